@@ -1,0 +1,64 @@
+"""Guided super-resolution for path-traced pictures; no Blender needed.
+
+Importing this package imports neither torch nor Blender: the public names are
+loaded on first use.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import (
+    Cancelled,
+    PictureError,
+    SceneError,
+    UsageError,
+    WeightsError,
+    XRDSError,
+)
+
+if TYPE_CHECKING:
+    from .network import XRDS as XRDS
+    from .network import NetworkConfig as NetworkConfig
+    from .upscale_file import upscale_file as upscale_file
+    from .upscaler import Upscaled as Upscaled
+    from .upscaler import Upscaler as Upscaler
+    from .upscaler import upscale as upscale
+
+_LAZY = {
+    "XRDS": ".network",
+    "NetworkConfig": ".network",
+    "Upscaled": ".upscaler",
+    "Upscaler": ".upscaler",
+    "upscale": ".upscaler",
+    "upscale_file": ".upscale_file",
+}
+
+__all__ = [
+    "XRDS",
+    "Cancelled",
+    "NetworkConfig",
+    "PictureError",
+    "SceneError",
+    "Upscaled",
+    "Upscaler",
+    "UsageError",
+    "WeightsError",
+    "XRDSError",
+    "upscale",
+    "upscale_file",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name that needs torch when it is first asked for."""
+    if name not in _LAZY:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_LAZY[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

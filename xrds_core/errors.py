@@ -1,0 +1,34 @@
+"""The errors XRDS raises on purpose.
+
+Each message is one clear line: what is wrong, where (with the value), and the
+remedy. Whatever else reaches a caller is a bug.
+"""
+
+from __future__ import annotations
+
+
+class XRDSError(Exception):
+    """Base of every error of this project; its text can be shown to a user."""
+
+
+class WeightsError(XRDSError):
+    """A weights file is missing, damaged, or made for another network."""
+
+
+class PictureError(XRDSError):
+    """Arrays or picture files that cannot be used: wrong size, pass, or format."""
+
+
+class SceneError(XRDSError):
+    """A scene that cannot be rendered, e.g. without a camera."""
+
+
+class UsageError(XRDSError):
+    """Options that contradict each other or lie outside their range (exit 2)."""
+
+
+class Cancelled(XRDSError):
+    """The user, or a progress callback returning False, stopped the work."""
+
+    def __init__(self, message: str = "cancelled") -> None:
+        super().__init__(message)
