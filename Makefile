@@ -1,0 +1,30 @@
+# make install | test | demo | extension | clean.  BPY=5.0.1 picks another Blender.
+PYTHON ?= python3.11
+VENV   ?= .venv
+BPY    ?= 4.5.15
+TORCH  ?= 2.13.0
+RUN    := $(VENV)/bin/python
+STAMP  := $(VENV)/.installed-bpy-$(BPY)-torch-$(TORCH)
+
+.PHONY: install test demo extension clean
+
+install: $(STAMP)
+
+$(STAMP): pyproject.toml
+	test -x $(RUN) || $(PYTHON) -m venv $(VENV)
+	$(RUN) -m pip install --quiet "torch==$(TORCH)"
+	$(RUN) -m pip install --quiet --editable ".[blender,dev]" "bpy==$(BPY)"
+	rm -f $(VENV)/.installed-*
+	touch $@
+
+test: install
+	$(RUN) -m ruff check .
+	$(RUN) -m mypy
+	$(RUN) tests/run.py
+
+demo: install
+	$(RUN) -m xrds_blender.studio.demo --out demo
+
+clean:
+	rm -rf build dist demo *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	find xrds_core xrds_blender tests -name __pycache__ -prune -exec rm -rf {} +

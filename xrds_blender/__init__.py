@@ -1,0 +1,1 @@
+"""The Blender add-on: the XRDS render engine and its commands."""
