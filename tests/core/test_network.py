@@ -1,0 +1,159 @@
+"""The network against the paper's counts, and what the presets promise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+import torch
+from torch import nn
+from torch.nn import functional as F
+
+from xrds_core.network import (
+    ALBEDO_EPSILON,
+    GUIDE_CHANNELS,
+    XRDS,
+    NetworkConfig,
+    preset_config,
+)
+
+# (RDST per XDG, XDG): parameters (M) and MACs (G) as the paper prints them, x4, 1024².
+PAPER_TABLE = {
+    (5, 3): ("9.36", "723.68"),
+    (3, 3): ("6.21", "519.13"),
+    (1, 3): ("3.06", "314.59"),
+    (5, 2): ("6.42", "507.86"),
+    (5, 1): ("3.49", "292.04"),
+}
+TINY = NetworkConfig(groups=1, blocks=1, channels=8, guide_channels=4, window_size=4)
+
+
+def count(config: NetworkConfig, height: int, width: int) -> tuple[int, int]:
+    """Parameters and MACs of Conv2d and Linear, as the paper's profiler counts."""
+    macs = 0
+
+    def conv(module: nn.Conv2d, _: object, out: torch.Tensor) -> None:
+        nonlocal macs
+        macs += out.numel() * module.weight[0].numel()
+
+    def linear(module: nn.Linear, _: object, out: torch.Tensor) -> None:
+        nonlocal macs
+        macs += out.numel() * module.in_features
+
+    with torch.device("meta"):
+        network = XRDS(config)
+        for module in network.modules():
+            if isinstance(module, nn.Conv2d):
+                module.register_forward_hook(conv)
+            elif isinstance(module, nn.Linear):
+                module.register_forward_hook(linear)
+        s = config.scale
+        guides = torch.empty(1, config.guide_count, height * s, width * s)
+        network(torch.empty(1, 3, height, width), guides)
+    return sum(p.numel() for p in network.parameters()), macs
+
+
+@pytest.mark.parametrize(("blocks", "groups"), PAPER_TABLE)
+def test_counts_are_the_papers(blocks: int, groups: int) -> None:
+    parameters, macs = count(NetworkConfig(groups=groups, blocks=blocks), 256, 256)
+    printed = f"{parameters / 1e6:.2f}", f"{macs / 1e9:.2f}"
+    assert printed == PAPER_TABLE[blocks, groups]
+
+
+@pytest.mark.parametrize("scale", [1, 2, 4, 8, 16])
+def test_every_scale_and_odd_sizes(scale: int) -> None:
+    network = XRDS(replace(TINY, scale=scale, cell=scale))
+    out = network(torch.rand(2, 3, 5, 7), torch.rand(2, 6, 5 * scale, 7 * scale))
+    assert out.shape == (2, 3, 5 * scale, 7 * scale)
+
+
+@pytest.mark.parametrize("block", ["rdst", "rdb", "rstb"])
+@pytest.mark.parametrize("guides", GUIDE_CHANNELS)
+@pytest.mark.parametrize("cross_attention", [True, False])
+def test_ablations_train_every_weight(
+    block: str, guides: str, cross_attention: bool
+) -> None:
+    config = replace(TINY, block=block, guides=guides, cross_attention=cross_attention)
+    network = XRDS(config)
+    out = network(torch.rand(1, 3, 8, 8), torch.rand(1, config.guide_count, 32, 32))
+    out.square().mean().backward()
+    assert all(p.grad is not None for p in network.parameters())
+
+
+@pytest.mark.parametrize("guides", ["albedo", "normal", "none"])
+def test_left_out_guides_have_no_influence(guides: str) -> None:
+    network = XRDS(replace(TINY, guides=guides)).eval()
+    radiance, stack = torch.rand(1, 3, 8, 8), torch.rand(1, 6, 32, 32)
+    other = torch.rand(1, 6, 32, 32)
+    for channel in GUIDE_CHANNELS[guides]:
+        other[:, channel] = stack[:, channel]
+    assert torch.equal(network(radiance, stack), network(radiance, other))
+
+
+def test_shifted_windows_do_not_wrap_around() -> None:
+    network = XRDS(replace(TINY, scale=1, cell=1, cross_attention=False)).eval()
+    radiance, guides = torch.rand(1, 3, 32, 32), torch.rand(1, 6, 32, 32)
+    before = network(radiance, guides)
+    radiance[..., -1:] += 1.0  # the right edge must not reach the left one
+    after = network(radiance, guides)
+    assert torch.equal(before[..., :4], after[..., :4])
+    assert not torch.equal(before[..., -4:], after[..., -4:])
+
+
+@pytest.mark.parametrize("preset", ["fast", "balanced"])
+@pytest.mark.parametrize("scale", [1, 2, 4, 8])
+def test_untrained_presets_are_the_demodulated_base(preset: str, scale: int) -> None:
+    torch.manual_seed(1)
+    network = XRDS(preset_config(preset, scale)).eval()
+    low = torch.rand(1, 3, 16, 16) + 0.5
+    low = F.avg_pool2d(F.pad(low, (2, 2, 2, 2), mode="replicate"), 5, stride=1)
+    guides = torch.rand(1, 6, 16 * scale, 16 * scale)
+    albedo = guides[:, :3] + ALBEDO_EPSILON
+    with torch.inference_mode():
+        out = torch.expm1(network(torch.log1p(low), guides))
+    irradiance = low / F.avg_pool2d(albedo, scale)
+    base = F.interpolate(irradiance, scale_factor=scale, mode="bilinear") * albedo
+    relative = (out - base).abs().mean() / base.mean()
+    assert relative < 0.1  # kernels keep every neighbour within reach: not exactly
+
+
+@pytest.mark.parametrize("preset", ["fast", "balanced"])
+@pytest.mark.parametrize("guides", ["fast", "full"])
+def test_presets_keep_black_and_grey(preset: str, guides: str) -> None:
+    torch.manual_seed(2)
+    config = preset_config(preset, 2, guides)
+    network = XRDS(config).eval()
+    for parameter in network.parameters():  # as far from the base as training can go
+        torch.nn.init.normal_(parameter, std=0.2)
+    stack = torch.rand(1, config.guide_count, 32, 32)
+    black = network(torch.zeros(1, 3, 16, 16), stack)
+    assert torch.equal(black, torch.zeros_like(black))
+    grey_stack = stack[:, :1].expand_as(stack)
+    grey = network(torch.rand(1, 1, 16, 16).expand(-1, 3, -1, -1), grey_stack)
+    assert (grey.amax(1) - grey.amin(1)).max() < 1e-5
+    assert grey.min() >= 0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"scale": 3}, "scale is 3"),
+        ({"cell": 2}, "cell 2"),
+        ({"guides": "depth"}, "'depth'"),
+        ({"block": "resnet"}, "'resnet'"),
+        ({"heads": 3}, "3 heads"),
+    ],
+)
+def test_wrong_configurations_say_what_is_wrong(change: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        NetworkConfig(**change)
+
+
+def test_wrong_guides_are_refused() -> None:
+    with pytest.raises(ValueError, match="guides are"):
+        XRDS(TINY)(torch.rand(1, 3, 8, 8), torch.rand(1, 6, 16, 16))
+
+
+def test_configuration_round_trip() -> None:
+    config = preset_config("fast", 2, "full")
+    assert NetworkConfig.from_dict(config.to_dict()) == config

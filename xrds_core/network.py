@@ -1,0 +1,582 @@
+"""XRDS, the Cross-modality Residual Densely-connected Swin Transformer.
+
+Hou and Liu, "Auxiliary Features-Guided Super Resolution for Monte Carlo Rendering".
+A low-resolution radiance picture and full-resolution guides (albedo, normal) go in, the
+full-resolution picture comes out. `NetworkConfig()` is the paper's network at scale 4.
+What the paper leaves open (the number of guide residual blocks, the deshuffle, where
+features are fused) is set so that its parameter and MAC counts come out to the last
+printed digit.
+
+Names: a *cell* is one position of the grid that the transformer works on. In the paper
+it is one low-resolution pixel; the small presets use coarser cells. Shape letters: B
+batch, C channels, h w cells or low-resolution pixels, H W output pixels, N tokens of a
+window, s scale.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+# Channels of the guide stack: albedo 0-2, normal 3-5, full-resolution radiance 6-8.
+GUIDE_CHANNELS: dict[str, tuple[int, ...]] = {
+    "none": (),
+    "albedo": (0, 1, 2),
+    "normal": (3, 4, 5),
+    "fast": (0, 1, 2, 3, 4, 5),
+    "full": (0, 1, 2, 3, 4, 5, 6, 7, 8),
+}
+
+# Added to albedo before it divides radiance: bounds the quotient on black surfaces.
+ALBEDO_EPSILON = 0.02
+# The same for the radiance of `full` guides, in units of k e x.
+RADIANCE_EPSILON = 0.05
+# Unit of the predicted sharpness: logits per squared distance between guides.
+SHARPNESS_UNIT = 10.0
+# The base may brighten or darken what its kernels gather by this factor at most.
+GAIN_LIMIT = 4.0
+
+
+@dataclass(frozen=True)
+class NetworkConfig:
+    """Hyper-parameters of `XRDS`; the defaults are the paper's, at scale 4."""
+
+    scale: int = 4
+    """Output pixels per low-resolution pixel along one axis, a power of two."""
+    groups: int = 3
+    """Number of cross-modality dense groups (XDG)."""
+    blocks: int = 5
+    """Number of RDST per group."""
+    channels: int = 64
+    guide_channels: int = 32
+    """Width of the guide branch."""
+    heads: int = 2
+    window_size: int = 8
+    """Cells per attention window along one axis."""
+    dense_layers: int = 4
+    """Convolution + Swin layers of one RDST."""
+    block: str = "rdst"
+    """`rdst`, or the ablations `rdb` (no Swin layers) and `rstb` (SwinIR's block)."""
+    cross_attention: bool = True
+    """False leaves out XM: guide features are then added to radiance features."""
+    guides: str = "fast"
+    """A key of `GUIDE_CHANNELS`."""
+    cell: int = 0
+    """Output pixels per cell along one axis; 0 means `scale`, the paper's grid."""
+    guide_stride: int = 1
+    """Guides are unshuffled by this before their first layer; divides `cell`."""
+    base: bool = False
+    """Predict kernels over the (demodulated) radiance instead of the radiance."""
+    tail_channels: int = 12
+    """Full-resolution width of the kernel predictor; only with `base`."""
+
+    def __post_init__(self) -> None:
+        if self.cell == 0:
+            object.__setattr__(self, "cell", self.scale)
+        for name in ("scale", "cell", "guide_stride"):
+            value = getattr(self, name)
+            if value < 1 or value & (value - 1):
+                raise ValueError(f"{name} is {value}; it must be a power of two")
+        if self.cell % self.scale or self.cell % self.guide_stride:
+            raise ValueError(
+                f"cell {self.cell} must be a multiple of scale {self.scale} "
+                f"and of guide_stride {self.guide_stride}"
+            )
+        if self.guides not in GUIDE_CHANNELS:
+            raise ValueError(f"guides is {self.guides!r}, not in {[*GUIDE_CHANNELS]}")
+        if self.block not in BLOCKS:
+            raise ValueError(f"block is {self.block!r}, not in {[*BLOCKS]}")
+        if self.channels % self.heads:
+            raise ValueError(f"{self.channels} channels, {self.heads} heads")
+
+    @property
+    def guide_count(self) -> int:
+        """Channels of the guide stack that `XRDS.forward` is given: 6 or 9."""
+        return 9 if self.guides == "full" else 6
+
+    @property
+    def low_multiple(self) -> int:
+        """Low-resolution height and width are padded to multiples of this."""
+        return self.window_size * self.cell // self.scale
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, fit for JSON."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> NetworkConfig:
+        """The inverse of `to_dict`; raises TypeError on unknown names."""
+        return cls(**values)
+
+
+PRESETS = ("paper", "balanced", "fast")
+
+
+def preset_config(preset: str, scale: int, guides: str = "fast") -> NetworkConfig:
+    """The configuration of a named preset.
+
+    `paper` is the published network. `balanced` and `fast` are the same class with
+    smaller numbers, a grid of at most a quarter of the output and the kernel base.
+    """
+    if preset == "paper":
+        return NetworkConfig(scale=scale, guides=guides)
+    small: dict[str, Any] = {
+        "scale": scale,
+        "guides": guides,
+        "cell": max(scale, 4),
+        "guide_stride": max(scale, 4),
+        "base": True,
+    }
+    if preset == "balanced":
+        return NetworkConfig(
+            groups=2,
+            blocks=2,
+            channels=48,
+            guide_channels=48,
+            tail_channels=24,
+            **small,
+        )
+    if preset == "fast":
+        return NetworkConfig(
+            groups=1,
+            blocks=1,
+            channels=32,
+            guide_channels=32,
+            tail_channels=16,
+            **small,
+        )
+    raise ValueError(f"preset is {preset!r}; there are {', '.join(PRESETS)}")
+
+
+def conv3(inputs: int, outputs: int) -> nn.Conv2d:
+    """The only convolution here: 3x3, stride 1, zero padding, bias."""
+    return nn.Conv2d(inputs, outputs, 3, padding=1)
+
+
+# --- attention in windows -------------------------------------------------------------
+
+
+def to_windows(x: Tensor, size: int) -> Tensor:
+    """(B, h, w, C) to (B * windows, size * size, C)."""
+    b, h, w, c = x.shape
+    x = x.view(b, h // size, size, w // size, size, c).transpose(2, 3)
+    return x.reshape(-1, size * size, c)
+
+
+def from_windows(windows: Tensor, size: int, h: int, w: int) -> Tensor:
+    """The inverse of `to_windows`: (B * windows, N, C) to (B, h, w, C)."""
+    c = windows.shape[-1]
+    x = windows.view(-1, h // size, w // size, size, size, c).transpose(2, 3)
+    return x.reshape(-1, h, w, c)
+
+
+def shift_mask(h: int, w: int, size: int, shift: int, like: Tensor) -> Tensor:
+    """(windows, 1, N, N): -100 between tokens that only the cyclic shift made meet."""
+    zone = torch.zeros(1, h, w, 1, device=like.device, dtype=like.dtype)
+    for i, rows in enumerate((slice(-size), slice(-size, -shift), slice(-shift, None))):
+        zone[:, rows] += 3 * i
+        zone[:, :, rows] += i
+    tokens = to_windows(zone, size).squeeze(-1)  # (windows, N)
+    return (tokens[:, None, :, None] != tokens[:, None, None, :]).to(like) * -100.0
+
+
+def attend(q: Tensor, k: Tensor, v: Tensor, heads: int, bias: Tensor | None) -> Tensor:
+    """Scaled dot-product attention; q, k, v and the result (windows, N, C)."""
+    q, k, v = (x.unflatten(-1, (heads, -1)).transpose(1, 2) for x in (q, k, v))
+    out = F.scaled_dot_product_attention(q, k, v, attn_mask=bias)  # (., heads, N, C')
+    return out.transpose(1, 2).flatten(2)
+
+
+class WindowAttention(nn.Module):
+    """Self-attention with a learnt bias per relative position (Swin's W-MSA)."""
+
+    def __init__(self, channels: int, heads: int, window_size: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.qkv = nn.Linear(channels, 3 * channels)
+        self.project = nn.Linear(channels, channels)
+        span = 2 * window_size - 1
+        self.position_bias = nn.Parameter(torch.zeros(span * span, heads))
+        nn.init.trunc_normal_(self.position_bias, std=0.02)
+        axis = torch.arange(window_size)
+        y, x = (g.flatten() for g in torch.meshgrid(axis, axis, indexing="ij"))
+        dy, dx = y[:, None] - y[None], x[:, None] - x[None]
+        index = (dy + window_size - 1) * span + dx + window_size - 1  # (N, N)
+        self.position_index: Tensor
+        self.register_buffer("position_index", index, persistent=False)
+
+    def forward(self, x: Tensor, mask: Tensor | None = None) -> Tensor:
+        bias = self.position_bias[self.position_index].permute(2, 0, 1)
+        bias = bias[None].to(x.dtype)  # (1, heads, N, N)
+        if mask is not None:  # (windows, 1, N, N), the same for every picture
+            bias = (bias + mask).repeat(x.shape[0] // mask.shape[0], 1, 1, 1)
+        q, k, v = self.qkv(x).chunk(3, dim=-1)
+        return self.project(attend(q, k, v, self.heads, bias))
+
+
+class WindowCrossAttention(nn.Module):
+    """Queries from one modality, keys and values from the other (W-MCA)."""
+
+    def __init__(self, channels: int, heads: int) -> None:
+        super().__init__()
+        self.heads = heads
+        self.query = nn.Linear(channels, channels)
+        self.key_value = nn.Linear(channels, 2 * channels)
+        self.project = nn.Linear(channels, channels)
+
+    def forward(self, x: Tensor, context: Tensor) -> Tensor:
+        k, v = self.key_value(context).chunk(2, dim=-1)
+        return self.project(attend(self.query(x), k, v, self.heads, None))
+
+
+class MLP(nn.Sequential):
+    """Two linear layers, `ratio` times as wide between them."""
+
+    def __init__(self, channels: int, ratio: int) -> None:
+        hidden = channels * ratio
+        super().__init__(
+            nn.Linear(channels, hidden), nn.GELU(), nn.Linear(hidden, channels)
+        )
+
+
+class SwinLayer(nn.Module):
+    """(Shifted) window self-attention and an MLP, each with a residual path."""
+
+    def __init__(self, config: NetworkConfig, shifted: bool) -> None:
+        super().__init__()
+        c = config.channels
+        self.window_size = config.window_size
+        self.shift = config.window_size // 2 if shifted else 0
+        self.norm1 = nn.LayerNorm(c)
+        self.attention = WindowAttention(c, config.heads, config.window_size)
+        self.norm2 = nn.LayerNorm(c)
+        self.mlp = MLP(c, ratio=2)
+
+    def forward(self, x: Tensor) -> Tensor:  # (B, C, h, w)
+        h, w = x.shape[-2:]
+        size, shift = self.window_size, self.shift
+        z = x.permute(0, 2, 3, 1)
+        mask = None
+        if shift:
+            z = z.roll((-shift, -shift), (1, 2))
+            mask = shift_mask(h, w, size, shift, x)
+        tokens = to_windows(z, size)
+        tokens = tokens + self.attention(self.norm1(tokens), mask)
+        tokens = tokens + self.mlp(self.norm2(tokens))
+        z = from_windows(tokens, size, h, w)
+        if shift:
+            z = z.roll((shift, shift), (1, 2))
+        return z.permute(0, 3, 1, 2)
+
+
+# --- blocks of the radiance branch ----------------------------------------------------
+
+
+class RDST(nn.Module):
+    """Residual densely-connected Swin block: RDN's, a Swin layer in each layer."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        c, layers = config.channels, config.dense_layers
+        self.convs = nn.ModuleList(conv3(c * (k + 1), c) for k in range(layers))
+        self.layers = nn.ModuleList(self.layer(config, k) for k in range(layers))
+        self.fuse = nn.Conv2d(c * (layers + 1), c, 1)
+
+    def layer(self, config: NetworkConfig, index: int) -> nn.Module:
+        return SwinLayer(config, shifted=index % 2 == 1)
+
+    def forward(self, x: Tensor) -> Tensor:
+        features = [x]
+        for conv, layer in zip(self.convs, self.layers, strict=True):
+            features.append(layer(conv(torch.cat(features, dim=1))))
+        return x + self.fuse(torch.cat(features, dim=1))
+
+
+class RDB(RDST):
+    """RDN's residual dense block: `RDST` with ReLU in place of the Swin layers."""
+
+    def layer(self, config: NetworkConfig, index: int) -> nn.Module:
+        return nn.ReLU()
+
+
+class RSTB(nn.Sequential):
+    """SwinIR's residual block: Swin layers, then a convolution."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        layers = (SwinLayer(config, k % 2 == 1) for k in range(config.dense_layers))
+        super().__init__(*layers, conv3(config.channels, config.channels))
+
+    def forward(self, x: Tensor) -> Tensor:
+        return x + super().forward(x)
+
+
+BLOCKS: dict[str, type[RDST] | type[RSTB]] = {"rdst": RDST, "rdb": RDB, "rstb": RSTB}
+
+
+class CrossModality(nn.Module):
+    """XM: self-attention on radiance features, then cross-attention to the guides'."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        c = config.channels
+        self.window_size = config.window_size
+        self.norm1 = nn.LayerNorm(c)
+        self.self_attention = WindowAttention(c, config.heads, config.window_size)
+        self.norm2 = nn.LayerNorm(c)
+        self.norm_guides = nn.LayerNorm(c)
+        self.cross_attention = WindowCrossAttention(c, config.heads)
+        self.norm3 = nn.LayerNorm(c)
+        self.mlp = MLP(c, ratio=4)
+
+    def forward(self, features: Tensor, guides: Tensor) -> Tensor:  # both (B, C, h, w)
+        h, w = features.shape[-2:]
+        x, context = (
+            to_windows(y.permute(0, 2, 3, 1), self.window_size)
+            for y in (features, guides)
+        )
+        x = x + self.self_attention(self.norm1(x))
+        x = x + self.cross_attention(self.norm2(x), self.norm_guides(context))
+        x = x + self.mlp(self.norm3(x))
+        return from_windows(x, self.window_size, h, w).permute(0, 3, 1, 2)
+
+
+class XDG(nn.Module):
+    """Cross-modality dense group: XM, RDSTs and a convolution inside a skip."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.cross = CrossModality(config) if config.cross_attention else None
+        block = BLOCKS[config.block]
+        self.blocks = nn.Sequential(*(block(config) for _ in range(config.blocks)))
+        self.conv = conv3(config.channels, config.channels)
+
+    def forward(self, features: Tensor, guides: Tensor) -> Tensor:
+        x = self.cross(features, guides) if self.cross else features + guides
+        return x + self.conv(self.blocks(x))
+
+
+# --- the guide branch -----------------------------------------------------------------
+
+
+class ResidualBlock(nn.Sequential):
+    """Two convolutions inside a skip, without normalisation."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__(
+            conv3(channels, channels), nn.ReLU(), conv3(channels, channels)
+        )
+
+    def forward(self, x: Tensor) -> Tensor:
+        return x + super().forward(x)
+
+
+class Deshuffle(nn.Sequential):
+    """Guide features down to cells: unshuffle by 2 and convolve, step by step."""
+
+    def __init__(self, inputs: int, outputs: int, steps: int) -> None:
+        layers: list[nn.Module] = []
+        for _ in range(steps - 1):
+            layers += [nn.PixelUnshuffle(2), conv3(4 * inputs, inputs), nn.ReLU()]
+        if steps:
+            layers += [nn.PixelUnshuffle(2), conv3(4 * inputs, outputs)]
+        else:
+            layers += [conv3(inputs, outputs)]
+        super().__init__(*layers, ResidualBlock(outputs))
+
+
+# --- tails ----------------------------------------------------------------------------
+
+
+class PixelTail(nn.Module):
+    """The paper's: pixel shuffle by 2, step by step, then the picture itself."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        c = config.channels
+        layers: list[nn.Module] = []
+        for _ in range(int(math.log2(config.cell))):
+            layers += [conv3(c, 4 * c), nn.PixelShuffle(2)]
+        self.layers = nn.Sequential(*layers, conv3(c, 3))
+
+    def forward(self, features: Tensor, radiance: Tensor, guides: Tensor) -> Tensor:
+        return self.layers(features)
+
+
+def neighbours(low: Tensor) -> list[Tensor]:
+    """The 3x3 neighbours of every pixel, edge clamped: nine of (B, C, 1, h, w)."""
+    h, w = low.shape[-2:]
+    padded = F.pad(low, (1, 1, 1, 1), mode="replicate")
+    return [
+        padded[:, :, None, y : y + h, x : x + w] for y in range(3) for x in range(3)
+    ]
+
+
+def bilinear_logits(scale: int) -> Tensor:
+    """(9, s * s): log of the bilinear weights of the 3x3 neighbours.
+
+    The floor keeps neighbours that bilinear interpolation leaves out within reach.
+    """
+    offset = (torch.arange(scale) + 0.5) / scale - 0.5  # of output pixels in their cell
+    axis = torch.stack((-offset, 1 - offset.abs(), offset)).clamp(min=0)  # (3, s)
+    weights = axis[:, None, :, None] * axis[None, :, None, :]  # (3, 3, s, s)
+    return (weights + 0.01).log().view(9, scale * scale)
+
+
+class KernelTail(nn.Module):
+    """The demodulated base, its kernels predicted.
+
+    Every output pixel is a convex combination of its 3x3 low-resolution neighbours: of
+    their radiance, and of their radiance divided by a modulator's area mean and
+    multiplied by the modulator at the pixel. The modulators are the albedo and, with
+    `full` guides, the full-resolution radiance. A gain, bounded by `GAIN_LIMIT`, scales
+    the result. So nothing rings, turns negative or becomes coloured by itself. Kernels
+    start from bilinear weights and fall with the distance between guides, as a joint
+    bilateral filter's, as fast as the network asks; untrained, they are bilinear on the
+    demodulated radiance.
+    """
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.scale, self.cell = config.scale, config.cell
+        self.modulators = 2 if config.guides == "full" else 1
+        width = config.tail_channels
+        self.expand = conv3(config.channels, width * config.cell**2)
+        self.mix = conv3(width + config.guide_count, width)
+        # per pixel: logits of each candidate, sharpness by albedo and by normal, gain
+        self.predict = nn.Conv2d(width, 9 * (self.modulators + 1) + 3, 1)
+        for parameter in self.predict.parameters():
+            nn.init.zeros_(parameter)
+        prior = torch.tensor([-4.0] + [0.0] * self.modulators)  # plain radiance, others
+        logits = prior[:, None, None] + bilinear_logits(config.scale)
+        self.prior: Tensor
+        self.register_buffer("prior", logits, persistent=False)
+
+    def forward(self, features: Tensor, radiance: Tensor, guides: Tensor) -> Tensor:
+        x = F.pixel_shuffle(self.expand(features), self.cell)
+        x = F.relu(self.mix(torch.cat((x, guides.to(x)), dim=1)))
+        x = F.pixel_unshuffle(self.predict(x), self.scale)
+        # sums over radiance need float32, whatever the precision of the layers above
+        return torch.log1p(self.combine(x.float(), radiance.float(), guides.float()))
+
+    def combine(self, predicted: Tensor, radiance: Tensor, guides: Tensor) -> Tensor:
+        s2 = self.scale**2
+        predicted = predicted.unflatten(1, (-1, s2))  # (B, n, s*s, h, w)
+        kernels = self.kernels(predicted, guides)
+        low = torch.expm1(radiance)
+        out = self.gather(kernels[:, 0], low)
+        for m, modulator in enumerate(self.modulations(guides)):
+            demodulated = low / F.avg_pool2d(modulator, self.scale)
+            cells = F.pixel_unshuffle(modulator, self.scale).unflatten(1, (3, s2))
+            out = out + self.gather(kernels[:, m + 1], demodulated) * cells
+        gain = torch.exp(math.log(GAIN_LIMIT) * torch.tanh(predicted[:, -1:]))
+        return F.pixel_shuffle((out * gain).flatten(1, 2), self.scale)
+
+    def kernels(self, predicted: Tensor, guides: Tensor) -> Tensor:
+        """Softmax over all candidates: (B, 1 + modulators, 9, s*s, h, w)."""
+        logits = predicted[:, :-3].unflatten(1, (-1, 9)) + self.prior[..., None, None]
+        distance = torch.zeros_like(logits[:, 0])
+        for channel, guide in ((-3, guides[:, :3]), (-2, guides[:, 3:6])):
+            sharpness = SHARPNESS_UNIT * predicted[:, channel, None]
+            distance = distance + sharpness * self.distances(guide)
+        logits = logits - distance[:, None]
+        return logits.flatten(1, 2).softmax(dim=1).unflatten(1, (-1, 9))
+
+    def distances(self, guide: Tensor) -> Tensor:
+        """Squared distance of pixels' guides to neighbours': (B, 9, s*s, h, w)."""
+        cells = F.pixel_unshuffle(guide, self.scale).unflatten(1, (3, -1))
+        means = neighbours(F.avg_pool2d(guide, self.scale))
+        return torch.stack([(cells - mean).square().sum(1) for mean in means], dim=1)
+
+    def modulations(self, guides: Tensor) -> list[Tensor]:
+        modulations = [guides[:, :3] + ALBEDO_EPSILON]
+        if self.modulators == 2:
+            modulations.append(torch.expm1(guides[:, 6:9]) + RADIANCE_EPSILON)
+        return modulations
+
+    @staticmethod
+    def gather(kernel: Tensor, low: Tensor) -> Tensor:
+        """Kernels (B, 9, s*s, h, w) over (B, 3, h, w): (B, 3, s*s, h, w)."""
+        taps = (kernel[:, k, None] * x for k, x in enumerate(neighbours(low)))
+        return sum(taps, torch.zeros((), device=low.device))
+
+
+# --- the network ----------------------------------------------------------------------
+
+
+class XRDS(nn.Module):
+    """The network: low-resolution radiance and full-resolution guides to radiance."""
+
+    def __init__(self, config: NetworkConfig) -> None:
+        super().__init__()
+        self.config = config
+        c, g = config.channels, config.guide_channels
+        fold = config.cell // config.scale  # low-resolution pixels per cell, one axis
+        steps = int(math.log2(config.cell // config.guide_stride))
+        inputs = len(GUIDE_CHANNELS[config.guides]) or config.guide_count
+        self.radiance_head = nn.Sequential(
+            nn.PixelUnshuffle(fold), conv3(3 * fold**2, c)
+        )
+        self.guide_head = nn.Sequential(
+            nn.PixelUnshuffle(config.guide_stride),
+            conv3(inputs * config.guide_stride**2, g),
+        )
+        self.guide_blocks = nn.ModuleList(
+            ResidualBlock(g) for _ in range(config.groups)
+        )
+        self.deshuffles = nn.ModuleList(
+            Deshuffle(g, c, steps) for _ in range(config.groups + 1)
+        )
+        self.groups = nn.ModuleList(XDG(config) for _ in range(config.groups))
+        self.fuse = conv3(2 * c, c)
+        self.tail = KernelTail(config) if config.base else PixelTail(config)
+
+    def forward(self, radiance: Tensor, guides: Tensor) -> Tensor:
+        """Enlarge one batch.
+
+        Args:
+            radiance: (B, 3, h, w), scene-linear, in the transfer domain log(1 + k e x).
+            guides: (B, 6, s*h, s*w), albedo in [0, 1] and camera-space normal; with
+                `full` guides (B, 9, s*h, s*w), the full-resolution radiance in the
+                transfer domain behind them.
+
+        Returns:
+            (B, 3, s*h, s*w) radiance in the transfer domain.
+        """
+        s = self.config.scale
+        h, w = radiance.shape[-2:]
+        expected = (self.config.guide_count, s * h, s * w)
+        if guides.shape[1:] != expected:
+            raise ValueError(f"guides are {tuple(guides.shape[1:])}, not {expected}")
+        radiance, guides = self.pad(radiance, 1), self.pad(guides, s)
+        features = self.features(radiance, guides)
+        return self.tail(features, radiance, guides)[..., : s * h, : s * w]
+
+    def features(self, radiance: Tensor, guides: Tensor) -> Tensor:
+        """The transformer: (B, C, cells, cells)."""
+        head = features = self.radiance_head(radiance)
+        guide = self.guide_head(self.select(guides))
+        detail = self.deshuffles[0](guide)
+        for block, deshuffle, group in zip(
+            self.guide_blocks, self.deshuffles[1:], self.groups, strict=True
+        ):
+            features = group(features, detail)
+            guide = block(guide)
+            detail = deshuffle(guide)
+        return self.fuse(torch.cat((features, detail), dim=1)) + head
+
+    def select(self, guides: Tensor) -> Tensor:
+        channels = GUIDE_CHANNELS[self.config.guides]
+        if not channels:
+            return torch.zeros_like(guides)
+        return guides[:, channels[0] : channels[-1] + 1]
+
+    def pad(self, x: Tensor, factor: int) -> Tensor:
+        """Pad bottom and right to whole windows; `factor` pixels per low pixel."""
+        multiple = self.config.low_multiple * factor
+        bottom, right = (-size % multiple for size in x.shape[-2:])
+        return F.pad(x, (0, right, 0, bottom), mode="replicate")
