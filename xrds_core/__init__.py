@@ -21,7 +21,7 @@ from .errors import (
 if TYPE_CHECKING:
     from .network import XRDS as XRDS
     from .network import NetworkConfig as NetworkConfig
-    from .upscale_file import upscale_file as upscale_file
+    from .exr_upscale import upscale_file as upscale_file
     from .upscaler import Upscaled as Upscaled
     from .upscaler import Upscaler as Upscaler
     from .upscaler import upscale as upscale
@@ -32,7 +32,7 @@ _LAZY = {
     "Upscaled": ".upscaler",
     "Upscaler": ".upscaler",
     "upscale": ".upscaler",
-    "upscale_file": ".upscale_file",
+    "upscale_file": ".exr_upscale",
 }
 
 __all__ = [

@@ -1,0 +1,214 @@
+"""Radiance to network space and back, and what keeps every value bounded.
+
+NumPy pictures are float32 (height, width, channels), row 0 on top, scene-linear
+Rec.709, radiance premultiplied by alpha. Torch tensors are (batch, channels,
+height, width). ``exposure`` is the dimensionless factor e of one whole picture.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+from torch.nn import functional
+
+Picture = NDArray[np.float32]
+ArrayOrTensor = TypeVar("ArrayOrTensor", NDArray[np.float32], Tensor)
+
+TRANSFER_GAIN = 10.0
+EXPOSURE_KEY = 0.18
+ALBEDO_EPSILON = 0.02
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec.709
+
+_MOST_BINS = 16  # along each axis
+_DARKEST_BIN = 1e-4  # of the brightest; darker bins say nothing of the exposure
+_EXPOSURE_RANGE = (1e-36, 1e36)  # times the gain, still a normal float32
+_LARGEST = np.finfo(np.float32).max
+# Of k e x: its square, over the epsilons that networks divide by, is a float32 still.
+_LARGEST_EXPOSED = 1e18
+_LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
+
+
+def clean_radiance(x: Picture) -> tuple[Picture, int]:
+    """Return (x, bad pixels): NaN and infinities filled in, negative values 0.
+
+    ``x`` itself is returned where nothing is wrong with it; else a copy.
+    """
+    x, holes = fill_holes(x)
+    if not x.size or x.min() >= 0.0:
+        return x, holes
+    negative = int((x < 0.0).any(axis=-1).sum())
+    return np.maximum(x, np.float32(0.0)), holes + negative
+
+
+def clean_albedo(x: Picture) -> tuple[Picture, int]:
+    """Return (x in [0, 1], pixels that held NaN or infinities).
+
+    Values above 1 are no fault: Cycles adds emission and background to its
+    denoising albedo.
+    """
+    x, holes = fill_holes(x)
+    return np.clip(x, 0.0, 1.0), holes
+
+
+def clean_normal(x: Picture) -> tuple[Picture, int]:
+    """Return (x in [-1, 1], pixels that held NaN or infinities); zero stays zero.
+
+    Cycles' denoising normals are means of unit vectors, so shorter than 1 at
+    edges: their length is information and is not normalised away.
+    """
+    x, holes = fill_holes(x)
+    return np.clip(x, -1.0, 1.0), holes
+
+
+def fill_holes(x: Picture) -> tuple[Picture, int]:
+    """Replace pixels with NaN or infinities by the mean of finite ones near them.
+
+    Returns (x, holes); ``x`` itself where there are none. A picture without a
+    single finite pixel becomes 0.
+    """
+    # min and max propagate NaN and need no array of the size of the picture
+    if not x.size or (np.isfinite(x.min()) and np.isfinite(x.max())):
+        return x, 0
+    finite = np.isfinite(x).all(axis=-1)
+    return _pull_push(x, finite), int(finite.size - finite.sum())
+
+
+def _pull_push(x: Picture, known: NDArray[np.bool_]) -> Picture:
+    """Fill unknown pixels from the means of 2x2 blocks, coarser where need be."""
+    if known.all():
+        return x
+    x = np.where(known[..., None], x, np.float32(0.0))
+    if not known.any():
+        return x
+    height, width = known.shape
+    even = ((0, height % 2), (0, width % 2))
+    blocks = np.pad(x, (*even, (0, 0))) * np.float32(0.25)  # sums stay in range
+    counts = np.pad(known, even).astype(np.float32) * np.float32(0.25)
+    for axis in (0, 1):
+        blocks = _pair_sums(blocks, axis)
+        counts = _pair_sums(counts, axis)
+    means = blocks / np.maximum(counts, np.float32(0.25))[..., None]
+    coarse = _pull_push(np.clip(means, -_LARGEST, _LARGEST), counts > 0.0)
+    fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
+    return np.where(known[..., None], x, fine)
+
+
+def _pair_sums(x: Picture, axis: int) -> Picture:
+    even, odd = (np.take(x, range(i, x.shape[axis], 2), axis=axis) for i in (0, 1))
+    return np.asarray(even + odd)
+
+
+def auto_exposure(radiance: Picture) -> float:
+    """Return e: the key over the geometric mean luminance of the picture's bins.
+
+    ``radiance`` (h, w, 3 or more) is clean and low-resolution. Its bins are at
+    most 16 x 16, whatever its size, so that a tiny render of a frame gives the
+    frame's own exposure. After OIDN's auto-exposure (Afra, 2019).
+    """
+    luminance = radiance[..., :3].astype(np.float64) @ np.asarray(LUMINANCE)
+    for axis in (0, 1):
+        luminance = _bin_means(luminance, axis)
+    brightest = float(luminance.max(initial=0.0))
+    if brightest <= 0.0:
+        return 1.0
+    seen = luminance[luminance >= brightest * _DARKEST_BIN]
+    exposure = EXPOSURE_KEY / math.exp(float(np.log(seen).mean()))
+    return min(max(exposure, _EXPOSURE_RANGE[0]), _EXPOSURE_RANGE[1])
+
+
+def _bin_means(x: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    size = x.shape[axis]
+    bins = min(size, _MOST_BINS)
+    edges = [i * size // bins for i in range(bins + 1)]
+    means = [
+        np.take(x, range(low, high), axis=axis).mean(axis=axis)
+        for low, high in pairwise(edges)
+    ]
+    return np.stack(means, axis=axis) if means else x
+
+
+def transfer(x: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
+    """Return t(x) = log(1 + k e x) in float32, for radiance >= 0 of any range.
+
+    ``exposure`` may be a tensor that broadcasts against ``x``, one e a picture.
+    """
+    if isinstance(x, Tensor):
+        exposed = x.float() * (TRANSFER_GAIN * exposure)
+        return torch.log1p(exposed.clamp(0.0, _LARGEST_EXPOSED))
+    with np.errstate(over="ignore"):
+        exposed = x.astype(np.float32, copy=False) * _gain(exposure)
+    return np.log1p(np.clip(exposed, 0.0, _LARGEST_EXPOSED))
+
+
+def inverse_transfer(t: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
+    """Return the radiance whose transfer is ``t``; finite for every finite t."""
+    if isinstance(t, Tensor):
+        exposed = torch.expm1(t.float().clamp(max=_LARGEST_TRANSFERRED))
+        return (exposed / (TRANSFER_GAIN * exposure)).clamp(max=float(_LARGEST))
+    with np.errstate(over="ignore"):
+        t = t.astype(np.float32, copy=False)
+        exposed = np.expm1(np.minimum(t, np.float32(_LARGEST_TRANSFERRED)))
+        return np.minimum(exposed / _gain(exposure), _LARGEST)
+
+
+def _gain(exposure: float | Tensor) -> np.float32:
+    return np.float32(TRANSFER_GAIN * float(exposure))
+
+
+def area_mean(x: Tensor, scale: int) -> Tensor:
+    """Return the means of scale x scale blocks: (B, C, s h, s w) -> (B, C, h, w)."""
+    return functional.avg_pool2d(x, scale)
+
+
+def upsample_bilinear(x: Tensor, scale: int) -> Tensor:
+    """Interpolate (B, C, h, w) -> (B, C, s h, s w): half-pixel centres, edges held."""
+    if scale == 1:
+        return x
+    return functional.interpolate(
+        x, scale_factor=float(scale), mode="bilinear", align_corners=False
+    )
+
+
+def demodulated_base(radiance: Picture, albedo: Picture, scale: int) -> Picture:
+    """Return up(L / down(A')) A' with A' = albedo + epsilon, albedo in [0, 1].
+
+    ``radiance`` (h, w, 3) and ``albedo`` (s h, s w, 3) are clean; the result is
+    radiance (s h, s w, 3). Lighting is smoother than texture, so it is what is
+    interpolated.
+    """
+    guide = _to_tensor(albedo) + ALBEDO_EPSILON
+    lighting = _to_tensor(radiance) / area_mean(guide, scale)
+    return _to_picture(upsample_bilinear(lighting, scale) * guide)
+
+
+def upsample_alpha(low_alpha: Picture, guide_alpha: Picture, scale: int) -> Picture:
+    """Return alpha (H, W): the edges of ``guide_alpha``, the cover of ``low_alpha``.
+
+    ``low_alpha`` (h, w), ``guide_alpha`` (H, W) with H <= s h, W <= s w. Exactly 0
+    or 1 wherever the low-resolution pixel and the guide both are.
+    """
+    height, width = guide_alpha.shape
+    low = _to_tensor(np.clip(low_alpha, 0.0, 1.0)[..., None])
+    edge = ((0, low.shape[2] * scale - height), (0, low.shape[3] * scale - width))
+    guide = _to_tensor(np.pad(np.clip(guide_alpha, 0.0, 1.0), edge, "edge")[..., None])
+    missing = upsample_bilinear(low - area_mean(guide, scale), scale)
+    alpha = (guide + missing).clamp(0.0, 1.0)
+    block = functional.interpolate(low, scale_factor=float(scale), mode="nearest")
+    agreed = (block == guide) & ((guide == 0.0) | (guide == 1.0))
+    return _to_picture(torch.where(agreed, guide, alpha))[:height, :width, 0]
+
+
+def _to_tensor(x: Picture) -> Tensor:
+    """(H, W, C) array -> (1, C, H, W) tensor."""
+    return torch.from_numpy(np.ascontiguousarray(x.transpose(2, 0, 1)))[None].float()
+
+
+def _to_picture(x: Tensor) -> Picture:
+    """(1, C, H, W) tensor -> (H, W, C) array."""
+    return np.ascontiguousarray(x[0].permute(1, 2, 0).numpy())
