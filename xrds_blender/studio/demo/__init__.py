@@ -1,0 +1,1 @@
+"""The demo: one procedural still life, every method side by side."""
