@@ -19,9 +19,9 @@ from .errors import (
 )
 
 if TYPE_CHECKING:
+    from .exr_upscale import upscale_file as upscale_file
     from .network import XRDS as XRDS
     from .network import NetworkConfig as NetworkConfig
-    from .exr_upscale import upscale_file as upscale_file
     from .upscaler import Upscaled as Upscaled
     from .upscaler import Upscaler as Upscaler
     from .upscaler import upscale as upscale

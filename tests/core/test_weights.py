@@ -1,0 +1,182 @@
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from xrds_core import weights
+from xrds_core.errors import WeightsError
+from xrds_core.network import XRDS, NetworkConfig
+
+CONFIG = NetworkConfig(
+    scale=2,
+    groups=1,
+    blocks=1,
+    channels=4,
+    guide_channels=4,
+    window_size=2,
+    dense_layers=1,
+    tail_channels=2,
+    base=True,
+)
+RECORD = {"preset": "fast", "blender_series": "4.5"}
+
+
+@pytest.fixture
+def network() -> XRDS:
+    torch.manual_seed(1)
+    return XRDS(CONFIG)
+
+
+@pytest.fixture
+def path(network: XRDS, tmp_path: Path) -> Path:
+    file = tmp_path / "fast_x2.safetensors"
+    weights.save(network, file, RECORD)
+    return file
+
+
+def test_saved_weights_come_back_to_half_precision(network: XRDS, path: Path) -> None:
+    loaded, metadata = weights.load(path)
+    assert loaded.config == CONFIG
+    assert metadata.items() >= RECORD.items()
+    for name, value in network.state_dict().items():
+        assert torch.equal(loaded.state_dict()[name], value.half().float())
+    assert not any(p.requires_grad for p in loaded.parameters())
+
+
+def test_saving_leaves_one_file_that_others_may_read(path: Path) -> None:
+    assert list(path.parent.iterdir()) == [path]
+    assert path.stat().st_mode & 0o044 == Path(__file__).stat().st_mode & 0o044
+
+
+def test_diverged_weights_are_not_saved(network: XRDS, tmp_path: Path) -> None:
+    with torch.no_grad():
+        network.fuse.bias[0] = 1e6
+    with pytest.raises(WeightsError, match=r"fuse\.bias"):
+        weights.save(network, tmp_path / "x.safetensors", {})
+    assert not list(tmp_path.iterdir())
+
+
+def test_every_truncation_is_a_weights_error(path: Path) -> None:
+    whole = path.read_bytes()
+    for percent in range(100):
+        path.write_bytes(whole[: len(whole) * percent // 100])
+        with pytest.raises(WeightsError, match="fast_x2"):
+            weights.load(path)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_random_bytes_are_a_weights_error(path: Path, seed: int) -> None:
+    path.write_bytes(np.random.default_rng(seed).bytes(900))
+    with pytest.raises(WeightsError, match="fast_x2"):
+        weights.load(path)
+
+
+def test_a_pickle_is_never_run(path: Path, tmp_path: Path) -> None:
+    class Attack:
+        def __reduce__(self) -> tuple[object, ...]:
+            return Path.touch, (tmp_path / "owned",)
+
+    path.write_bytes(pickle.dumps(Attack()))
+    with pytest.raises(WeightsError, match="safetensors"):
+        weights.load(path)
+    assert not (tmp_path / "owned").exists()
+
+
+def rewrite(path: Path, config: object, **tensors: torch.Tensor | None) -> None:
+    """Write the file anew with another configuration or other tensors."""
+    state = {**weights.load(path)[0].state_dict(), **tensors}
+    kept = {name: x for name, x in state.items() if x is not None}
+    save_file(kept, path, {"config": json.dumps(config)})
+
+
+@pytest.mark.parametrize(
+    ("tensors", "message"),
+    [
+        ({"fuse.bias": None}, r"lacks the tensor fuse\.bias"),
+        ({"fuse.bias": torch.zeros(5)}, r"fuse\.bias .* is \(5,\)"),
+        ({"foreign": torch.zeros(5)}, "foreign"),
+        ({"fuse.bias": torch.full((4,), torch.nan)}, r"fuse\.bias"),
+        ({"fuse.bias": torch.zeros(4, dtype=torch.int32)}, r"fuse\.bias"),
+    ],
+)
+def test_tensors_that_do_not_fit_the_configuration(
+    path: Path, tensors: dict[str, torch.Tensor | None], message: str
+) -> None:
+    rewrite(path, CONFIG.to_dict(), **tensors)
+    with pytest.raises(WeightsError, match=message):
+        weights.load(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"groups": 2},
+        {"groups": 4000, "blocks": 4000, "dense_layers": 0},
+        {"channels": 10**9},
+        {"channels": 0},
+        {"heads": 0},
+        {"scale": 3},
+        {"guides": "none of ours"},
+        {"window_size": 4096},
+        {"future": 1},
+        {"channels": "many"},
+        {"channels": None},
+    ],
+)
+def test_configurations_that_the_file_cannot_be_of(
+    path: Path, change: dict[str, object]
+) -> None:
+    rewrite(path, {**CONFIG.to_dict(), **change})
+    with pytest.raises(WeightsError, match="fast_x2"):
+        weights.load(path)
+
+
+@pytest.mark.parametrize("config", [None, [], "{", 7])
+def test_a_configuration_that_is_no_table(path: Path, config: object) -> None:
+    rewrite(path, config)
+    with pytest.raises(WeightsError, match="describes no network"):
+        weights.load(path)
+
+
+def test_a_file_of_another_program(path: Path) -> None:
+    save_file({"x": torch.zeros(3)}, path)
+    with pytest.raises(WeightsError, match="no config"):
+        weights.load(path)
+
+
+def test_presets_are_found_by_name(path: Path) -> None:
+    loaded, _ = weights.load_preset("fast", 2, directory=path.parent)
+    assert loaded.config == CONFIG
+    with pytest.raises(WeightsError, match="there are: fast_x2"):
+        weights.load_preset("balanced", 4, directory=path.parent)
+
+
+def test_a_preset_under_a_false_name(path: Path) -> None:
+    wrong = path.rename(path.with_name("fast_x4.safetensors"))
+    with pytest.raises(WeightsError, match="is for scale 2"):
+        weights.load_preset("fast", 4, directory=wrong.parent)
+
+
+def test_what_is_available_is_told(path: Path) -> None:
+    (path.parent / "notes_x2.safetensors").write_text("not ours")
+    (record,) = weights.available(path.parent)
+    assert record == {
+        "preset": "fast",
+        "scale": 2,
+        "guides": "fast",
+        "file": "fast_x2.safetensors",
+        "sha256": record["sha256"],
+        "blender_series": "4.5",
+    }
+    assert len(record["sha256"]) == 64
+
+
+def test_file_names() -> None:
+    assert weights.file_name("fast", 4) == "fast_x4.safetensors"
+    assert weights.file_name("paper", 2, "full") == "paper_full_x2.safetensors"

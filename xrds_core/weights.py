@@ -1,0 +1,171 @@
+"""Weights files: safetensors, so that reading one never runs code.
+
+A file holds the tensors of one `XRDS` in half precision and, in its metadata, the
+network's configuration as JSON under ``config`` beside whatever else was recorded
+(preset, blender_series, training set, licence), all strings.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save as serialize
+from torch import Tensor
+
+from .atomic import replacing
+from .errors import WeightsError
+from .network import PRESETS, XRDS, NetworkConfig
+
+DIRECTORY = Path(__file__).with_name("weights")
+
+_LARGEST_SETTING = 4096  # far above any real width or count; bounds hostile files
+
+
+def file_name(preset: str, scale: int, guides: str = "fast") -> str:
+    """Return the name of a preset's file: fast_x2, or fast_full_x2 for full guides."""
+    kind = "" if guides == "fast" else f"_{guides}"
+    return f"{preset}{kind}_x{scale}.safetensors"
+
+
+def save(network: XRDS, path: str | Path, metadata: dict[str, str]) -> None:
+    """Write ``network`` and ``metadata`` to ``path``, all at once or not at all.
+
+    Raises WeightsError if a weight does not fit half precision.
+    """
+    tensors = {k: v.detach().cpu().half() for k, v in network.state_dict().items()}
+    bad = [name for name, tensor in tensors.items() if not tensor.isfinite().all()]
+    if bad:
+        raise WeightsError(
+            f"{bad[0]} is not finite in half precision; the training has diverged"
+        )
+    record = {**metadata, "config": json.dumps(network.config.to_dict())}
+    with replacing(Path(path)) as unfinished:
+        unfinished.write_bytes(serialize(tensors, record))
+
+
+def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:
+    """Return (network in float32 on the CPU, metadata) of a weights file.
+
+    Raises WeightsError if the file is missing, damaged, or does not hold exactly the
+    tensors of the network that its configuration describes.
+    """
+    path = Path(path)
+    tensors, metadata = _read(path)
+    config, expected = _described(path, metadata, len(tensors))
+    _compare(path, expected, tensors)
+    network = XRDS(config)
+    network.load_state_dict({name: x.float() for name, x in tensors.items()})
+    return network.eval().requires_grad_(False), metadata
+
+
+def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
+    if not path.is_file():
+        raise WeightsError(f"no weights file at {path}")
+    try:
+        with safe_open(path, framework="pt") as file:
+            metadata = dict(file.metadata() or {})
+            tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # no mapping
+    except (SafetensorError, OSError, ValueError) as error:
+        raise WeightsError(
+            f"{path} is not a whole safetensors file ({error}); fetch it again"
+        ) from error
+    return tensors, metadata
+
+
+def _described(
+    path: Path, metadata: dict[str, str], tensors: int
+) -> tuple[NetworkConfig, dict[str, torch.Size]]:
+    """Return the configuration in ``metadata`` and the shapes that follow from it."""
+    if "config" not in metadata:
+        raise WeightsError(f"{path} holds no XRDS network: its metadata has no config")
+    try:
+        values = json.loads(metadata["config"])
+        numbers = [v for v in values.values() if not isinstance(v, (str, bool))]
+        if not all(isinstance(v, int) and 0 <= v <= _LARGEST_SETTING for v in numbers):
+            raise ValueError(f"a setting is outside 0 to {_LARGEST_SETTING}")
+        config = NetworkConfig.from_dict(values)
+        layers = (config.groups, config.blocks, config.dense_layers)
+        if math.prod(max(n, 1) for n in layers) > tensors:
+            raise ValueError(f"{tensors} tensors are too few for it")
+        with torch.device("meta"):  # sizes cost nothing here, whatever is claimed
+            shapes = {k: v.shape for k, v in XRDS(config).state_dict().items()}
+    except (ValueError, TypeError, AttributeError, ArithmeticError, RuntimeError) as e:
+        raise WeightsError(
+            f"{path} describes no network that this version knows ({e})"
+        ) from e
+    return config, shapes
+
+
+def _compare(
+    path: Path, expected: dict[str, torch.Size], found: dict[str, Tensor]
+) -> None:
+    """Raise WeightsError on the first tensor that is missing, foreign or damaged."""
+    for name in sorted(expected.keys() | found.keys()):
+        if name not in found:
+            raise WeightsError(f"{path} lacks the tensor {name} of its configuration")
+        if name not in expected:
+            raise WeightsError(f"{path} holds a tensor {name} its network has not")
+        if found[name].shape != expected[name]:
+            raise WeightsError(
+                f"{name} in {path} is {tuple(found[name].shape)}, "
+                f"its configuration asks for {tuple(expected[name])}"
+            )
+        if not found[name].is_floating_point() or not found[name].isfinite().all():
+            raise WeightsError(f"{name} in {path} is not of finite floats")
+
+
+def load_preset(
+    preset: str, scale: int, guides: str = "fast", directory: str | Path | None = None
+) -> tuple[XRDS, dict[str, str]]:
+    """Return (network, metadata) of a shipped preset, or of one in ``directory``.
+
+    Raises WeightsError, naming what there is, if there is no such file.
+    """
+    folder = Path(directory or DIRECTORY)
+    path = folder / file_name(preset, scale, guides)
+    if not path.is_file():
+        found = ", ".join(sorted(p.stem for p in _files(folder))) or "none"
+        raise WeightsError(
+            f"no weights for preset {preset!r} at scale {scale} with {guides} guides "
+            f"in {folder}; there are: {found}"
+        )
+    network, metadata = load(path)
+    config = network.config
+    if (config.scale, config.guides) != (scale, guides):
+        raise WeightsError(
+            f"{path} is for scale {config.scale} and {config.guides} guides, "
+            "unlike its name; fetch it again"
+        )
+    return network, metadata
+
+
+def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
+    """Return records {preset, scale, guides, file, sha256, blender_series}.
+
+    Raises WeightsError if a file named as a preset's is damaged.
+    """
+    return [_record(path) for path in _files(Path(directory or DIRECTORY))]
+
+
+def _files(folder: Path) -> list[Path]:
+    found = sorted(folder.glob("*_x*.safetensors"))
+    return [path for path in found if path.name.split("_")[0] in PRESETS]
+
+
+def _record(path: Path) -> dict[str, Any]:
+    tensors, metadata = _read(path)
+    config, _ = _described(path, metadata, len(tensors))
+    return {
+        "preset": path.name.split("_")[0],
+        "scale": config.scale,
+        "guides": config.guides,
+        "file": path.name,
+        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "blender_series": metadata.get("blender_series"),
+    }
