@@ -1,0 +1,104 @@
+"""Which part of which frame is measured: the windows file and its scenes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from xrds_core.errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle of a frame, in pixels from its top-left corner."""
+
+    frame_width: int
+    frame_height: int
+    x: int
+    y: int
+    width: int
+    height: int
+    floor_psnr: float | None = None
+
+    @property
+    def whole(self) -> Window:
+        """The frame itself as a window."""
+        size = self.frame_width, self.frame_height
+        return Window(*size, 0, 0, *size)
+
+    @property
+    def label(self) -> str:
+        """As it stands in file names: frame size, then x, y, width and height."""
+        place = f"{self.x}_{self.y}_{self.width}_{self.height}"
+        return f"{self.frame_width}x{self.frame_height}-{place}"
+
+    def apply(self, scene: Any) -> None:
+        """Give a Blender scene this frame size and this cropped border."""
+        render = scene.render
+        render.resolution_x, render.resolution_y = self.frame_width, self.frame_height
+        render.resolution_percentage = 100
+        bordered = (self.width, self.height) != (self.frame_width, self.frame_height)
+        render.use_border = render.use_crop_to_border = bordered
+        # Blender truncates; a quarter of a pixel keeps its float32 off the edge
+        bottom = self.frame_height - self.y - self.height
+        render.border_min_x = (self.x + 0.25) / self.frame_width
+        render.border_max_x = (self.x + self.width + 0.25) / self.frame_width
+        render.border_min_y = (bottom + 0.25) / self.frame_height
+        render.border_max_y = (bottom + self.height + 0.25) / self.frame_height
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A scene file seen through a window, with the reference to compare with."""
+
+    path: Path
+    window: Window
+    reference: Path
+    digest: str
+
+    @property
+    def name(self) -> str:
+        """Name of the scene: the file's without its suffix."""
+        return self.path.stem
+
+
+def read_windows(path: Path) -> dict[str, Window]:
+    """Windows by scene name; raises UsageError when the file does not hold them."""
+    try:
+        entries = json.loads(path.read_text("utf-8"))
+        return {
+            name: Window(*entry["resolution"], *entry["window"], entry["floor_psnr"])
+            for name, entry in entries.items()
+        }
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(
+            f"{path} is not a windows file ({error!r}): it maps scene names to "
+            "resolution, window and floor_psnr"
+        ) from error
+
+
+def find_shots(scenes: Sequence[Path], windows: Path, references: Path) -> list[Shot]:
+    """One Shot per scene file; raises UsageError for what is missing."""
+    known = read_windows(windows)
+    return [_shot(path, known, windows, references) for path in scenes]
+
+
+def _shot(
+    path: Path, known: dict[str, Window], windows: Path, references: Path
+) -> Shot:
+    if not path.is_file():
+        raise UsageError(f"there is no scene {path}")
+    if path.stem not in known:
+        names = ", ".join(known)
+        raise UsageError(f"{windows} has no window for {path.stem}; it has {names}")
+    reference = references / f"{path.stem}.exr"
+    if not reference.is_file():
+        raise UsageError(f"there is no reference {reference} for {path}")
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
+    return Shot(path, known[path.stem], reference, digest)
