@@ -1,0 +1,200 @@
+"""What `xrds info` prints: versions, devices, weights and the cost of the networks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from .network import (
+    PRESETS,
+    XRDS,
+    NetworkConfig,
+    WindowAttention,
+    WindowCrossAttention,
+    preset_config,
+)
+from .weights import available
+
+PAPER_ROWS = ((5, 3), (3, 3), (1, 3), (5, 2), (5, 1))  # RDST per XDG, XDG: table 5
+PAPER_OUTPUT = 1024  # pixels along each side of the picture the paper counts for
+SCALES = (2, 4, 8)
+
+# Operations per element outside MACs, as the paper's profiler counts them.
+ELEMENTWISE: dict[type[nn.Module], int] = {nn.LayerNorm: 5, nn.GELU: 1, nn.ReLU: 1}
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Operations of one forward pass; `macs` as the paper's profiler counted them."""
+
+    parameters: int
+    macs: int
+    """Multiply-adds of Conv2d and Linear."""
+    attention_macs: int
+    """Those of the two products inside each attention, which the paper left out."""
+    elementwise: int
+    """Operations of norms, activations and softmax."""
+
+    @property
+    def macs_with_attention(self) -> int:
+        return self.macs + self.attention_macs
+
+    @property
+    def flops(self) -> int:
+        """As the paper's: without the products inside attention."""
+        return 2 * self.macs + self.elementwise
+
+
+class _Counter:
+    """Sums the operations of a network's modules while it runs."""
+
+    def __init__(self, network: XRDS) -> None:
+        self.macs = self.attention = self.elementwise = 0
+        for module in network.modules():
+            if isinstance(module, nn.Conv2d):
+                module.register_forward_hook(self._convolution)
+            elif isinstance(module, nn.Linear):
+                module.register_forward_hook(self._linear)
+            elif isinstance(module, WindowAttention | WindowCrossAttention):
+                module.register_forward_hook(self._attention)
+            elif type(module) in ELEMENTWISE:
+                module.register_forward_hook(self._elementwise)
+
+    def _convolution(self, module: nn.Conv2d, _: Any, out: Tensor) -> None:
+        self.macs += out.numel() * module.weight[0].numel()
+
+    def _linear(self, module: nn.Linear, _: Any, out: Tensor) -> None:
+        self.macs += out.numel() * module.in_features
+
+    def _attention(
+        self, module: WindowAttention | WindowCrossAttention, _: Any, out: Tensor
+    ) -> None:
+        tokens = out.shape[1]  # out is (windows, tokens, channels)
+        self.attention += 2 * tokens * out.numel()
+        self.elementwise += out.shape[0] * module.heads * tokens * tokens  # softmax
+
+    def _elementwise(self, module: nn.Module, _: Any, out: Tensor) -> None:
+        self.elementwise += ELEMENTWISE[type(module)] * out.numel()
+
+
+def count(config: NetworkConfig, size: int = PAPER_OUTPUT) -> Cost:
+    """Count one forward pass for an output of `size` x `size` pixels.
+
+    Runs on torch's meta device: shapes only, no memory, no arithmetic. `size` is a
+    multiple of the scale; pixels padded to whole windows are counted.
+    """
+    low = size // config.scale
+    with torch.device("meta"), torch.no_grad():
+        network = XRDS(config).eval()
+        counter = _Counter(network)
+        network(
+            torch.empty(1, 3, low, low), torch.empty(1, config.guide_count, size, size)
+        )
+    parameters = sum(p.numel() for p in network.parameters())
+    return Cost(parameters, counter.macs, counter.attention, counter.elementwise)
+
+
+def paper_table() -> list[dict[str, int]]:
+    """Recount the paper's ablation over depth (x4, 1024 x 1024 output)."""
+    return [
+        {
+            "rdst": blocks,
+            "xdg": groups,
+            "parameters": cost.parameters,
+            "macs": cost.macs,
+            "macs_with_attention": cost.macs_with_attention,
+            "flops": cost.flops,
+        }
+        for blocks, groups in PAPER_ROWS
+        for cost in [count(NetworkConfig(groups=groups, blocks=blocks))]
+    ]
+
+
+def preset_costs() -> dict[str, dict[str, dict[str, int]]]:
+    """Parameters and MACs per output pixel of every preset at every scale."""
+    return {
+        preset: {str(scale): _preset_cost(preset, scale) for scale in SCALES}
+        for preset in PRESETS
+    }
+
+
+def _preset_cost(preset: str, scale: int) -> dict[str, int]:
+    cost = count(preset_config(preset, scale))
+    per_pixel = round(cost.macs / PAPER_OUTPUT**2)
+    return {"parameters": cost.parameters, "macs_per_output_pixel": per_pixel}
+
+
+def devices() -> list[str]:
+    """The names that `--device` accepts here, the processor first."""
+    found = ["cpu"]
+    found += [f"cuda:{i}" for i in range(torch.cuda.device_count())]
+    if torch.backends.mps.is_available():
+        found.append("mps")
+    return found
+
+
+def package_version() -> str:
+    """The installed version, or "unknown" when run from bare source."""
+    try:
+        return version("xrds")
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def info(
+    blender: str | None = None, weights: str | Path | None = None
+) -> dict[str, Any]:
+    """Everything `xrds info --json` prints.
+
+    Args:
+        blender: Blender's version, which this package cannot ask for.
+        weights: the folder of weights files; the shipped ones by default.
+
+    Raises:
+        WeightsError: a weights file is damaged.
+    """
+    return {
+        "version": package_version(),
+        "torch": torch.__version__,
+        "blender": blender,
+        "devices": devices(),
+        "paper_table": paper_table(),
+        "presets": preset_costs(),
+        "weights": available(weights),
+    }
+
+
+def lines(told: dict[str, Any]) -> Iterator[str]:
+    """`info`'s answer for people to read."""
+    yield (
+        f"XRDS {told['version']}, torch {told['torch']}, "
+        f"Blender {told['blender'] or 'not found'}"
+    )
+    yield f"devices: {', '.join(told['devices'])}"
+    yield "the paper's network, x4, 1024 x 1024 output:"
+    yield "  RDST  XDG  parameters    MACs  with attention   FLOPs"
+    for row in told["paper_table"]:
+        yield (
+            f"  {row['rdst']:4}  {row['xdg']:3}  {row['parameters'] / 1e6:8.2f} M"
+            f"  {row['macs'] / 1e9:6.2f} G  {row['macs_with_attention'] / 1e9:10.2f} G"
+            f"  {row['flops'] / 1e12:4.2f} T"
+        )
+    yield "presets: parameters, MACs per output pixel"
+    for preset, scales in told["presets"].items():
+        for scale, cost in scales.items():
+            yield (
+                f"  {preset:9} x{scale}  {cost['parameters'] / 1e6:7.3f} M"
+                f"  {cost['macs_per_output_pixel']:8}"
+            )
+    yield "weights:" if told["weights"] else "weights: none"
+    for record in told["weights"]:
+        yield (
+            f"  {record['file']}  Blender {record['blender_series']}"
+            f"  sha256 {record['sha256'][:16]}"
+        )
