@@ -1,0 +1,1 @@
+"""Training of `xrds_core.network.XRDS`; not part of the extension."""
