@@ -23,7 +23,7 @@ def l1(output: Tensor, reference: Tensor) -> Tensor:
 
 
 def charbonnier(output: Tensor, reference: Tensor) -> Tensor:
-    """Mean of sqrt(d^2 + epsilon^2) - epsilon: square of small errors, else absolute."""
+    """Mean of sqrt(d^2 + epsilon^2) - epsilon: squares small errors alone."""
     error = (output - reference).square() + CHARBONNIER_EPSILON**2
     return (error.sqrt() - CHARBONNIER_EPSILON).mean()
 
