@@ -1,0 +1,348 @@
+"""`xrds ...` and `blender --command xrds ...`: parse, call the work, print.
+
+Exit status: 0 done, 1 failed, 2 wrong usage, 130 interrupted. With --json, stdout
+holds the JSON alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from xrds_core.errors import UsageError
+
+from . import console
+
+PRESETS = ("fast", "balanced", "paper")
+GUIDES = ("fast", "full")
+Work = Callable[[argparse.Namespace], dict[str, Any] | None]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    try:
+        options = _parser().parse_args(argv)
+    except SystemExit as end:  # argparse has told why
+        return int(end.code or 0)
+    if not options.json:
+        return console.status_of(lambda: _show(options))
+    with console.stdout_for_json() as tell:
+        return console.status_of(lambda: tell(options.work(options)))
+
+
+def program() -> NoReturn:
+    """Run the console script `xrds`."""
+    console.interrupt_at_once()
+    console.leave(main())
+
+
+def _show(options: argparse.Namespace) -> None:
+    told = options.work(options)
+    lines = options.lines(told) if told else ()
+    for line in lines:
+        print(line)
+
+
+# --- the commands: each calls the function that does the work -------------------------
+
+
+def _info(options: argparse.Namespace) -> dict[str, Any]:
+    from xrds_core import info
+
+    return info.info(_blender_version(), options.weights)
+
+
+def _info_lines(told: dict[str, Any]) -> list[str]:
+    from xrds_core import info
+
+    return list(info.lines(told))
+
+
+def _blender_version() -> str | None:
+    try:
+        import bpy
+    except ImportError:
+        return None
+    return bpy.app.version_string
+
+
+def _render(options: argparse.Namespace) -> dict[str, Any]:
+    _need_blender("render")
+    from .render import RenderJob
+    from .render_file import render_file
+
+    job = RenderJob(
+        scale=options.scale,
+        samples=options.samples,
+        guide_samples=options.guide_samples,
+        guides=options.guides,
+        preset=options.preset,
+        device=options.device,
+        exposure=options.exposure,
+        seed=options.seed,
+        plain=options.plain,
+        memory_limit=options.memory_limit,
+        weights=options.weights,
+    )
+    return render_file(
+        options.scene,
+        options.output,
+        job,
+        frames=options.frames,
+        resolution=options.resolution,
+    )
+
+
+def _render_lines(told: dict[str, Any]) -> list[str]:
+    lines = [
+        f"{frame['output']}: {frame['seconds']['total']:.1f} s"
+        for frame in told["frames"]
+    ]
+    return lines + [f"  {d['decision']}: {d['reason']}" for d in told["plan"]]
+
+
+def _upscale(options: argparse.Namespace) -> dict[str, Any]:
+    from xrds_core import upscale_file
+
+    return upscale_file(
+        options.beauty,
+        options.guide_file,
+        options.output,
+        scale=options.scale,
+        preset=options.preset,
+        guides=options.guides,
+        exposure=options.exposure,
+        device=options.device,
+        memory_limit=options.memory_limit,
+        weights=options.weights,
+    )
+
+
+def _upscale_lines(told: dict[str, Any]) -> list[str]:
+    return [f"{told['output']}: {told['seconds']:.1f} s"]
+
+
+def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
+    _need_blender("evaluate")
+    from .bench.evaluate import evaluate
+
+    return evaluate(
+        options.scenes,
+        windows=options.windows,
+        references=options.references,
+        cache=options.cache,
+        scales=options.scale,
+        presets=options.preset,
+        guides=options.guides,
+        timing=options.timing,
+        out=options.out,
+        weights=options.weights,
+        progress=_progress,
+    )
+
+
+def _progress(line: str) -> None:
+    print(line, file=sys.stderr, flush=True)
+
+
+def _dataset(options: argparse.Namespace) -> dict[str, Any]:
+    _need_blender("dataset")
+    from .studio.dataset import generate
+
+    return generate(
+        options.out,
+        seed=options.seed,
+        count=options.count,
+        assets=options.assets,
+        scales=options.scales,
+    )
+
+
+def _train(options: argparse.Namespace) -> dict[str, Any]:
+    from xrds_core.training.config import read
+    from xrds_core.training.train import train
+
+    return train(read(options.config), options.out or _run_folder(options.config))
+
+
+def _run_folder(config: Path) -> Path:
+    return Path("runs") / config.stem
+
+
+def _need_blender(command: str) -> None:
+    try:
+        import bpy  # noqa: F401  # only asked whether it is there
+    except ImportError as error:
+        raise UsageError(
+            f"{command} needs Blender: install the bpy module "
+            "(pip install bpy) or run blender --command xrds"
+        ) from error
+
+
+# --- the options ----------------------------------------------------------------------
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "xrds", description="Guided super-resolution of Cycles renders."
+    )
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for add in (
+        _add_info,
+        _add_render,
+        _add_upscale,
+        _add_evaluate,
+        _add_dataset,
+        _add_train,
+    ):
+        command = add(commands)
+        command.add_argument(
+            "--json", action="store_true", help="print JSON on stdout, all else beside"
+        )
+    return parser
+
+
+def _add_info(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("info", help="versions, devices, weights, costs")
+    command.add_argument("--weights", type=Path, help="folder of weights files")
+    command.set_defaults(work=_info, lines=_info_lines)
+    return command
+
+
+def _add_render(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("render", help="render a .blend file")
+    add = command.add_argument
+    add("scene", type=Path, metavar="SCENE.blend")
+    add("-o", "--output", required=True, help=".exr or .png; # for frame numbers")
+    size = command.add_mutually_exclusive_group()
+    size.add_argument("--scale", type=int, choices=(1, 2, 4, 8), default=2)
+    size.add_argument("--plain", action="store_true", help="Cycles as the file has it")
+    add("--samples", type=_positive, help="of the low-resolution render")
+    add("--guide-samples", type=_positive, default=4)
+    which = command.add_mutually_exclusive_group()
+    which.add_argument("--frame", type=_frame, dest="frames", metavar="F")
+    which.add_argument("--frames", type=_frames, help="first-last", metavar="A-B")
+    add("--resolution", type=_size, metavar="WxH")
+    add("--seed", type=int)
+    _add_network(command)
+    command.set_defaults(work=_render, lines=_render_lines)
+    return command
+
+
+def _add_upscale(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("upscale", help="enlarge a render from EXR files")
+    add = command.add_argument
+    add("beauty", type=Path, metavar="BEAUTY.exr", help="low-resolution picture")
+    add("guide_file", type=Path, metavar="GUIDES.exr", help="full-resolution passes")
+    add("-o", "--output", type=Path, required=True, metavar="OUT.exr")
+    add("--scale", type=int, choices=(1, 2, 4, 8), default=2)
+    _add_network(command)
+    command.set_defaults(work=_upscale, lines=_upscale_lines)
+    return command
+
+
+def _add_network(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    add("--guides", choices=GUIDES, default="fast")
+    add("--preset", choices=PRESETS, default="fast")
+    add("--exposure", type=float, help="hold it for an animation or a border")
+    add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
+    add("--memory-limit", type=_bytes, help="of the network, as 500M or 4G")
+    add("--weights", type=Path, help="folder of weights files")
+
+
+def _add_evaluate(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("evaluate", help="measure error against references")
+    add = command.add_argument
+    add("scenes", type=Path, nargs="+", metavar="SCENE.blend")
+    add("--windows", type=Path, required=True, help="JSON file of windows")
+    add("--references", type=Path, required=True, help="folder of NAME.exr")
+    add("--cache", type=Path, help="folder that keeps rendered inputs")
+    add("--scale", type=_integers, default=(2, 4), help="as 2,4")
+    add("--preset", type=_names(PRESETS), default=("fast",), help="as fast,balanced")
+    add("--guides", type=_names(GUIDES), default=("fast",), help="as fast,full")
+    add("--timing", action="store_true", help="also time whole frames")
+    add("--weights", type=Path, help="folder of weights files")
+    add("--out", type=Path, help="folder for results.json")
+    command.set_defaults(work=_evaluate, lines=lambda _: ())
+    return command
+
+
+def _add_dataset(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("dataset", help="render a training set")
+    add = command.add_argument
+    add("--out", type=Path, required=True)
+    add("--seed", type=int, default=0, help="first scene's seed")
+    add("--count", type=_positive, default=1, help="number of scenes")
+    add("--assets", type=Path, help="folder of models, textures and skies")
+    add("--scales", type=_integers, default=(2, 4, 8), help="as 2,4,8")
+    command.set_defaults(work=_dataset, lines=lambda _: ())
+    return command
+
+
+def _add_train(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("train", help="train or resume a network")
+    command.add_argument("config", type=Path, metavar="CONFIG.toml")
+    command.add_argument("--out", type=Path, metavar="RUN", help="runs/CONFIG")
+    command.set_defaults(work=_train, lines=lambda _: ())
+    return command
+
+
+# --- values ---------------------------------------------------------------------------
+
+
+def _positive(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value} is below 1")
+    return value
+
+
+def _integers(text: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in text.split(","))
+
+
+def _names(known: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
+    def names(text: str) -> tuple[str, ...]:
+        found = tuple(text.split(","))
+        for name in found:
+            if name not in known:
+                raise argparse.ArgumentTypeError(
+                    f"{name!r} is none of {', '.join(known)}"
+                )
+        return found
+
+    return names
+
+
+def _frame(text: str) -> list[int]:
+    return [int(text)]
+
+
+def _frames(text: str) -> list[int]:
+    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
+    if not match or int(match[1]) > int(match[2]):
+        raise argparse.ArgumentTypeError(f"{text!r} is no range as 1-24")
+    return list(range(int(match[1]), int(match[2]) + 1))
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    if not match or "0" in match.groups():
+        raise argparse.ArgumentTypeError(f"{text!r} is no size as 1920x1080")
+    return int(match[1]), int(match[2])
+
+
+def _bytes(text: str) -> int:
+    match = re.fullmatch(r"(\d+)([KMG]?)", text.upper())
+    if not match:
+        raise argparse.ArgumentTypeError(f"{text!r} is no amount as 500M or 4G")
+    return int(match[1]) << {"": 0, "K": 10, "M": 20, "G": 30}[match[2]]
+
+
+if __name__ == "__main__":
+    program()

@@ -1,0 +1,97 @@
+"""What a command owes the shell: clean streams, an exit status, a quick Ctrl-C."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import os
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, NoReturn
+
+from xrds_core.errors import Cancelled, UsageError, XRDSError
+
+DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
+
+
+def flush_all() -> None:
+    """Flush what Python and the C library still hold of stdout and stderr."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    if os.name != "nt":  # Windows' C libraries keep one buffer each
+        ctypes.CDLL(None).fflush(None)
+
+
+@contextmanager
+def stdout_for_json() -> Iterator[Callable[[Any], None]]:
+    """Keep stdout for one JSON value; all else that is printed goes to stderr.
+
+    Cycles prints its progress from C, so the file descriptor itself is moved. Yields
+    the function that writes the value; nothing is written if it is not called.
+    """
+    flush_all()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    told: list[Any] = []
+    try:
+        yield told.append
+    finally:
+        flush_all()
+        os.dup2(kept, 1)
+        os.close(kept)
+    for value in told:
+        print(json.dumps(value, indent=1), flush=True)
+
+
+def status_of(work: Callable[[], None]) -> int:
+    """Run `work`; show its error as one line on stderr and return the exit status."""
+    try:
+        work()
+    except (KeyboardInterrupt, Cancelled):
+        return _say("interrupted", INTERRUPTED)
+    except UsageError as error:
+        return _say(str(error), WRONG_USAGE)
+    except XRDSError as error:
+        return _say(str(error), FAILED)
+    except MemoryError:
+        return _say("out of memory; set a memory limit or a smaller picture", FAILED)
+    except Exception:  # a fault of ours: show where, end as a command ends
+        traceback.print_exc()
+        return FAILED
+    return DONE
+
+
+def _say(line: str, status: int) -> int:
+    print(f"xrds: {line}", file=sys.stderr, flush=True)
+    return status
+
+
+def interrupt_at_once() -> None:
+    """End with status 130 on Ctrl-C even while Cycles or torch compute in C.
+
+    Python runs its own signal handlers only between bytecodes of the main thread,
+    which a render keeps waiting for minutes; a thread that reads the wake-up pipe
+    does not wait. Unfinished files carry a name of their own and never replace one.
+    """
+    woken, wake = os.pipe()
+    os.set_blocking(wake, False)
+    signal.signal(signal.SIGINT, lambda *_: None)
+    signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
+
+    def wait() -> None:
+        while os.read(woken, 1) != bytes([signal.SIGINT]):
+            pass
+        os.write(2, b"xrds: interrupted\n")
+        os._exit(INTERRUPTED)
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def leave(status: int) -> NoReturn:
+    """End the process; the bpy module can hang when the interpreter ends."""
+    flush_all()
+    os._exit(status)

@@ -1,0 +1,115 @@
+"""Pictures to files: EXR as scene-linear radiance, PNG as Blender saves it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xrds_core.atomic import replacing
+from xrds_core.errors import PictureError, UsageError
+
+SUFFIXES = (".exr", ".png")
+
+
+def frame_path(pattern: str, frame: int) -> Path:
+    """Put the frame number in place of the last run of #, as Blender does.
+
+    Three # are three digits at least; without # the pattern is the path.
+    """
+    runs = list(re.finditer("#+", Path(pattern).name))
+    if not runs:
+        return Path(pattern)
+    first, last = runs[-1].span()
+    name = Path(pattern).name
+    width = last - first + (frame < 0)
+    return Path(pattern).with_name(f"{name[:first]}{frame:0{width}d}{name[last:]}")
+
+
+def check_output(pattern: str, frames: int) -> None:
+    """Refuse, before anything is rendered, an output that could not be written.
+
+    Makes the folder. Raises UsageError for a suffix that is neither .exr nor .png and
+    for several frames of one name, PictureError for a folder that takes no file.
+    """
+    path = Path(pattern)
+    if path.suffix.lower() not in SUFFIXES:
+        raise UsageError(f"output {pattern!r} must end in .exr or .png")
+    if frames > 1 and "#" not in path.name:
+        raise UsageError(
+            f"output {pattern!r} would be written {frames} times; "
+            f"put #### for the frame number, as {path.stem}_####{path.suffix}"
+        )
+    if path.is_dir():
+        raise PictureError(f"output {path} is a folder; name a file")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        probe = path.with_name(f".{path.name}.probe")
+        probe.touch()
+        probe.unlink()
+    except OSError as error:
+        raise PictureError(
+            f"cannot write into {path.parent} ({error.strerror}); choose another output"
+        ) from error
+
+
+def save(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> None:
+    """Write one frame, all at once or not at all.
+
+    Args:
+        path: ends in .exr or .png.
+        radiance: (H, W, 3) scene-linear, premultiplied.
+        alpha: (H, W) in [0, 1].
+        scene: its view settings shape the PNG; with a transparent film both formats
+            hold alpha.
+    """
+    if path.suffix.lower() == ".png":
+        with replacing(path) as unfinished:
+            _save_png(unfinished, radiance, alpha, scene)
+        return
+    from xrds_core import exr
+
+    channels = {name: radiance[..., i] for i, name in enumerate("RGB")}
+    if scene.render.film_transparent:
+        channels["A"] = alpha
+    exr.write_picture(path, channels)
+
+
+def _save_png(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> None:
+    """Let Blender apply the scene's view transform and write the file."""
+    import bpy
+
+    height, width = alpha.shape
+    image = bpy.data.images.new("xrds", width, height, alpha=True, float_buffer=True)
+    try:
+        image.alpha_mode = "PREMUL"
+        rows = np.dstack((radiance, alpha))[::-1]  # Blender's first row is the lowest
+        image.pixels.foreach_set(np.ascontiguousarray(rows, np.float32).ravel())
+        with _png_settings(scene):
+            image.save_render(str(path), scene=scene)
+    finally:
+        bpy.data.images.remove(image)
+
+
+@contextmanager
+def _png_settings(scene: Any) -> Iterator[None]:
+    """Ask Blender for PNG, with alpha where the film is transparent."""
+    settings = scene.render.image_settings
+    wanted = {
+        "media_type": "IMAGE",  # from Blender 5.0 on, and to be set before the format
+        "file_format": "PNG",
+        "color_mode": "RGBA" if scene.render.film_transparent else "RGB",
+    }
+    wanted = {name: value for name, value in wanted.items() if hasattr(settings, name)}
+    kept = {name: getattr(settings, name) for name in wanted}
+    try:
+        for name, value in wanted.items():
+            setattr(settings, name, value)
+        yield
+    finally:
+        for name, value in kept.items():
+            setattr(settings, name, value)
