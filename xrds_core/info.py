@@ -30,7 +30,7 @@ ELEMENTWISE: dict[type[nn.Module], int] = {nn.LayerNorm: 5, nn.GELU: 1, nn.ReLU:
 
 
 @dataclass(frozen=True)
-class Cost:
+class Operations:
     """Operations of one forward pass; `macs` as the paper's profiler counted them."""
 
     parameters: int
@@ -83,7 +83,7 @@ class _Counter:
         self.elementwise += ELEMENTWISE[type(module)] * out.numel()
 
 
-def count(config: NetworkConfig, size: int = PAPER_OUTPUT) -> Cost:
+def count(config: NetworkConfig, size: int = PAPER_OUTPUT) -> Operations:
     """Count one forward pass for an output of `size` x `size` pixels.
 
     Runs on torch's meta device: shapes only, no memory, no arithmetic. `size` is a
@@ -97,7 +97,7 @@ def count(config: NetworkConfig, size: int = PAPER_OUTPUT) -> Cost:
             torch.empty(1, 3, low, low), torch.empty(1, config.guide_count, size, size)
         )
     parameters = sum(p.numel() for p in network.parameters())
-    return Cost(parameters, counter.macs, counter.attention, counter.elementwise)
+    return Operations(parameters, counter.macs, counter.attention, counter.elementwise)
 
 
 def paper_table() -> list[dict[str, int]]:
