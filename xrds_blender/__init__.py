@@ -1,1 +1,52 @@
-"""The Blender add-on: the XRDS render engine and its commands."""
+"""The Blender add-on: the XRDS render engine and its commands.
+
+Importing it needs neither Blender nor torch; `register()` needs Blender.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+_registered = False
+
+
+def register() -> None:
+    """Make Blender know the engine, its settings and its panels."""
+    import bpy
+
+    from . import cycles_session, engine, properties
+
+    global _registered
+    cycles_session.functions()
+    bpy.utils.register_class(properties.XRDSSettings)
+    bpy.types.Scene.xrds = bpy.props.PointerProperty(type=properties.XRDSSettings)
+    bpy.utils.register_class(engine.XRDSRender)
+    _registered = True
+
+
+def unregister() -> None:
+    """Take back everything that `register` did."""
+    import bpy
+
+    from . import engine, properties
+
+    global _registered
+    bpy.utils.unregister_class(engine.XRDSRender)
+    del bpy.types.Scene.xrds
+    bpy.utils.unregister_class(properties.XRDSSettings)
+    _registered = False
+
+
+def ensure_registered() -> None:
+    """Register once, for scripts that use the bpy module."""
+    if not _registered:
+        register()
+
+
+def __getattr__(name: str) -> Any:
+    """Load `render` and `run_job`, which need Blender, when first asked for."""
+    if name in {"run_job", "RenderJob", "Picture"}:
+        from . import render
+
+        return getattr(render, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,67 @@
+"""Seconds of the stages inside one Cycles render, read from its own status lines.
+
+Blender hands every status line of a background render to the `render_stats` handlers.
+A render in a window tells nothing there: its seconds then all count as rendering.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from types import TracebackType
+from typing import Any
+
+_PEAK = re.compile(r"Mem:[\d.]+M, Peak:([\d.]+)M")
+
+
+class StageClock:
+    """Times one Cycles render: `sync` (scene and BVH) and `render` seconds.
+
+    `peak` is the largest memory in bytes that Cycles reported, 0 when it told none.
+    """
+
+    def __init__(self) -> None:
+        self._start = self._end = 0.0
+        self._sync = self._status = 0.0
+        self._syncing = True
+        self.peak = 0
+
+    def __enter__(self) -> StageClock:
+        import bpy
+
+        self._start = self._status = time.perf_counter()
+        bpy.app.handlers.render_stats.append(self._hear)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        import bpy
+
+        self._end = time.perf_counter()
+        bpy.app.handlers.render_stats.remove(self._hear)
+
+    def _hear(self, line: str, *_: Any) -> None:
+        """Add the time since the last line to what Cycles did until now.
+
+        With several views it syncs, samples, and syncs again.
+        """
+        now = time.perf_counter()
+        if self._syncing:
+            self._sync += now - self._status
+        if found := _PEAK.search(line):
+            self.peak = max(self.peak, int(float(found[1]) * 2**20))
+        status = line.rpartition("|")[2].strip()
+        self._status = now
+        self._syncing = not status.startswith(("Sample ", "Rendered ", "Finished"))
+
+    @property
+    def sync(self) -> float:
+        return self._sync
+
+    @property
+    def render(self) -> float:
+        return self._end - self._start - self._sync

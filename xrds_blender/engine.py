@@ -1,0 +1,81 @@
+"""The render engine XRDS: what Blender calls, handed on to `render` and to Cycles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from . import cycles_session, render
+
+
+class XRDSRender(bpy.types.RenderEngine):
+    """Cycles at low resolution, enlarged under full-resolution guides."""
+
+    bl_idname = "XRDS"
+    bl_label = "XRDS"
+    bl_use_preview = True
+    bl_use_eevee_viewport = True
+    bl_use_exclude_layers = True
+    bl_use_spherical_stereo = True
+    bl_use_custom_freestyle = True
+    bl_use_alembic_procedural = True
+    bl_use_shading_nodes_custom = False
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.session = None
+
+    def __del__(self) -> None:
+        cycles_session.free(self)
+
+    def update_render_passes(self, scene: Any, layer: Any) -> None:
+        cycles_session.functions().register_passes(self, scene, layer)
+
+    def update(self, data: Any, depsgraph: Any) -> None:
+        # A final render makes its sessions itself, with their own sizes.
+        if self.is_preview:
+            cycles = cycles_session.functions()
+            if not self.session:
+                cycles.create(self, data)
+            cycles.reset(self, data, depsgraph)
+
+    def render(self, depsgraph: Any) -> None:
+        if self.is_preview:
+            cycles_session.functions().render(self, depsgraph)
+        else:
+            render.render_layer(self, depsgraph)
+
+    def render_frame_finish(self) -> None:
+        if self.session:
+            cycles_session.functions().render_frame_finish(self)
+
+    def draw(self, context: Any, depsgraph: Any) -> None:
+        cycles_session.functions().draw(self, depsgraph, context.space_data)
+
+    def bake(
+        self,
+        depsgraph: Any,
+        item: Any,
+        pass_type: str,
+        pass_filter: int,
+        width: int,
+        height: int,
+    ) -> None:
+        cycles = cycles_session.functions()
+        if not self.session:
+            cycles.create(self, bpy.data)
+            cycles.reset(self, bpy.data, depsgraph)
+        cycles.bake(self, depsgraph, item, pass_type, pass_filter, width, height)
+
+    def view_update(self, context: Any, depsgraph: Any) -> None:
+        cycles = cycles_session.functions()
+        if not self.session:
+            place = context.region, context.space_data, context.region_data
+            cycles.create(self, context.blend_data, *place)
+        cycles.reset(self, context.blend_data, depsgraph)
+        cycles.sync(self, depsgraph, context.blend_data)
+
+    def view_draw(self, context: Any, depsgraph: Any) -> None:
+        place = context.region, context.space_data, context.region_data
+        cycles_session.functions().view_draw(self, depsgraph, *place)

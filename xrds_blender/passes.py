@@ -1,0 +1,369 @@
+"""The Cycles renders inside one `RenderEngine.render()`: beauty and guides.
+
+Arrays are float32 (height, width, channels), scene-linear, row 0 on top; Blender's
+rows are turned in `cycles_session` alone. The user's scene is never touched: samples,
+bounces and camera are set on the evaluated scene, sizes on the pipeline's own copy
+of the render settings, and all of it is given back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+
+from xrds_core.errors import Cancelled
+
+from . import cycles_session
+from .borrowed import Borrowed, PipelineSettings
+from .cycles_session import Array
+from .low_camera import Frame, is_exact, widen
+
+ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth"
+COMBINED, NOISY = "Combined", "Noisy Image"
+# What follows a mirror or glass: four bounces hold albedo and normal right.
+GUIDE_BOUNCES = 4
+
+
+@dataclass(frozen=True)
+class Region:
+    """A rectangle in pixels of the full-resolution frame, (0, 0) at the top left."""
+
+    x: int
+    y: int
+    width: int
+    height: int
+
+    def low(self, scale: int) -> Region:
+        """The whole low-resolution pixels that cover it, in their own grid."""
+        x, y = self.x // scale, self.y // scale
+        right = -(-(self.x + self.width) // scale)
+        bottom = -(-(self.y + self.height) // scale)
+        return Region(x, y, right - x, bottom - y)
+
+
+@dataclass(frozen=True)
+class Beauty:
+    """The low-resolution radiance (h, w, 3), premultiplied, and alpha (h, w).
+
+    `offset` (dy, dx): where the region starts inside the coverage, in full-resolution
+    pixels. `seconds`: sync, beauty, denoise. `noisy` is None without denoising.
+    """
+
+    radiance: Array
+    alpha: Array
+    noisy: Array | None
+    offset: tuple[int, int]
+    seconds: dict[str, float] = field(default_factory=dict)
+    others: dict[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Guides:
+    """Full-resolution albedo and normal (H, W, 3), alpha and depth (H, W).
+
+    Albedo is as Cycles writes it, not clamped; normals are in camera space.
+    `radiance` (H, W, 3) is there for full guides only. `seconds`: sync, guides.
+    """
+
+    albedo: Array
+    normal: Array
+    alpha: Array
+    depth: Array | None
+    radiance: Array | None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+class CyclesPasses:
+    """Cycles renders of one view layer; a context manager inside `render()`.
+
+    Any number of `beauty` and `guides` calls, in any order. Raises Cancelled when the
+    user stops the render and SceneError when this Blender keeps its render settings
+    in an unknown way. On exit every setting is as before.
+    """
+
+    def __init__(self, engine: Any, depsgraph: Any, *, extra: bool = False) -> None:
+        self._engine, self._depsgraph = engine, depsgraph
+        self._scene = depsgraph.scene_eval
+        self._layer_name = depsgraph.view_layer_eval.name
+        # The method of this name hides the property, so it is asked for by path.
+        self._render = engine.path_resolve("render")
+        self._borrowed = Borrowed()
+        self._extra = extra
+        self.peak_memory = 0
+        render, result = self._render, engine.get_result()
+        percentage = render.resolution_percentage
+        self.width = int(render.resolution_x * percentage / 100)
+        self.height = int(render.resolution_y * percentage / 100)
+        self._size = result.resolution_x, result.resolution_y
+        self.region = self._find_region()
+        self.frame = Frame(
+            self.width, self.height, render.pixel_aspect_x, render.pixel_aspect_y
+        )
+        self.views = [view.name for view in result.views] or [""]
+
+    def _find_region(self) -> Region:
+        width, height = self._size
+        if not self._render.use_border:
+            return Region(0, 0, width, height)
+        x = int(np.float32(self._render.border_min_x) * np.float32(self.width))
+        bottom = int(np.float32(self._render.border_min_y) * np.float32(self.height))
+        return Region(x, self.height - bottom - height, width, height)
+
+    def __enter__(self) -> CyclesPasses:
+        self._pipeline = PipelineSettings(self._render, self._scene)
+        self._keeps_session = self._render.use_persistent_data
+        # Else Cycles frees the dependency graph after its first sync.
+        self._pipeline.set(use_persistent_data=True)
+        for name, channels, letters in self._wanted_passes():
+            if name not in self._layer().passes:
+                self._engine.add_pass(name, channels, letters, layer=self._layer_name)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if error is not None or not self._keeps_session:
+                cycles_session.free(self._engine)
+        finally:
+            self._borrowed.give_back()
+            self._pipeline.give_back()
+
+    def _wanted_passes(self) -> list[tuple[str, int, str]]:
+        wanted = [(ALBEDO, 3, "RGB"), (NORMAL, 3, "XYZ")]
+        if self._extra:
+            wanted += [(DEPTH, 1, "Z"), (NOISY, 4, "RGBA")]
+        return wanted
+
+    def _layer(self) -> Any:
+        return self._engine.get_result().layers[self._layer_name]
+
+    def beauty(
+        self,
+        scale: int,
+        samples: int | None = None,
+        *,
+        denoise: bool = True,
+        seed: int | None = None,
+        prefilter: str | None = None,
+    ) -> Beauty:
+        """Render the beauty at 1/scale of the size, filtered by a box of one pixel.
+
+        Scale 1 keeps the scene's own filter: plain Cycles. `samples` None takes the
+        scene's sampling, adaptive or not. `prefilter` NONE, FAST or ACCURATE is the
+        denoiser's. Without a denoiser in this Blender the picture stays noisy.
+        """
+        return self.beauties(
+            scale, samples, denoise=denoise, seed=seed, prefilter=prefilter
+        )[self.views[0]]
+
+    def beauties(
+        self,
+        scale: int,
+        samples: int | None = None,
+        *,
+        denoise: bool = True,
+        seed: int | None = None,
+        prefilter: str | None = None,
+    ) -> dict[str, Beauty]:
+        """As `beauty`, for every view by name (one without stereo)."""
+        denoise = denoise and cycles_session.has_denoiser()
+        with Borrowed() as borrowed:
+            self._set_sampling(borrowed, samples, seed)
+            self._set_denoising(borrowed, denoise, prefilter)
+            if scale > 1:
+                self._set_box_filter(borrowed, scale)
+                for camera in self._cameras():
+                    widen(borrowed, camera, self.frame, scale)
+            window = self._low_window(scale)
+            clock = self._run(self.frame.low_size(scale), window)
+        seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
+        return {
+            view: self._read_beauty(view, scale, window, denoise, seconds)
+            for view in self.views
+        }
+
+    def guides(
+        self,
+        samples: int,
+        *,
+        full: bool = False,
+        denoise: bool = False,
+        seed: int | None = None,
+    ) -> Guides:
+        """Render albedo and normal at full size with the file's own filter.
+
+        Only mirror and glass bounces are followed, which is all that albedo and normal
+        need; `full` keeps every bounce and gives the radiance too, denoised if asked.
+        """
+        return self.guides_by_view(samples, full=full, denoise=denoise, seed=seed)[
+            self.views[0]
+        ]
+
+    def guides_by_view(
+        self,
+        samples: int,
+        *,
+        full: bool = False,
+        denoise: bool = False,
+        seed: int | None = None,
+    ) -> dict[str, Guides]:
+        """As `guides`, for every view by name."""
+        denoise = denoise and full and cycles_session.has_denoiser()
+        with Borrowed() as borrowed:
+            self._set_sampling(borrowed, samples, seed)
+            self._set_denoising(borrowed, denoise, None)
+            if not full:
+                self._set_guide_bounces(borrowed)
+            clock = self._run((self.width, self.height), self.region)
+        seconds = {"sync": clock.sync, "guides": clock.render}
+        return {
+            view: self._read_guides(view, full, denoise, seconds) for view in self.views
+        }
+
+    def _set_sampling(
+        self, borrowed: Borrowed, samples: int | None, seed: int | None
+    ) -> None:
+        cycles = self._scene.cycles
+        if seed is not None:
+            borrowed.set(cycles, seed=seed, use_animated_seed=False)
+        if samples is not None:
+            borrowed.set(
+                cycles,
+                samples=samples,
+                use_adaptive_sampling=False,
+                time_limit=0.0,
+                use_layer_samples="IGNORE",
+                sample_offset=0,
+                use_sample_subset=False,
+            )
+
+    def _set_denoising(
+        self, borrowed: Borrowed, denoise: bool, prefilter: str | None
+    ) -> None:
+        cycles = self._scene.cycles
+        borrowed.set(cycles, use_denoising=denoise)
+        if denoise:
+            # The same denoiser as in the training set, whatever the scene uses.
+            borrowed.set(
+                cycles,
+                denoiser="OPENIMAGEDENOISE",
+                denoising_input_passes="RGB_ALBEDO_NORMAL",
+                denoising_prefilter=prefilter or cycles.denoising_prefilter,
+            )
+            layer = self._depsgraph.view_layer_eval.cycles
+            borrowed.set(layer, use_denoising=True)
+
+    def _set_box_filter(self, borrowed: Borrowed, scale: int) -> None:
+        cycles = self._scene.cycles
+        # Dicing is counted in pixels: the mesh is to be that of the full picture.
+        borrowed.set(
+            cycles,
+            pixel_filter_type="BOX",
+            filter_width=1.0,
+            dicing_rate=cycles.dicing_rate / scale,
+        )
+
+    def _set_guide_bounces(self, borrowed: Borrowed) -> None:
+        cycles = self._scene.cycles
+        borrowed.set(
+            cycles,
+            max_bounces=min(cycles.max_bounces, GUIDE_BOUNCES),
+            diffuse_bounces=0,
+            volume_bounces=0,
+            use_fast_gi=False,
+            use_guiding=False,
+            light_sampling_threshold=1.0,
+        )
+
+    def _cameras(self) -> list[Any]:
+        import bpy
+
+        ids = self._depsgraph.ids
+        return [item for item in ids if isinstance(item, bpy.types.Camera)]
+
+    def _low_window(self, scale: int) -> Region:
+        """The low-resolution pixels to render."""
+        if scale == 1:
+            return self.region
+        return self.region.low(scale)
+
+    def _run(self, size: tuple[int, int], window: Region) -> cycles_session.StageClock:
+        """Render `window` of a frame of `size` into the lower left of the result."""
+        depth = self._pipeline.depth
+        with Borrowed() as borrowed:
+            try:
+                borrowed.set(self._render, resolution_percentage=100)
+                width, height = size
+                self._pipeline.set(resolution_x=width, resolution_y=height)
+                if self._render.use_border:
+                    # A quarter pixel in, so that truncation finds the same pixel.
+                    borrowed.set(
+                        self._render,
+                        border_min_x=(window.x + 0.25) / width,
+                        border_max_x=min(1.0, (window.x + window.width + 0.25) / width),
+                        border_min_y=(height - window.y - window.height + 0.25)
+                        / height,
+                        border_max_y=min(1.0, (height - window.y + 0.25) / height),
+                    )
+                clock = cycles_session.run(self._engine, self._depsgraph)
+            finally:
+                self._pipeline.give_back(keep=depth)
+        self.peak_memory = max(self.peak_memory, clock.peak)
+        if self._engine.test_break():
+            raise Cancelled
+        return clock
+
+    def _read(self, name: str, view: str) -> Array | None:
+        return cycles_session.read_pass(self._layer(), name, view, self._size)
+
+    def _radiance(self, view: str, denoised: bool) -> Array:
+        """Radiance and alpha; undenoised Cycles leaves Combined black beside Noisy."""
+        pixels = None if denoised else self._read(NOISY, view)
+        if pixels is None:
+            pixels = self._read(COMBINED, view)
+        assert pixels is not None
+        return pixels
+
+    def _read_beauty(
+        self,
+        view: str,
+        scale: int,
+        window: Region,
+        denoised: bool,
+        seconds: dict[str, float],
+    ) -> Beauty:
+        def corner(pixels: Array) -> Array:
+            return pixels[-window.height :, : window.width].copy()
+
+        picture = corner(self._radiance(view, denoised))
+        noisy = self._read(NOISY, view) if denoised else None
+        return Beauty(
+            picture[..., :3].copy(),
+            picture[..., 3].copy(),
+            None if noisy is None else corner(noisy)[..., :3],
+            (self.region.y - window.y * scale, self.region.x - window.x * scale),
+            seconds,
+        )
+
+    def _read_guides(
+        self, view: str, full: bool, denoised: bool, seconds: dict[str, float]
+    ) -> Guides:
+        albedo, normal = self._read(ALBEDO, view), self._read(NORMAL, view)
+        assert albedo is not None and normal is not None
+        depth = self._read(DEPTH, view)
+        radiance = self._radiance(view, denoised)
+        return Guides(
+            albedo,
+            normal,
+            radiance[..., 3].copy(),
+            None if depth is None else depth[..., 0],
+            radiance[..., :3].copy() if full else None,
+            seconds,
+        )

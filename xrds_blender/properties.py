@@ -1,0 +1,66 @@
+"""The settings of XRDS that a scene keeps; samples stay with Cycles."""
+
+from __future__ import annotations
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+_SCALES = [
+    ("2", "2×", "A quarter of the pixels are path traced"),
+    ("4", "4×", "A sixteenth of the pixels are path traced"),
+    ("8", "8×", "One pixel in 64 is path traced"),
+]
+_PRESETS = [
+    ("fast", "Fast", "Quickest network"),
+    ("balanced", "Balanced", "Larger network, better at gloss and fine detail"),
+    ("paper", "Paper", "The network of the paper; far slower"),
+]
+_GUIDES = [
+    ("fast", "Fast", "Albedo and normal, rendered without diffuse light"),
+    ("full", "Full", "Also a noisy picture of full size; dearer, sharper light"),
+]
+_DEVICES = [
+    ("auto", "Automatic", "A GPU if torch finds one"),
+    ("cpu", "CPU", "Run the network on the processor"),
+    ("cuda", "CUDA", "Run the network on an NVIDIA GPU"),
+]
+
+
+class XRDSSettings(bpy.types.PropertyGroup):
+    """How the engine XRDS renders a scene."""
+
+    scale: EnumProperty(
+        name="Scale", items=_SCALES, description="Enlargement along each side"
+    )
+    preset: EnumProperty(
+        name="Network", items=_PRESETS, description="Which network enlarges"
+    )
+    guides: EnumProperty(
+        name="Guides", items=_GUIDES, description="What is rendered at full size"
+    )
+    guide_samples: IntProperty(
+        name="Guide Samples",
+        default=4,
+        min=1,
+        soft_max=64,
+        description="Samples per pixel of albedo and normal",
+    )
+    device: EnumProperty(
+        name="Device", items=_DEVICES, description="Where the network runs"
+    )
+    use_exposure: BoolProperty(
+        name="Fixed Exposure",
+        description="Hold the network's exposure, for animations and border renders",
+    )
+    exposure: FloatProperty(
+        name="Exposure",
+        default=1.0,
+        min=1e-12,
+        soft_min=1e-3,
+        soft_max=1e3,
+        description="Factor that brings the radiance to about 0.18",
+    )
+    plain: BoolProperty(
+        name="Plain Cycles",
+        description="Render with Cycles alone, as if the engine were Cycles",
+    )
