@@ -10,17 +10,23 @@ from typing import Any
 _registered = False
 
 
-def register() -> None:
-    """Make Blender know the engine, its settings and its panels."""
+def register(package: str = __name__) -> None:
+    """Make Blender know the engine, its settings and its panels.
+
+    `package` is the add-on's module name, under which Blender keeps its preferences.
+    """
     import bpy
 
-    from . import cycles_session, engine, properties
+    from . import cycles_session, engine, operators, panels, preferences, properties
 
     global _registered
     cycles_session.functions()
     bpy.utils.register_class(properties.XRDSSettings)
     bpy.types.Scene.xrds = bpy.props.PointerProperty(type=properties.XRDSSettings)
     bpy.utils.register_class(engine.XRDSRender)
+    preferences.register(package)
+    operators.register()
+    panels.register()
     _registered = True
 
 
@@ -28,9 +34,12 @@ def unregister() -> None:
     """Take back everything that `register` did."""
     import bpy
 
-    from . import engine, properties
+    from . import engine, operators, panels, preferences, properties
 
     global _registered
+    panels.unregister()
+    operators.unregister()
+    preferences.unregister()
     bpy.utils.unregister_class(engine.XRDSRender)
     del bpy.types.Scene.xrds
     bpy.utils.unregister_class(properties.XRDSSettings)
