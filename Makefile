@@ -25,6 +25,9 @@ test: install
 demo: install
 	$(RUN) -m xrds_blender.studio.demo --out demo
 
+extension: install
+	$(RUN) extension/build.py --out dist
+
 clean:
 	rm -rf build dist demo *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	find xrds_core xrds_blender tests -name __pycache__ -prune -exec rm -rf {} +

@@ -52,20 +52,22 @@ def status_of(work: Callable[[], None]) -> int:
     try:
         work()
     except (KeyboardInterrupt, Cancelled):
-        return _say("interrupted", INTERRUPTED)
+        line, status = "interrupted", INTERRUPTED
     except UsageError as error:
-        return _say(str(error), WRONG_USAGE)
+        line, status = str(error), WRONG_USAGE
     except XRDSError as error:
-        return _say(str(error), FAILED)
+        line, status = str(error), FAILED
+    except ModuleNotFoundError as error:
+        # the extension leaves out torch and what only makes XRDS
+        line, status = f"this installation has no module {error.name}", FAILED
     except MemoryError:
-        return _say("out of memory; set a memory limit or a smaller picture", FAILED)
-    except Exception:  # a fault of ours: show where, end as a command ends
+        line = "out of memory; set a memory limit or a smaller picture"
+        status = FAILED
+    except Exception as error:  # a fault of ours: show where, end as a command ends
         traceback.print_exc()
-        return FAILED
-    return DONE
-
-
-def _say(line: str, status: int) -> int:
+        line, status = f"unexpected {type(error).__name__}, a fault of XRDS", FAILED
+    else:
+        return DONE
     print(f"xrds: {line}", file=sys.stderr, flush=True)
     return status
 

@@ -1,6 +1,11 @@
-"""Render with XRDS from a button or the Render menu, whatever the scene's engine."""
+"""Render with XRDS from a button or the Render menu, whatever the scene's engine.
+
+Also makes `blender --command xrds` known.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import bpy
 
@@ -72,13 +77,21 @@ def menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     animation.animation = True
 
 
+_command: Any = None
+
+
 def register() -> None:
-    """Register the operator and put it into the Render menu."""
+    """Register the operator, its menu entries and the command."""
+    from . import cli
+
+    global _command
     bpy.utils.register_class(XRDS_OT_render)
     bpy.types.TOPBAR_MT_render.append(menu)
+    _command = bpy.utils.register_cli_command("xrds", cli.main)
 
 
 def unregister() -> None:
-    """Take both back."""
+    """Take them back."""
+    bpy.utils.unregister_cli_command(_command)
     bpy.types.TOPBAR_MT_render.remove(menu)
     bpy.utils.unregister_class(XRDS_OT_render)
