@@ -1,8 +1,10 @@
 """Cycles run by hand on an engine object of our own, one session for several passes.
 
 Cycles writes into the render result of the engine that its session was made with.
-The session lives as long as the passes do: `reset` makes it take the new size and
-settings, and it keeps what did not change (compiled kernels, images, most meshes).
+One session serves every pass: `reset` makes it take the new size and settings, and
+only what the dependency graph calls updated is synced again. The graph still calls
+everything updated when a render starts, so `prepare` lets it forget that; the second
+sync and its BVH then cost next to nothing.
 """
 
 from __future__ import annotations
@@ -35,15 +37,40 @@ def has_denoiser() -> bool:
     return bool(_cycles.with_openimagedenoise)
 
 
+def prepare(engine: Any, depsgraph: Any) -> None:
+    """Hand the graph's updates to a session kept from the frame before, then forget.
+
+    To be called before anything is set on evaluated data: should the graph hold
+    changes not yet evaluated, those are made now.
+    """
+    import bpy
+
+    if getattr(engine, "session", None):
+        functions().reset(engine, bpy.data, depsgraph)
+    handlers = bpy.app.handlers
+    # Nothing changed, so nobody is to hear of it.
+    held = [
+        (listeners, list(listeners))
+        for listeners in (handlers.depsgraph_update_pre, handlers.depsgraph_update_post)
+    ]
+    try:
+        for listeners, _ in held:
+            listeners.clear()
+        depsgraph.update()
+    finally:
+        for listeners, before in held:
+            listeners[:] = before
+
+
 def run(engine: Any, depsgraph: Any) -> StageClock:
     """Render the current settings with the engine's session, made when missing."""
     import bpy
 
     cycles = functions()
     with StageClock() as clock:
-        if getattr(engine, "session", None) and not any(depsgraph.updates):
-            # Without updates Cycles skips its sync and would keep film and samples.
-            cycles.free(engine)
+        if getattr(engine, "session", None) and not _tagged(depsgraph):
+            # Without an update Cycles would keep the film and samples of before.
+            free(engine)
         if not getattr(engine, "session", None):
             cycles.create(engine, bpy.data)
         cycles.reset(engine, bpy.data, depsgraph)
@@ -53,10 +80,17 @@ def run(engine: Any, depsgraph: Any) -> StageClock:
     return clock
 
 
+def _tagged(depsgraph: Any) -> bool:
+    """Tag the evaluated scene as updated; False if this Blender does not do so."""
+    settings = depsgraph.scene_eval.cycles
+    settings.seed = settings.seed  # setting is what tags, whatever the value
+    return any(True for _ in depsgraph.updates)
+
+
 def free(engine: Any) -> None:
     """End the engine's session if it has one."""
     if getattr(engine, "session", None):
-        functions().free(engine)
+        functions().free(engine)  # takes the attribute away
     engine.session = None
 
 

@@ -19,7 +19,7 @@ from xrds_core.errors import Cancelled
 from . import cycles_session
 from .borrowed import Borrowed, PipelineSettings
 from .cycles_session import Array
-from .low_camera import Frame, is_exact, widen
+from .low_camera import Frame, widen
 
 ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth"
 COMBINED, NOISY = "Combined", "Noisy Image"
@@ -117,6 +117,8 @@ class CyclesPasses:
         self._keeps_session = self._render.use_persistent_data
         # Else Cycles frees the dependency graph after its first sync.
         self._pipeline.set(use_persistent_data=True)
+        cycles_session.prepare(self._engine, self._depsgraph)
+        self._scene = self._depsgraph.scene_eval
         for name, channels, letters in self._wanted_passes():
             if name not in self._layer().passes:
                 self._engine.add_pass(name, channels, letters, layer=self._layer_name)
@@ -356,7 +358,8 @@ class CyclesPasses:
         self, view: str, full: bool, denoised: bool, seconds: dict[str, float]
     ) -> Guides:
         albedo, normal = self._read(ALBEDO, view), self._read(NORMAL, view)
-        assert albedo is not None and normal is not None
+        assert albedo is not None
+        assert normal is not None
         depth = self._read(DEPTH, view)
         radiance = self._radiance(view, denoised)
         return Guides(

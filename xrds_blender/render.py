@@ -62,7 +62,9 @@ def run_job(
     global _running
     ensure_registered()
     if scene.camera is None:
-        raise SceneError(f"scene {scene.name!r} has no camera; add one and render again")
+        raise SceneError(
+            f"scene {scene.name!r} has no camera; add one and render again"
+        )
     if _running is not None:
         raise SceneError("a render is running already; wait for its end")
     name = layer or next((v.name for v in scene.view_layers if v.use), None)
