@@ -153,24 +153,22 @@ def _dataset(options: argparse.Namespace) -> dict[str, Any]:
     _need_blender("dataset")
     from .studio.dataset import generate
 
-    return generate(
+    written = generate(
         options.out,
         seed=options.seed,
         count=options.count,
         assets=options.assets,
         scales=options.scales,
     )
+    return {"out": str(options.out), "windows": written}
 
 
 def _train(options: argparse.Namespace) -> dict[str, Any]:
-    from xrds_core.training.config import read
+    from xrds_core.training.config import read_config
     from xrds_core.training.train import train
 
-    return train(read(options.config), options.out or _run_folder(options.config))
-
-
-def _run_folder(config: Path) -> Path:
-    return Path("runs") / config.stem
+    folder = options.out or Path("runs") / options.config.stem
+    return train(read_config(options.config), folder)
 
 
 def _need_blender(command: str) -> None:
@@ -252,7 +250,7 @@ def _add_network(command: argparse.ArgumentParser) -> None:
     add("--exposure", type=float, help="hold it for an animation or a border")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
     add("--memory-limit", type=_bytes, help="of the network, as 500M or 4G")
-    add("--weights", type=Path, help="folder of weights files")
+    add("--weights", type=Path, help="weights file, or folder of such")
 
 
 def _add_evaluate(commands: Any) -> argparse.ArgumentParser:

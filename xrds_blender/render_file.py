@@ -84,9 +84,9 @@ def open_scene(path: Path) -> Any:
 def _check_weights(job: RenderJob) -> None:
     """Raise WeightsError now rather than after the Cycles renders."""
     if not job.plain:
-        from xrds_core import weights
+        from xrds_core import Upscaler
 
-        weights.load_preset(job.preset, job.scale, job.guides, job.weights)
+        Upscaler(job.preset, job.scale, job.guides, job.device, weights=job.weights)
 
 
 def _frame(
