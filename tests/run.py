@@ -19,6 +19,7 @@ from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
 MODULE_LIMIT = 420.0  # seconds for one process; single tests have their own limit
+EXIT_GRACE = 10.0  # seconds to end after the last test
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,18 @@ def read_report(report: Path) -> Counter[str] | None:
     return told
 
 
+def wait(child: subprocess.Popen[bytes], report: Path, deadline: float) -> None:
+    """Wait until the process ends; kill it soon after its report, or when late."""
+    while child.poll() is None:
+        try:
+            child.wait(1.0)
+        except subprocess.TimeoutExpired:
+            if read_report(report) is not None:
+                deadline = min(deadline, time.perf_counter() + EXIT_GRACE)
+            if time.perf_counter() > deadline:
+                child.kill()
+
+
 def run(name: str, paths: list[Path], options: list[str]) -> Verdict:
     """Run pytest on `paths` in its own process and read what it reported."""
     start = time.perf_counter()
@@ -52,16 +65,14 @@ def run(name: str, paths: list[Path], options: list[str]) -> Verdict:
         report = Path(folder) / "report.xml"
         command = [sys.executable, "-m", "pytest", f"--junit-xml={report}", *options]
         with subprocess.Popen([*command, *map(str, paths)], cwd=TESTS.parent) as child:
-            try:
-                child.wait(MODULE_LIMIT)
-            except subprocess.TimeoutExpired:
-                child.kill()
+            wait(child, report, start + MODULE_LIMIT)
         counts = read_report(report)
     seconds = time.perf_counter() - start
     if counts is None:
         print(f"{name}: no report; exit status {child.returncode}", flush=True)
         return Verdict(name, False, Counter(failed=1), seconds)
-    return Verdict(name, counts["failed"] == 0, counts, seconds)
+    ok = counts["failed"] == 0 and counts.total() > 0
+    return Verdict(name, ok, counts, seconds)
 
 
 def batches() -> list[tuple[str, list[Path]]]:
