@@ -1,0 +1,1 @@
+"""Procedural scenes and the training-set generator; not part of the extension."""

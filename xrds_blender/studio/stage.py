@@ -1,0 +1,111 @@
+"""What every recipe works with: the scene, the dice, the materials, the views."""
+
+from __future__ import annotations
+
+import math
+import random
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from .assets import Library, copied, import_model
+from .geometry import Point, Shape
+from .materials import Painter
+
+
+@dataclass(frozen=True)
+class View:
+    """A camera: where it stands, what it looks at (metres), lens in mm of 36."""
+
+    eye: tuple[float, float, float]
+    target: tuple[float, float, float]
+    lens: float
+    fstop: float = 0.0  # 0: everything sharp
+
+
+@dataclass
+class Stage:
+    """One scene under construction. Recipes add things and views."""
+
+    scene: bpy.types.Scene
+    rng: random.Random
+    library: Library | None
+    kind: str = ""
+    views: list[View] = field(default_factory=list)
+    models: dict[str, bpy.types.Object] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.paint = Painter(self.rng, self.library)
+        self.dice = np.random.default_rng(self.rng.getrandbits(32))
+
+    def chance(self, probability: float) -> bool:
+        """True with this probability."""
+        return self.rng.random() < probability
+
+    def put(
+        self,
+        shape: Shape,
+        material: bpy.types.Material,
+        at: Point = (0, 0, 0),
+        turn: float = 0.0,
+        bevel: float = 0.0,
+    ) -> bpy.types.Object:
+        """A shape as an object of this material; bevelled edges if ``bevel`` metres."""
+        mesh = shape.mesh(material.name)
+        mesh.materials.append(material)
+        thing = bpy.data.objects.new(material.name, mesh)
+        thing.location, thing.rotation_euler[2] = at, turn
+        self.scene.collection.objects.link(thing)
+        if bevel:
+            edge = thing.modifiers.new("Bevel", "BEVEL")
+            edge.width, edge.segments, edge.limit_method = bevel, 2, "ANGLE"
+        return thing
+
+    def model(
+        self, size: float, at: Point, turn: float, words: tuple[str, ...] = ()
+    ) -> bpy.types.Object | None:
+        """A model of the library (whose name has one of ``words``) standing at ``at``."""
+        if self.library is None:
+            return None
+        paths = [
+            path
+            for path in self.library.models
+            if not words or any(word in path.name for word in words)
+        ]
+        path = self.rng.choice(paths or list(self.library.models))
+        base = self._imported(path)
+        # The first one is a pattern of unit size, kept out of the picture's way.
+        base = copied(base)
+        base.location, base.rotation_euler[2] = at, turn
+        base.scale = (size, size, size)
+        return base
+
+    def _imported(self, path) -> bpy.types.Object:
+        if path.name not in self.models:
+            base = import_model(path, 1.0)
+            base.location = (0, 0, -500)
+            self.models[path.name] = base
+            self.library.note(path)
+        return self.models[path.name]
+
+    def look(
+        self, eye: Point, target: Point, lens: float, shallow: float = 0.25
+    ) -> None:
+        """Add a view; with probability ``shallow`` it has a depth of field."""
+        fstop = self.rng.uniform(1.2, 6.0) if self.chance(shallow) else 0.0
+        self.views.append(View(tuple(eye), tuple(target), lens, fstop))
+
+
+def aim(thing: bpy.types.Object, eye: Point, target: Point, roll: float = 0.0) -> None:
+    """Place a camera or lamp at ``eye`` looking at ``target``."""
+    thing.location = eye
+    way = (Vector(target) - Vector(eye)).to_track_quat("-Z", "Y")
+    thing.rotation_euler = way.to_euler()
+    thing.rotation_euler.rotate_axis("Z", roll)
+
+
+def turned(rng: random.Random) -> float:
+    """Any angle in radians."""
+    return rng.uniform(0, 2 * math.pi)
