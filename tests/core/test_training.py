@@ -48,7 +48,7 @@ def write_window(path: Path, seed: int, scale: int = 2) -> None:
     arrays |= {"guide_radiance_a": reference, "guide_radiance_b": reference}
     for i in (0, 1):
         arrays |= {f"low{scale}_{i}": low, f"low{scale}_{i}_noisy": low}
-    meta = {"guide_spp_a": 1, "guide_spp_b": 4, "blender_series": "4.5"}
+    meta = {"guide_spp": [1, 4], "blender_series": "4.5"}
     path.parent.mkdir(parents=True, exist_ok=True)
     half_floats = {k: v.astype(np.float16) for k, v in arrays.items()}
     np.savez_compressed(path, meta=json.dumps(meta), **half_floats)

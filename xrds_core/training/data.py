@@ -131,7 +131,7 @@ def draw(
 
 def mix_guides(window: Window, random: np.random.Generator) -> Array:
     """One of the two guide renders, or their mean by samples: (H, W, 6)."""
-    a, b = window.meta["guide_spp_a"], window.meta["guide_spp_b"]
+    a, b = window.meta["guide_spp"]
     share = ((a / (a + b)), 1.0, 0.0)[random.integers(3)]
     mixed: Array = window.array("guides_a") * np.float32(share)
     mixed += window.array("guides_b") * np.float32(1 - share)
