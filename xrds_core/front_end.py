@@ -23,11 +23,11 @@ ArrayOrTensor = TypeVar("ArrayOrTensor", NDArray[np.float32], Tensor)
 TRANSFER_GAIN = 10.0
 EXPOSURE_KEY = 0.18
 ALBEDO_EPSILON = 0.02
+EXPOSURE_RANGE = (1e-36, 1e36)  # times the gain, still a normal float32
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec.709
 
 _MOST_BINS = 16  # along each axis
 _DARKEST_BIN = 1e-4  # of the brightest; darker bins say nothing of the exposure
-_EXPOSURE_RANGE = (1e-36, 1e36)  # times the gain, still a normal float32
 _LARGEST = np.finfo(np.float32).max
 # Of k e x: its square, over the epsilons that networks divide by, is a float32 still.
 _LARGEST_EXPOSED = 1e18
@@ -119,7 +119,7 @@ def auto_exposure(radiance: Picture) -> float:
         return 1.0
     seen = luminance[luminance >= brightest * _DARKEST_BIN]
     exposure = EXPOSURE_KEY / math.exp(float(np.log(seen).mean()))
-    return min(max(exposure, _EXPOSURE_RANGE[0]), _EXPOSURE_RANGE[1])
+    return min(max(exposure, EXPOSURE_RANGE[0]), EXPOSURE_RANGE[1])
 
 
 def _bin_means(x: NDArray[np.float64], axis: int) -> NDArray[np.float64]:

@@ -1,0 +1,88 @@
+"""Alpha at full resolution, and radiance that fits it.
+
+Radiance is premultiplied. Arrays are float32: low-resolution ones (h, w, ...), full
+ones (H, W, ...) with H <= scale h, W <= scale w.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+from torch.nn import functional
+
+from .front_end import upsample_alpha, upsample_bilinear
+
+if TYPE_CHECKING:
+    from .front_end import Picture
+
+_BAND = 64  # low-resolution rows at a time bound the memory of what is in between
+
+
+def finish(
+    picture: Picture, low: Picture, guide_alpha: Picture | None, scale: int
+) -> None:
+    """Fill in the alpha of ``picture`` (H, W, 4) and free its radiance of fringes.
+
+    ``picture`` was made from ``low`` (h, w, 4); ``guide_alpha`` is (H, W).
+    """
+    height = low.shape[0]
+    for top in range(0, height, _BAND):
+        # one more row at each end: as far as interpolation and bounds look
+        first, last = max(top - 1, 0), min(top + _BAND + 1, height)
+        rows = slice(first * scale, last * scale)
+        kept = slice((top - first) * scale, (top - first + _BAND) * scale)
+        band, target = low[first:last], picture[rows]
+        guide = None if guide_alpha is None else guide_alpha[rows]
+        alpha = _alpha(band[..., 3], guide, target.shape[:2], scale)
+        bounded = _bounded(target[..., :3], alpha, band, scale)
+        target[kept, :, :3] = bounded[kept]
+        target[kept, :, 3] = alpha[kept]
+
+
+def _alpha(
+    low: Picture, guide: Picture | None, shape: tuple[int, ...], scale: int
+) -> Picture:
+    if guide is not None:
+        return upsample_alpha(low, guide, scale)
+    plane = torch.from_numpy(np.clip(low, 0.0, 1.0))[None, None]
+    large: Picture = upsample_bilinear(plane, scale)[0, 0].numpy()
+    return large[: shape[0], : shape[1]]
+
+
+def _bounded(radiance: Picture, alpha: Picture, low: Picture, scale: int) -> Picture:
+    """Keep the colour behind ``alpha`` among those of the 3x3 pixels of ``low``.
+
+    Only near edges: where all nine are opaque, radiance may be anything. Light that
+    covers nothing (alpha 0), as of fire, sets no upper bound.
+    """
+    height, width = alpha.shape
+    limits = (_expand(x, scale)[:height, :width] for x in _colour_range(low))
+    with np.errstate(invalid="ignore"):  # infinity times alpha 0
+        darkest, brightest = (x * alpha[..., None] for x in limits)
+    # fmin and fmax: a bound that is NaN is none
+    return np.fmax(np.fmin(radiance, brightest), darkest)
+
+
+def _colour_range(low: Picture) -> tuple[Picture, Picture]:
+    """Return the least and largest radiance / alpha around pixels, both (h, w, 3)."""
+    radiance, alpha = low[..., :3], low[..., 3:]
+    with np.errstate(all="ignore"):
+        colour = radiance / alpha  # NaN where there is nothing
+    darkest = -_largest_around(-np.nan_to_num(colour, nan=np.inf, posinf=np.inf))
+    brightest = _largest_around(np.nan_to_num(colour, nan=0.0, posinf=np.inf))
+    opaque = -_largest_around(-alpha) >= 1.0
+    darkest[np.isinf(darkest) | opaque] = 0.0
+    brightest[np.broadcast_to(opaque, brightest.shape)] = np.inf
+    return darkest, brightest
+
+
+def _largest_around(x: Picture) -> Picture:
+    planes = torch.from_numpy(np.ascontiguousarray(x.transpose(2, 0, 1)))
+    pooled = functional.max_pool2d(planes, kernel_size=3, stride=1, padding=1)
+    return np.ascontiguousarray(pooled.permute(1, 2, 0).numpy())
+
+
+def _expand(x: Picture, scale: int) -> Picture:
+    return x.repeat(scale, axis=0).repeat(scale, axis=1)

@@ -1,0 +1,86 @@
+"""What a network costs per output pixel, found by watching one tiny forward pass."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor, nn
+from torch.utils._python_dispatch import TorchDispatchMode
+from torch.utils._pytree import tree_leaves
+
+if TYPE_CHECKING:
+    from .network import XRDS
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Per output pixel of a network's forward pass."""
+
+    bytes: float
+    """Most bytes of tensors alive at the same time, inputs left out."""
+    values: float
+    """Values that the layers return, in all: a measure of how far a pass has come."""
+
+
+class _LiveBytes(TorchDispatchMode):
+    """Follows every tensor that operations allocate until it is freed."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.now = self.peak = 0
+        self.alive: set[int] = set()
+
+    def __torch_dispatch__(
+        self, func: Any, types: Any, args: Any = (), kwargs: Any = None
+    ) -> Any:
+        result = func(*args, **(kwargs or {}))
+        for tensor in tree_leaves(result):
+            if isinstance(tensor, Tensor):
+                self.follow(tensor.untyped_storage())
+        return result
+
+    def follow(self, storage: torch.UntypedStorage) -> None:
+        key, size = storage._cdata, storage.nbytes()
+        if key not in self.alive:
+            self.alive.add(key)
+            self.now += size
+            self.peak = max(self.peak, self.now)
+            weakref.finalize(storage, self.forget, key, size)
+
+    def forget(self, key: int, size: int) -> None:
+        self.alive.discard(key)
+        self.now -= size
+
+
+def leaves(network: nn.Module) -> list[nn.Module]:
+    """Return the layers that hold no others."""
+    return [module for module in network.modules() if not any(module.children())]
+
+
+def measure(network: XRDS) -> Cost:
+    """Run ``network`` in float32 on two by two windows and return its cost.
+
+    Everything it computes grows with the number of pixels, so that a tiny picture
+    tells of a large one.
+    """
+    config = network.config
+    device = next(network.parameters()).device
+    low = 2 * config.low_multiple
+    high = low * config.scale
+    radiance = torch.zeros(1, 3, low, low, device=device)
+    guides = torch.zeros(1, config.guide_count, high, high, device=device)
+    values = 0
+
+    def count(module: nn.Module, inputs: Any, output: Tensor) -> None:
+        nonlocal values
+        values += output.numel()
+
+    hooks = [layer.register_forward_hook(count) for layer in leaves(network)]
+    with torch.inference_mode(), _LiveBytes() as live:
+        network(radiance, guides)
+    for hook in hooks:
+        hook.remove()
+    return Cost(live.peak / high**2, values / high**2)

@@ -1,0 +1,180 @@
+"""The arrays given to an upscale: checked, cleaned, and cut into tiles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+
+from .errors import PictureError
+from .front_end import clean_radiance, fill_holes, transfer
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from .front_end import Picture
+    from .tiling import Tile
+
+_SCALES = (1, 2, 4, 8, 16)  # to propose in a message
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """One picture and its guides, without NaN, infinities or negative radiance."""
+
+    scale: int
+    low: Picture
+    """Radiance (h, w, 3), or (h, w, 4) with alpha."""
+    albedo: Picture
+    """(H, W, 3), as the normal; scale (h - 1) < H <= scale h, and so W."""
+    normal: Picture
+    guide_radiance: Picture | None
+    """(H, W, 3)"""
+    guide_alpha: Picture | None
+    """(H, W)"""
+    bad_pixels: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the result."""
+        return self.albedo.shape[0], self.albedo.shape[1]
+
+    def is_black(self) -> bool:
+        """Tell whether there is no light at all in the picture."""
+        seen = (self.low[..., :3], self.guide_radiance)
+        return not any(x is not None and x.any() for x in seen)
+
+    def radiance_tensor(self, tile: Tile, exposure: float) -> Tensor:
+        """Return the radiance of a tile in the transfer domain, (1, 3, h, w)."""
+        rows, columns = tile.rows, tile.columns
+        cut = self.low[rows.start : rows.stop, columns.start : columns.stop, :3]
+        return transfer(_planes(cut), exposure)
+
+    def guide_tensor(self, tile: Tile, exposure: float) -> Tensor:
+        """Return the guides of a tile as the network takes them, (1, 6 or 9, H, W).
+
+        Where they end before the low-resolution picture does, their edge is repeated.
+        """
+        guides = (self.albedo, self.normal, self.guide_radiance)
+        planes = [_planes(self._cut(x, tile)) for x in guides if x is not None]
+        planes[0] = planes[0].clamp(0.0, 1.0)
+        planes[1] = planes[1].clamp(-1.0, 1.0)
+        planes[2:] = [transfer(x, exposure) for x in planes[2:]]
+        return torch.cat(planes, dim=1)
+
+    def _cut(self, guide: Picture, tile: Tile) -> Picture:
+        spans = (tile.rows, tile.columns)
+        rows, columns = (
+            span.output(self.scale, limit)
+            for span, limit in zip(spans, self.shape, strict=True)
+        )
+        cut = guide[rows, columns]
+        missing = [
+            (0, span.size * self.scale - size)
+            for span, size in zip(spans, cut.shape, strict=False)
+        ]
+        if not any(after for _, after in missing):
+            return cut
+        return np.pad(cut, (*missing, (0, 0)), "edge")
+
+
+def _planes(x: Picture) -> Tensor:
+    """(H, W, C) array -> (1, C, H, W) tensor."""
+    return torch.from_numpy(np.ascontiguousarray(x)).permute(2, 0, 1)[None]
+
+
+def check(
+    scale: int,
+    radiance: Any,
+    albedo: Any,
+    normal: Any,
+    guide_radiance: Any = None,
+    guide_alpha: Any = None,
+) -> Inputs:
+    """Return the arrays, cleaned; float32 ones without a fault are not copied.
+
+    Raises PictureError, with the sizes and the remedy, for arrays that do not fit.
+    """
+    low = _array("radiance", radiance, (3, 4))
+    guides = {
+        "albedo": _array("albedo", albedo, (3,)),
+        "normal": _array("normal", normal, (3,)),
+    }
+    if guide_radiance is not None:
+        guides["guide_radiance"] = _array("guide_radiance", guide_radiance, (3,))
+    if guide_alpha is not None:
+        plane = np.asarray(guide_alpha)
+        plane = plane[..., None] if plane.ndim == 2 else plane
+        guides["guide_alpha"] = _array("guide_alpha", plane, (1,))
+    _check_sizes(scale, low, guides)
+    cleaned = {
+        name: (clean_radiance if name == "guide_radiance" else fill_holes)(guide)
+        for name, guide in guides.items()
+    }
+    low, bad_pixels = clean_radiance(low)
+    bad_pixels += sum(count for _, count in cleaned.values())
+    light, _ = cleaned.get("guide_radiance", (None, 0))
+    cover, _ = cleaned.get("guide_alpha", (None, 0))
+    if cover is not None and low.shape[2] == 3:
+        low = np.concatenate((low, _low_alpha(cover, low, scale)), axis=2)
+    return Inputs(
+        scale,
+        low,
+        cleaned["albedo"][0],
+        cleaned["normal"][0],
+        light,
+        None if cover is None else cover[..., 0],
+        bad_pixels,
+    )
+
+
+def _low_alpha(cover: Picture, low: Picture, scale: int) -> Picture:
+    """Return what the guides' alpha (H, W, 1) is at low resolution, (h, w, 1)."""
+    height, width = low.shape[:2]
+    missing = (height * scale - cover.shape[0], width * scale - cover.shape[1])
+    whole = np.pad(cover, ((0, missing[0]), (0, missing[1]), (0, 0)), "edge")
+    blocks = whole.reshape(height, scale, width, scale, 1)
+    return np.asarray(blocks.mean(axis=(1, 3)))
+
+
+def _array(name: str, value: Any, channels: tuple[int, ...]) -> Picture:
+    array = np.asarray(value)
+    if array.ndim != 3 or array.shape[-1] not in channels or not array.size:
+        wanted = " or ".join(map(str, channels))
+        raise PictureError(
+            f"{name} has the shape {array.shape}; it must be (height, width, {wanted})"
+        )
+    if array.dtype.kind != "f":
+        raise PictureError(
+            f"{name} holds {array.dtype}; it must hold scene-linear floats"
+        )
+    with np.errstate(over="ignore"):  # what float32 cannot hold is a bad pixel
+        return array.astype(np.float32, copy=False)
+
+
+def _check_sizes(scale: int, low: Picture, guides: dict[str, Picture]) -> None:
+    albedo = guides["albedo"]
+    for name, guide in guides.items():
+        if guide.shape[:2] != albedo.shape[:2]:
+            raise PictureError(
+                f"{name} is {_size(guide)} pixels, but albedo is {_size(albedo)}: "
+                "give guides of one render"
+            )
+    if not _fits(scale, low, albedo):
+        other = [s for s in _SCALES if _fits(s, low, albedo)]
+        raise PictureError(
+            f"the guides are {_size(albedo)} pixels, but a beauty of {_size(low)} at "
+            f"scale {scale} needs guides of {_size(low, scale)}, or less by fewer "
+            f"than {scale} pixels: render them at that size"
+            + (f", or use scale {other[0]}" if other else "")
+        )
+
+
+def _fits(scale: int, low: Picture, guide: Picture) -> bool:
+    return low.shape[:2] == tuple(-(-size // scale) for size in guide.shape[:2])
+
+
+def _size(x: Picture, scale: int = 1) -> str:
+    return f"{x.shape[1] * scale}x{x.shape[0] * scale}"

@@ -1,0 +1,125 @@
+"""Where tiles lie, how they are blended, and how much memory one costs.
+
+All lengths are low-resolution pixels unless a name says otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Of an overlap, this part at each end counts nothing: what is near a tile's edge has
+# not seen its surroundings. The blend happens in the rest.
+_BLIND = 0.375
+
+
+@dataclass(frozen=True)
+class Span:
+    """The extent of a tile along one axis."""
+
+    start: int
+    stop: int
+    overlap_before: int
+    """Shared with the tile before; 0 at the edge of the picture."""
+    overlap_after: int
+
+    @property
+    def size(self) -> int:
+        return self.stop - self.start
+
+    def output(self, scale: int, limit: int) -> slice:
+        """Return the full-resolution pixels it covers of a picture of ``limit``."""
+        return slice(self.start * scale, min(self.stop * scale, limit))
+
+    def weights(self, scale: int) -> NDArray[np.float32]:
+        """Return the blend weights of its ``size * scale`` full-resolution pixels.
+
+        Over all spans of an axis they add up to 1.
+        """
+        weights = np.ones(self.size * scale, np.float32)
+        if self.overlap_before:
+            rise = _rise(self.overlap_before * scale)
+            weights[: rise.size] = rise
+        if self.overlap_after:
+            fall = 1.0 - _rise(self.overlap_after * scale)
+            weights[-fall.size :] = fall
+        return weights
+
+
+def _rise(length: int) -> NDArray[np.float32]:
+    """Return a smooth step from 0 to 1."""
+    x = (np.arange(length) + 0.5) / length
+    x = np.clip((x - _BLIND) / (1.0 - 2.0 * _BLIND), 0.0, 1.0)
+    return (x * x * (3.0 - 2.0 * x)).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A rectangle of the low-resolution picture that the network sees at once."""
+
+    rows: Span
+    columns: Span
+
+    def weights(self, scale: int) -> NDArray[np.float32]:
+        """Return blend weights (scale height, scale width)."""
+        rows, columns = self.rows.weights(scale), self.columns.weights(scale)
+        return rows[:, None] * columns
+
+
+def tiles(
+    low_height: int, low_width: int, tile: tuple[int, int], overlap: int, multiple: int
+) -> list[Tile]:
+    """Cover a picture with tiles of at most ``tile`` (height, width).
+
+    Every origin is a multiple of ``multiple``, so that attention windows lie in a
+    tile as they do in the whole picture; neighbours share at least ``overlap``.
+    """
+    rows = _spans(low_height, tile[0], overlap, multiple)
+    columns = _spans(low_width, tile[1], overlap, multiple)
+    return [Tile(row, column) for row in rows for column in columns]
+
+
+def _spans(length: int, tile: int, overlap: int, multiple: int) -> list[Span]:
+    overlap = _up(overlap, multiple)
+    tile = max(tile // multiple * multiple, 2 * overlap)  # ramps must not meet
+    if length <= tile:
+        return [Span(0, length, 0, 0)]
+    count = math.ceil((length - overlap) / (tile - overlap))
+    step = _up(math.ceil((length - overlap) / count), multiple)  # even, so smaller
+    starts = range(0, length - overlap, step)
+    return [
+        Span(
+            start,
+            min(start + step + overlap, length),
+            overlap if start else 0,
+            overlap if start + step + overlap < length else 0,
+        )
+        for start in starts
+    ]
+
+
+def fit(
+    low_height: int, low_width: int, pixels: float, overlap: int, multiple: int
+) -> tuple[int, int]:
+    """Return the tile (height, width) for at most ``pixels`` low-resolution pixels.
+
+    The picture itself if it is small enough; never smaller than two overlaps, below
+    which tiles cannot be blended.
+    """
+    least = 2 * _up(overlap, multiple)
+    square = max(math.isqrt(int(pixels)) // multiple * multiple, least)
+    height = min(square, _up(low_height, multiple))
+    width = max(int(pixels / height) // multiple * multiple, least)
+    width = min(width, _up(low_width, multiple))
+    taller = max(int(pixels / width) // multiple * multiple, height)
+    return min(taller, _up(low_height, multiple)), width
+
+
+def _up(length: int, multiple: int) -> int:
+    return -(-length // multiple) * multiple

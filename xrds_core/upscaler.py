@@ -1,0 +1,297 @@
+"""Pictures in, larger pictures out: weights, device, tiles, progress and cancel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import torch
+
+from . import tiling
+from .alpha import finish
+from .cost import Cost, measure
+from .devices import choose_device, choose_precision
+from .errors import PictureError, UsageError, WeightsError, XRDSError
+from .front_end import EXPOSURE_RANGE, auto_exposure, inverse_transfer
+from .inputs import Inputs, check
+from .network import XRDS
+from .progress import Callback, Progress, watched
+from .weights import load, load_preset
+
+if TYPE_CHECKING:
+    from .front_end import Picture
+
+DEFAULT_MEMORY = 4 << 30
+"""Bytes that an upscale may take on the CPU where no limit is given."""
+
+# Tiles overlap by so many attention windows; the tests hold the seams to a bound.
+_OVERLAP_WINDOWS = 4
+# What the allocator of the C library loses to fragments, and what layers allocate for
+# themselves: measured 1.7 to 2.6 times the tensors.
+_CPU_OVERHEAD = 2.6
+_GPU_OVERHEAD = 1.5
+_TILE_BYTES = 100.0  # per output pixel beside the network: guides, result, weights
+
+
+@dataclass(frozen=True)
+class Upscaled:
+    """The result of an upscale."""
+
+    radiance: Picture
+    """(H, W, 3), or (H, W, 4) premultiplied with alpha, scene-linear."""
+    exposure: float
+    """That was used: give it to the other frames or borders of the same picture."""
+    bad_pixels: int
+    """Pixels of the inputs that held NaN, infinities or negative light."""
+    tiles: int
+
+
+class Upscaler:
+    """A network on a device, ready for any number of pictures.
+
+    Args:
+        preset: ``paper``, ``balanced`` or ``fast``.
+        scale: output pixels per low-resolution pixel along one axis.
+        guides: ``fast`` (albedo and normal) or ``full`` (and noisy radiance).
+        device: ``auto``, or what torch knows: ``cpu``, ``cuda``, ``cuda:1``, ``mps``.
+        precision: ``auto``, ``fp32`` or ``bf16``; only the layers of the network
+            ever run in bf16.
+        weights: a folder of presets, a file, or a network, in place of the shipped.
+
+    Raises:
+        WeightsError: the weights are missing, damaged or of another scale.
+        UsageError: the device or precision is not there.
+    """
+
+    def __init__(
+        self,
+        preset: str = "fast",
+        scale: int = 2,
+        guides: str = "fast",
+        device: str = "auto",
+        precision: str = "auto",
+        weights: str | Path | XRDS | None = None,
+    ) -> None:
+        self.device = choose_device(device)
+        self.precision = choose_precision(precision, self.device)
+        self.network = _network(preset, scale, guides, weights).to(self.device)
+        self._cost: Cost | None = None
+
+    @property
+    def scale(self) -> int:
+        """Output pixels per low-resolution pixel along one axis."""
+        return self.network.config.scale
+
+    @property
+    def cost(self) -> Cost:
+        """What the network costs per output pixel."""
+        if self._cost is None:
+            self._cost = measure(self.network)
+        return self._cost
+
+    def __call__(
+        self,
+        radiance: Picture,
+        albedo: Picture,
+        normal: Picture,
+        *,
+        guide_radiance: Picture | None = None,
+        guide_alpha: Picture | None = None,
+        exposure: float | None = None,
+        memory_limit: int | None = None,
+        tile: int | None = None,
+        progress: Callback | None = None,
+    ) -> Upscaled:
+        """Enlarge one picture.
+
+        Args:
+            radiance: (h, w, 3), or (h, w, 4) premultiplied; scene-linear.
+            albedo: (H, W, 3), where h = ceil(H / scale) and w = ceil(W / scale).
+            normal: (H, W, 3), in camera space.
+            guide_radiance: (H, W, 3), for ``full`` guides and only for them.
+            guide_alpha: (H, W), the alpha of the guides' render; in place of the
+                picture's own, too, where ``radiance`` has none.
+            exposure: of a picture this is a part of; None finds it in ``radiance``.
+            memory_limit: bytes to aim at, beside the arrays given and returned. The
+                smallest tiles are taken where it is too small even for them.
+            tile: side of the tiles in low-resolution pixels, in place of a limit.
+            progress: called with fractions from 0 to exactly 1; False cancels.
+
+        Raises:
+            PictureError: the arrays do not fit each other or this network.
+            Cancelled: ``progress`` returned False.
+        """
+        inputs = check(
+            self.scale, radiance, albedo, normal, guide_radiance, guide_alpha
+        )
+        self._check_guides(inputs)
+        exposure = _exposure(exposure, inputs)
+        plan = self._tiles(inputs, memory_limit, tile)
+        picture = self._picture(inputs, exposure, plan, progress)
+        return Upscaled(picture, exposure, inputs.bad_pixels, len(plan))
+
+    def _check_guides(self, inputs: Inputs) -> None:
+        full = self.network.config.guides == "full"
+        if full and inputs.guide_radiance is None:
+            raise PictureError("these weights want guide_radiance; or use fast guides")
+        if not full and inputs.guide_radiance is not None:
+            raise PictureError(
+                "these weights take no guide_radiance; leave it out or use full guides"
+            )
+
+    def _tiles(
+        self, inputs: Inputs, limit: int | None, side: int | None
+    ) -> list[tiling.Tile]:
+        window = self.network.config.low_multiple
+        overlap, multiple = _OVERLAP_WINDOWS * window, 2 * window
+        height, width = inputs.low.shape[:2]
+        if side is None:
+            pixels = self._memory(limit) / (self.bytes_per_pixel() * self.scale**2)
+        else:
+            pixels = side**2
+        size = tiling.fit(height, width, pixels, overlap, multiple)
+        return tiling.tiles(height, width, size, overlap, multiple)
+
+    def _memory(self, limit: int | None) -> float:
+        if limit is not None:
+            return limit
+        if self.device.type == "cuda":
+            return 0.8 * torch.cuda.mem_get_info(self.device)[0]
+        return DEFAULT_MEMORY
+
+    def bytes_per_pixel(self) -> float:
+        """Return the memory that one output pixel of a tile takes at the most."""
+        overhead = _CPU_OVERHEAD if self.device.type == "cpu" else _GPU_OVERHEAD
+        return self.cost.bytes * overhead + _TILE_BYTES
+
+    def _picture(
+        self,
+        inputs: Inputs,
+        exposure: float,
+        plan: list[tiling.Tile],
+        callback: Callback | None,
+    ) -> Picture:
+        picture = np.zeros((*inputs.shape, inputs.low.shape[2]), np.float32)
+        progress = Progress(callback, self._work(plan))
+        progress.tell(0.0)
+        if not inputs.is_black():
+            with watched(self.network, progress):
+                for tile in plan:
+                    self._add(picture, inputs, tile, exposure)
+        if inputs.low.shape[2] == 4:
+            finish(picture, inputs.low, inputs.guide_alpha, self.scale)
+        progress.tell(1.0)
+        return picture
+
+    def _work(self, plan: list[tiling.Tile]) -> float:
+        """Return the number of values that the layers will have returned."""
+        window = self.network.config.low_multiple
+        cells = sum(
+            math.ceil(tile.rows.size / window) * math.ceil(tile.columns.size / window)
+            for tile in plan
+        )
+        return cells * (window * self.scale) ** 2 * self.cost.values
+
+    def _add(
+        self, picture: Picture, inputs: Inputs, tile: tiling.Tile, exposure: float
+    ) -> None:
+        """Add what one tile has to say to the pixels it covers."""
+        result = self._run(inputs, tile, exposure)
+        rows = tile.rows.output(self.scale, picture.shape[0])
+        columns = tile.columns.output(self.scale, picture.shape[1])
+        target = picture[rows, columns, :3]
+        height, width = target.shape[:2]
+        share = tile.weights(self.scale)[:height, :width, None]
+        target += result[:height, :width] * share
+
+    def _run(self, inputs: Inputs, tile: tiling.Tile, exposure: float) -> Picture:
+        """Return the radiance of one tile, (scale height, scale width, 3)."""
+        bf16 = self.precision == torch.bfloat16
+        try:
+            with (
+                torch.inference_mode(),
+                torch.autocast(self.device.type, torch.bfloat16, enabled=bf16),
+            ):
+                t = self.network(
+                    inputs.radiance_tensor(tile, exposure).to(self.device),
+                    inputs.guide_tensor(tile, exposure).to(self.device),
+                )
+                result = inverse_transfer(t, exposure).clamp_(min=0.0)
+        except torch.OutOfMemoryError as error:
+            raise XRDSError(
+                f"{self.device} has too little memory for a tile of "
+                f"{tile.columns.size}x{tile.rows.size} pixels: give a memory limit"
+            ) from error
+        array: Picture = result[0].permute(1, 2, 0).cpu().numpy()
+        return array
+
+
+def _network(
+    preset: str, scale: int, guides: str, weights: str | Path | XRDS | None
+) -> XRDS:
+    if isinstance(weights, XRDS):
+        network = weights.eval()
+    elif weights is None or Path(weights).is_dir():
+        network, _ = load_preset(preset, scale, guides, weights)
+    else:
+        network, _ = load(weights)
+    config = network.config
+    if config.scale != scale or (config.guides == "full") != (guides == "full"):
+        raise WeightsError(
+            f"these weights are for scale {config.scale} and {config.guides} guides, "
+            f"not for scale {scale} and {guides} guides; give others"
+        )
+    return network
+
+
+def _exposure(exposure: float | None, inputs: Inputs) -> float:
+    if exposure is None:
+        return auto_exposure(inputs.low)
+    least, most = EXPOSURE_RANGE
+    if not least <= exposure <= most:
+        raise UsageError(f"exposure {exposure} is not within {least:g} and {most:g}")
+    return float(exposure)
+
+
+def upscale(
+    radiance: Picture,
+    albedo: Picture,
+    normal: Picture,
+    *,
+    scale: int = 2,
+    preset: str = "fast",
+    guide_radiance: Picture | None = None,
+    alpha: Picture | None = None,
+    exposure: float | None = None,
+    device: str = "auto",
+    memory_limit: int | None = None,
+    progress: Callback | None = None,
+) -> Picture:
+    """Enlarge one picture with the shipped weights; see `Upscaler` for the arrays.
+
+    ``alpha`` (H, W) is that of the guides' render; the picture's own is the fourth
+    channel of ``radiance``. With ``guide_radiance`` the guides are ``full``. Returns
+    (H, W, 3), with either alpha (H, W, 4). The last network used stays loaded.
+
+    Raises WeightsError, UsageError, PictureError and Cancelled, as `Upscaler`.
+    """
+    guides = "fast" if guide_radiance is None else "full"
+    return _upscaler(preset, scale, guides, device)(
+        radiance,
+        albedo,
+        normal,
+        guide_radiance=guide_radiance,
+        guide_alpha=alpha,
+        exposure=exposure,
+        memory_limit=memory_limit,
+        progress=progress,
+    ).radiance
+
+
+@lru_cache(maxsize=1)
+def _upscaler(preset: str, scale: int, guides: str, device: str) -> Upscaler:
+    return Upscaler(preset, scale, guides, device)
