@@ -53,9 +53,10 @@ def ensure_registered() -> None:
 
 
 def __getattr__(name: str) -> Any:
-    """Load `render` and `run_job`, which need Blender, when first asked for."""
-    if name in {"run_job", "RenderJob", "Picture"}:
-        from . import render
+    """Load `render`, `run_job` and their types when first asked for."""
+    if name in {"render", "run_job", "RenderJob", "Picture"}:
+        from importlib import import_module
 
-        return getattr(render, name)
+        module = import_module(".render", __name__)
+        return module if name == "render" else getattr(module, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

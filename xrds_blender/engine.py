@@ -1,4 +1,4 @@
-"""The render engine XRDS: what Blender calls, handed on to `render` and to Cycles."""
+"""The render engine XRDS: what Blender calls, handed on to our path or to Cycles."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import Any
 
 import bpy
 
-from . import cycles_session, render
+from . import cycles_session
+from .render import render_in
 
 
 class XRDSRender(bpy.types.RenderEngine):
@@ -44,7 +45,7 @@ class XRDSRender(bpy.types.RenderEngine):
         if self.is_preview:
             cycles_session.functions().render(self, depsgraph)
         else:
-            render.render_layer(self, depsgraph)
+            render_in(self, depsgraph)
 
     def render_frame_finish(self) -> None:
         if self.session:

@@ -8,6 +8,7 @@ of the render settings, and all of it is given back.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any
@@ -19,29 +20,27 @@ from xrds_core.errors import Cancelled
 from . import cycles_session
 from .borrowed import Borrowed, PipelineSettings
 from .cycles_session import Array
-from .low_camera import Frame, widen
+from .cycles_settings import (
+    set_box_filter,
+    set_denoising,
+    set_guide_bounces,
+    set_sampling,
+)
+from .low_camera import Frame, LowGrid, Region, is_exact, widen
 
 ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth"
 COMBINED, NOISY = "Combined", "Noisy Image"
-# What follows a mirror or glass: four bounces hold albedo and normal right.
-GUIDE_BOUNCES = 4
-
-
-@dataclass(frozen=True)
-class Region:
-    """A rectangle in pixels of the full-resolution frame, (0, 0) at the top left."""
-
-    x: int
-    y: int
-    width: int
-    height: int
-
-    def low(self, scale: int) -> Region:
-        """The whole low-resolution pixels that cover it, in their own grid."""
-        x, y = self.x // scale, self.y // scale
-        right = -(-(self.x + self.width) // scale)
-        bottom = -(-(self.y + self.height) // scale)
-        return Region(x, y, right - x, bottom - y)
+# The tiny whole frame that a border render takes its exposure from.
+OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
+# Light that guides are rendered without, and what was made of it: these passes come
+# from the low-resolution render. Names of Blender up to 4.5 and from 5.0.
+_LIGHTS = ("Diffuse", "Glossy", "Transmission", "Volume")
+LIGHT_PASSES = frozenset(
+    [f"{light} {way}" for light in _LIGHTS for way in ("Direct", "Indirect")]
+    + [f"{kind}{way}" for kind in ("Diff", "Gloss", "Trans") for way in ("Dir", "Ind")]
+    + ["VolumeDir", "VolumeInd", "AO", "Ambient Occlusion"]
+    + ["Shadow Catcher", "Noisy Shadow Catcher", "Noisy Image"]
+)
 
 
 @dataclass(frozen=True)
@@ -87,7 +86,8 @@ class CyclesPasses:
     def __init__(self, engine: Any, depsgraph: Any, *, extra: bool = False) -> None:
         self._engine, self._depsgraph = engine, depsgraph
         self._scene = depsgraph.scene_eval
-        self._layer_name = depsgraph.view_layer_eval.name
+        self._layer_eval = depsgraph.view_layer_eval
+        self._layer_name = self._layer_eval.name
         # The method of this name hides the property, so it is asked for by path.
         self._render = engine.path_resolve("render")
         self._borrowed = Borrowed()
@@ -119,6 +119,7 @@ class CyclesPasses:
         self._pipeline.set(use_persistent_data=True)
         cycles_session.prepare(self._engine, self._depsgraph)
         self._scene = self._depsgraph.scene_eval
+        self._layer_eval = self._depsgraph.view_layer_eval
         for name, channels, letters in self._wanted_passes():
             if name not in self._layer().passes:
                 self._engine.add_pass(name, channels, letters, layer=self._layer_name)
@@ -176,20 +177,37 @@ class CyclesPasses:
     ) -> dict[str, Beauty]:
         """As `beauty`, for every view by name (one without stereo)."""
         denoise = denoise and cycles_session.has_denoiser()
+        grid = self._grid(scale)
         with Borrowed() as borrowed:
-            self._set_sampling(borrowed, samples, seed)
-            self._set_denoising(borrowed, denoise, prefilter)
-            if scale > 1:
-                self._set_box_filter(borrowed, scale)
-                for camera in self._cameras():
-                    widen(borrowed, camera, self.frame, scale)
-            window = self._low_window(scale)
-            clock = self._run(self.frame.low_size(scale), window)
+            set_sampling(borrowed, self._scene, samples, seed)
+            set_denoising(borrowed, self._scene, self._layer_eval, denoise, prefilter)
+            clock = self._run_low(borrowed, grid)
         seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
         return {
-            view: self._read_beauty(view, scale, window, denoise, seconds)
-            for view in self.views
+            view: self._read_beauty(view, grid, denoise, seconds) for view in self.views
         }
+
+    def border_exposure(self) -> float | None:
+        """The exposure of the whole frame, where a border cuts a part out of it.
+
+        From a tiny picture of all of it, so that parts fit together. None without a
+        border: the picture itself then tells it.
+        """
+        if not self._render.use_border:
+            return None
+        from xrds_core.front_end import auto_exposure
+
+        width, height = self._size
+        scale = max(-(-self.width // width), -(-self.height // height))
+        scale = max(scale, -(-max(self.width, self.height) // OVERVIEW_SIDE))
+        low_width, low_height = self.frame.low_size(scale)
+        whole = Region(0, 0, low_width, low_height)
+        with Borrowed() as borrowed:
+            set_sampling(borrowed, self._scene, OVERVIEW_SAMPLES, None)
+            set_denoising(borrowed, self._scene, self._layer_eval, False, None)
+            self._run_low(borrowed, LowGrid(self.frame, scale, whole, exact=True))
+        picture = self._read_corner(self._radiance(self.views[0], False), whole)
+        return auto_exposure(np.ascontiguousarray(picture[..., :3]))
 
     def guides(
         self,
@@ -219,70 +237,15 @@ class CyclesPasses:
         """As `guides`, for every view by name."""
         denoise = denoise and full and cycles_session.has_denoiser()
         with Borrowed() as borrowed:
-            self._set_sampling(borrowed, samples, seed)
-            self._set_denoising(borrowed, denoise, None)
+            set_sampling(borrowed, self._scene, samples, seed)
+            set_denoising(borrowed, self._scene, self._layer_eval, denoise, None)
             if not full:
-                self._set_guide_bounces(borrowed)
+                set_guide_bounces(borrowed, self._scene)
             clock = self._run((self.width, self.height), self.region)
         seconds = {"sync": clock.sync, "guides": clock.render}
         return {
             view: self._read_guides(view, full, denoise, seconds) for view in self.views
         }
-
-    def _set_sampling(
-        self, borrowed: Borrowed, samples: int | None, seed: int | None
-    ) -> None:
-        cycles = self._scene.cycles
-        if seed is not None:
-            borrowed.set(cycles, seed=seed, use_animated_seed=False)
-        if samples is not None:
-            borrowed.set(
-                cycles,
-                samples=samples,
-                use_adaptive_sampling=False,
-                time_limit=0.0,
-                use_layer_samples="IGNORE",
-                sample_offset=0,
-                use_sample_subset=False,
-            )
-
-    def _set_denoising(
-        self, borrowed: Borrowed, denoise: bool, prefilter: str | None
-    ) -> None:
-        cycles = self._scene.cycles
-        borrowed.set(cycles, use_denoising=denoise)
-        if denoise:
-            # The same denoiser as in the training set, whatever the scene uses.
-            borrowed.set(
-                cycles,
-                denoiser="OPENIMAGEDENOISE",
-                denoising_input_passes="RGB_ALBEDO_NORMAL",
-                denoising_prefilter=prefilter or cycles.denoising_prefilter,
-            )
-            layer = self._depsgraph.view_layer_eval.cycles
-            borrowed.set(layer, use_denoising=True)
-
-    def _set_box_filter(self, borrowed: Borrowed, scale: int) -> None:
-        cycles = self._scene.cycles
-        # Dicing is counted in pixels: the mesh is to be that of the full picture.
-        borrowed.set(
-            cycles,
-            pixel_filter_type="BOX",
-            filter_width=1.0,
-            dicing_rate=cycles.dicing_rate / scale,
-        )
-
-    def _set_guide_bounces(self, borrowed: Borrowed) -> None:
-        cycles = self._scene.cycles
-        borrowed.set(
-            cycles,
-            max_bounces=min(cycles.max_bounces, GUIDE_BOUNCES),
-            diffuse_bounces=0,
-            volume_bounces=0,
-            use_fast_gi=False,
-            use_guiding=False,
-            light_sampling_threshold=1.0,
-        )
 
     def _cameras(self) -> list[Any]:
         import bpy
@@ -290,11 +253,18 @@ class CyclesPasses:
         ids = self._depsgraph.ids
         return [item for item in ids if isinstance(item, bpy.types.Camera)]
 
-    def _low_window(self, scale: int) -> Region:
-        """The low-resolution pixels to render."""
-        if scale == 1:
-            return self.region
-        return self.region.low(scale)
+    def _grid(self, scale: int) -> LowGrid:
+        """The low-resolution pixels of the region."""
+        window = self.region if scale == 1 else self.region.low(scale)
+        exact = scale == 1 or is_exact(self._scene.camera.data)
+        return LowGrid(self.frame, scale, window, exact)
+
+    def _run_low(self, borrowed: Borrowed, grid: LowGrid) -> cycles_session.StageClock:
+        if grid.scale > 1:
+            set_box_filter(borrowed, self._scene, grid.scale)
+            for camera in self._cameras():
+                widen(borrowed, camera, self.frame, grid.scale)
+        return self._run(self.frame.low_size(grid.scale), grid.rendered(self._size))
 
     def _run(self, size: tuple[int, int], window: Region) -> cycles_session.StageClock:
         """Render `window` of a frame of `size` into the lower left of the result."""
@@ -333,26 +303,36 @@ class CyclesPasses:
         assert pixels is not None
         return pixels
 
-    def _read_beauty(
-        self,
-        view: str,
-        scale: int,
-        window: Region,
-        denoised: bool,
-        seconds: dict[str, float],
-    ) -> Beauty:
-        def corner(pixels: Array) -> Array:
-            return pixels[-window.height :, : window.width].copy()
+    def _read_corner(self, pixels: Array, window: Region) -> Array:
+        """What a smaller render left in the lower left of the result."""
+        return pixels[-window.height :, : window.width]
 
-        picture = corner(self._radiance(view, denoised))
+    def _read_beauty(
+        self, view: str, grid: LowGrid, denoised: bool, seconds: dict[str, float]
+    ) -> Beauty:
+        rendered = grid.rendered(self._size)
+
+        def low(pixels: Array) -> Array:
+            return grid.resample(self._read_corner(pixels, rendered), rendered)
+
+        picture = low(self._radiance(view, denoised))
         noisy = self._read(NOISY, view) if denoised else None
         return Beauty(
             picture[..., :3].copy(),
             picture[..., 3].copy(),
-            None if noisy is None else corner(noisy)[..., :3],
-            (self.region.y - window.y * scale, self.region.x - window.x * scale),
+            None if noisy is None else low(noisy)[..., :3],
+            grid.offset(self.region),
             seconds,
+            {name: low(pixels) for name, pixels in self._light_passes(view)},
         )
+
+    def _light_passes(self, view: str) -> Iterator[tuple[str, Array]]:
+        names = dict.fromkeys(item.name for item in self._layer().passes)
+        for name in names:
+            if name in LIGHT_PASSES or name.startswith("Combined_"):
+                pixels = self._read(name, view)
+                if pixels is not None:
+                    yield name, pixels
 
     def _read_guides(
         self, view: str, full: bool, denoised: bool, seconds: dict[str, float]

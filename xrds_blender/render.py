@@ -2,51 +2,54 @@
 
 from __future__ import annotations
 
+import sys
+import traceback
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from types import ModuleType
 from typing import Any, TypeVar
 
-from xrds_core.errors import SceneError, XRDSError
+from xrds_core.errors import Cancelled, SceneError, XRDSError
 
+from .job import Picture, RenderJob
+from .layer import render_layer
 from .passes import CyclesPasses
+
+__all__ = ["Picture", "RenderJob", "render", "run_job"]
 
 T = TypeVar("T")
 
 
 @dataclass
-class _Running:
-    """A job that waits for Blender to call the engine, and how it ended."""
+class _Task:
+    """Work that waits for Blender to call the engine, and how it ended."""
 
-    job: Callable[[CyclesPasses], Any]
-    done: bool = False
-    result: Any = None
+    work: Callable[[Any, Any], Any]
+    results: list[Any] = field(default_factory=list)
     error: BaseException | None = None
 
 
-_running: _Running | None = None
+_task: _Task | None = None
 
 
-def render_layer(engine: Any, depsgraph: Any) -> None:
-    """Render one view layer of one frame into the engine's result."""
-    if _running is not None:
-        _run_in(_running, engine, depsgraph)
+def render(
+    scene: Any, scale: int = 2, *, layer: str | None = None, **choices: Any
+) -> Picture:
+    """Render the current frame of `scene` and return its picture.
 
+    `choices` are the other fields of RenderJob; `layer` names the view layer, else it
+    is the first that is used. The scene's own `xrds` settings play no part, its
+    compositor neither, and everything in it is as before afterwards.
 
-def _run_in(running: _Running, engine: Any, depsgraph: Any) -> None:
-    try:
-        with CyclesPasses(engine, depsgraph, extra=True) as passes:
-            running.result = running.job(passes)
-            running.done = True
-    except BaseException as error:  # Blender would only print it; the caller gets it
-        running.error = error
+    Raises SceneError without a camera, WeightsError without the weights, UsageError
+    for values out of range, Cancelled when the user stops the render.
+    """
+    job = RenderJob(scale=scale, **choices)
+    return _run(scene, lambda engine, graph: render_layer(engine, graph, job), layer)
 
 
 def run_job(
-    scene: Any,
-    job: Callable[[CyclesPasses], T],
-    *,
-    layer: str | None = None,
-    write: bool = False,
+    scene: Any, job: Callable[[CyclesPasses], T], *, layer: str | None = None
 ) -> T:
     """Call `job` inside a render of `scene` and return what it returns.
 
@@ -54,38 +57,86 @@ def run_job(
     compositor and sequencer. What the job raises reaches the caller; engine and
     settings are then as before. Raises SceneError without a camera.
     """
+
+    def work(engine: Any, depsgraph: Any) -> T:
+        with CyclesPasses(engine, depsgraph, extra=True) as passes:
+            return job(passes)
+
+    return _run(scene, work, layer)
+
+
+def render_in(engine: Any, depsgraph: Any) -> None:
+    """Do what Blender asks of the engine, or the work that waits for it."""
+    if _task is not None:
+        try:
+            _task.results.append(_task.work(engine, depsgraph))
+        except BaseException as error:  # Blender would print it; the caller gets it
+            _task.error = error
+        return
+    try:
+        render_layer(engine, depsgraph, RenderJob.of(depsgraph.scene_eval.xrds))
+    except Cancelled:
+        return  # Blender knows: it is who told us
+    except XRDSError as error:
+        engine.error_set(str(error))
+    except Exception as error:  # Blender calls: show it instead of a black picture
+        traceback.print_exc()
+        engine.error_set(f"XRDS failed: {type(error).__name__}: {error}")
+
+
+def _run(scene: Any, work: Callable[[Any, Any], T], layer: str | None) -> T:
+    """Let Blender render one layer of `scene` with `work` as the engine's."""
     import bpy
 
     from . import ensure_registered
     from .borrowed import Borrowed
 
-    global _running
+    global _task
     ensure_registered()
-    if scene.camera is None:
-        raise SceneError(
-            f"scene {scene.name!r} has no camera; add one and render again"
-        )
-    if _running is not None:
+    if _task is not None:
         raise SceneError("a render is running already; wait for its end")
-    name = layer or next((v.name for v in scene.view_layers if v.use), None)
-    if name is None:
-        raise SceneError(f"scene {scene.name!r} has no view layer in use")
-    running = _running = _Running(job)
+    name = _layer_name(scene, layer)
+    task = _task = _Task(work)
     try:
         with Borrowed() as borrowed:
             borrowed.set(
-                scene.render,
-                engine="XRDS",
-                use_compositing=False,
-                use_sequencer=False,
+                scene.render, engine="XRDS", use_compositing=False, use_sequencer=False
             )
-            bpy.ops.render.render(scene=scene.name, layer=name, write_still=write)
+            bpy.ops.render.render(scene=scene.name, layer=name)
     except RuntimeError as error:
-        running.error = running.error or SceneError(str(error).strip())
+        message = str(error).removeprefix("Error: ").strip()
+        task.error = task.error or SceneError(message)
     finally:
-        _running = None
-    if running.error is not None:
-        raise running.error
-    if not running.done:
+        _task = None
+    if task.error is not None:
+        raise task.error
+    if not task.results:
         raise XRDSError(f"scene {scene.name!r} was not rendered; see Blender's log")
-    return running.result  # type: ignore[no-any-return]
+    return task.results[0]  # type: ignore[no-any-return]
+
+
+def _layer_name(scene: Any, wanted: str | None) -> str:
+    if scene.camera is None:
+        raise SceneError(f"scene {scene.name!r} has no camera; add one")
+    names = [layer.name for layer in scene.view_layers if layer.use]
+    if wanted is not None and wanted not in scene.view_layers:
+        known = ", ".join(layer.name for layer in scene.view_layers)
+        raise SceneError(
+            f"scene {scene.name!r} has no layer {wanted!r}; it has {known}"
+        )
+    if wanted is None and not names:
+        raise SceneError(f"scene {scene.name!r} renders no view layer; switch one on")
+    return wanted or names[0]
+
+
+class _CallableModule(ModuleType):
+    """`xrds_blender.render` is this module and the public function at once.
+
+    Python sets the module as attribute of its package whatever else has that name.
+    """
+
+    def __call__(self, scene: Any, scale: int = 2, **choices: Any) -> Picture:
+        return render(scene, scale, **choices)
+
+
+sys.modules[__name__].__class__ = _CallableModule

@@ -1,0 +1,232 @@
+"""One view layer of one frame, inside `RenderEngine.render()`."""
+
+from __future__ import annotations
+
+import time
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_core.errors import Cancelled, XRDSError
+
+from . import cycles_session, low_camera, plan
+from .borrowed import Borrowed
+from .cycles_settings import set_sampling
+from .job import STAGES, Picture, RenderJob
+from .passes import COMBINED, Beauty, CyclesPasses, Guides
+
+if TYPE_CHECKING:
+    from xrds_core import Upscaled, Upscaler
+
+    from .cycles_session import Array
+
+
+def render_layer(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
+    """Render the layer into the engine's result; the picture is of its first view.
+
+    Raises Cancelled when the user stops it and XRDSError where it cannot be done, then
+    with nothing written.
+    """
+    start = time.perf_counter()
+    seconds = dict.fromkeys(STAGES, 0.0)
+    if job.is_plain:
+        picture = _plain(engine, depsgraph, job, seconds)
+    else:
+        upscaler = _upscaler(job)  # first: missing weights are to cost no render
+        picture = _enlarged(engine, depsgraph, job, upscaler, seconds)
+    seconds["total"] = time.perf_counter() - start
+    return picture
+
+
+def _plain(
+    engine: Any, depsgraph: Any, job: RenderJob, seconds: dict[str, float]
+) -> Picture:
+    """Cycles alone, exactly as its own engine would render."""
+    keeps = engine.path_resolve("render").use_persistent_data
+    name = depsgraph.view_layer_eval.name
+    with Borrowed() as borrowed:
+        set_sampling(borrowed, depsgraph.scene_eval, job.samples, job.seed)
+        try:
+            clock = cycles_session.run(engine, depsgraph)
+        finally:
+            if not keeps:
+                cycles_session.free(engine)
+    _stop_if_cancelled(engine)
+    seconds |= {"sync": clock.sync, "beauty": clock.render}
+    result = engine.get_result()
+    layer, size = result.layers[name], (result.resolution_x, result.resolution_y)
+    view = next((view.name for view in result.views), "")
+    pixels = cycles_session.read_pass(layer, COMBINED, view, size)
+    assert pixels is not None
+    reason = "asked for" if job.plain else "scale 1 leaves nothing to enlarge"
+    return Picture(
+        np.ascontiguousarray(pixels[..., :3]),
+        np.ascontiguousarray(pixels[..., 3]),
+        None,
+        None,
+        None,
+        seconds,
+        plan.plain(reason),
+        peak_memory(),
+    )
+
+
+def _enlarged(
+    engine: Any,
+    depsgraph: Any,
+    job: RenderJob,
+    upscaler: Upscaler,
+    seconds: dict[str, float],
+) -> Picture:
+    name = depsgraph.view_layer_eval.name
+    with CyclesPasses(engine, depsgraph) as passes:
+        decisions = plan.decide(_facts(depsgraph, job, passes))
+        guide_seed = None if job.seed is None else job.seed + 1
+        engine.update_stats("XRDS", "Rendering low resolution")
+        beauties = passes.beauties(job.scale, job.samples, seed=job.seed)
+        exposure = job.exposure or passes.border_exposure()
+        engine.update_stats("XRDS", "Rendering guides")
+        guides = passes.guides_by_view(
+            job.guide_samples, full=job.guides == "full", seed=guide_seed
+        )
+    first = passes.views[0]
+    for stage in (beauties[first].seconds, guides[first].seconds):
+        for key, value in stage.items():
+            seconds[key] += value
+    decisions += plan.after(beauties[first].seconds["sync"])
+    started = time.perf_counter()
+    pictures = {
+        view: _upscale(engine, upscaler, job, exposure, beauties[view], guides[view])
+        for view in passes.views
+    }
+    _stop_if_cancelled(engine)
+    seconds["network"] = time.perf_counter() - started
+    started = time.perf_counter()
+    _write(engine, name, job.scale, pictures, beauties)
+    seconds["write"] = time.perf_counter() - started
+    picture = pictures[first]
+    return Picture(
+        np.ascontiguousarray(picture[..., :3]),
+        np.ascontiguousarray(picture[..., 3]),
+        guides[first].albedo,
+        guides[first].normal,
+        beauties[first].radiance,
+        seconds,
+        decisions,
+        peak_memory(),
+    )
+
+
+def _facts(depsgraph: Any, job: RenderJob, passes: CyclesPasses) -> plan.Facts:
+    scene = depsgraph.scene_eval
+    return plan.Facts(
+        scale=job.scale,
+        width=passes.width,
+        height=passes.height,
+        guides=job.guides,
+        max_bounces=scene.cycles.max_bounces,
+        has_denoiser=cycles_session.has_denoiser(),
+        exact_camera=low_camera.is_exact(scene.camera.data),
+    )
+
+
+def _upscaler(job: RenderJob) -> Upscaler:
+    """The network of a job; the last one stays loaded for the next frame."""
+    weights = None if job.weights is None else str(job.weights)
+    return _load(job.preset, job.scale, job.guides, job.device, weights)
+
+
+@lru_cache(maxsize=1)
+def _load(
+    preset: str, scale: int, guides: str, device: str, weights: str | None
+) -> Upscaler:
+    try:
+        from xrds_core import Upscaler
+    except ImportError as error:
+        raise XRDSError(
+            f"XRDS needs PyTorch, which Blender's Python does not find ({error}): "
+            "install it from the add-on's preferences, or render plain"
+        ) from error
+    return Upscaler(preset, scale, guides, device, weights=weights)
+
+
+def _upscale(
+    engine: Any,
+    upscaler: Upscaler,
+    job: RenderJob,
+    exposure: float | None,
+    beauty: Beauty,
+    guides: Guides,
+) -> Array:
+    """The region's radiance and alpha, (H, W, 4)."""
+    rows, columns = beauty.offset
+
+    def placed(guide: Array | None) -> Array | None:
+        """Guides start where the first low-resolution pixel does."""
+        if guide is None:
+            return None
+        margin = ((rows, 0), (columns, 0), *[(0, 0)] * (guide.ndim - 2))
+        return np.pad(guide, margin, mode="edge")
+
+    def tell(done: float) -> bool:
+        engine.update_stats("XRDS", f"Network {done:.0%}")
+        engine.update_progress(done)
+        return not engine.test_break()
+
+    picture: Upscaled = upscaler(
+        np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1),
+        placed(guides.albedo),
+        placed(guides.normal),
+        guide_radiance=placed(guides.radiance),
+        guide_alpha=placed(guides.alpha),
+        exposure=exposure,
+        memory_limit=job.memory_limit,
+        progress=tell,
+    )
+    return picture.radiance[rows:, columns:]
+
+
+def _write(
+    engine: Any,
+    name: str,
+    scale: int,
+    pictures: dict[str, Array],
+    beauties: dict[str, Beauty],
+) -> None:
+    """Put the pictures and the enlarged light passes into the engine's result."""
+    result = engine.get_result()
+    layer = result.layers[name]
+    for view, picture in pictures.items():
+        cycles_session.write_pass(layer, COMBINED, view, picture)
+        for other, low in beauties[view].others.items():
+            large = _bilinear(low, scale, beauties[view].offset, picture.shape)
+            cycles_session.write_pass(layer, other, view, large)
+    engine.update_result(result)
+
+
+def _bilinear(
+    low: Array, scale: int, offset: tuple[int, int], shape: tuple[int, ...]
+) -> Array:
+    import torch
+
+    from xrds_core.front_end import upsample_bilinear
+
+    planes = torch.from_numpy(np.ascontiguousarray(low.transpose(2, 0, 1)))[None]
+    large: Array = upsample_bilinear(planes, scale)[0].numpy().transpose(1, 2, 0)
+    top, left = offset
+    return large[top : top + shape[0], left : left + shape[1]]
+
+
+def _stop_if_cancelled(engine: Any) -> None:
+    if engine.test_break():
+        raise Cancelled
+
+
+def peak_memory() -> int:
+    """The largest memory in bytes that this process has taken; 0 where not known."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
