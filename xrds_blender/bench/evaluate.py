@@ -108,7 +108,11 @@ def _record(
 def _settings(chosen: Settings, timing: bool) -> dict[str, Any]:
     import bpy
 
-    return asdict(chosen) | {
+    fields = {
+        key: list(value) if isinstance(value, tuple) else value
+        for key, value in asdict(chosen).items()
+    }
+    return fields | {
         "timing": timing,
         "blender": bpy.app.version_string,
         "cpu_count": os.cpu_count(),

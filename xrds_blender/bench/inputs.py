@@ -6,6 +6,7 @@ Everything goes through the product's own passes, in one Blender render per scen
 from __future__ import annotations
 
 import json
+import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -89,7 +90,7 @@ class Folder:
         try:
             with np.load(self.directory / name) as file:
                 return dict(file)
-        except (OSError, ValueError, EOFError):
+        except (OSError, ValueError, EOFError, zipfile.BadZipFile):
             return None
 
     def write(self, name: str, arrays: Arrays, seconds: dict[str, float]) -> None:

@@ -68,7 +68,8 @@ def _block(title: str, records: list[Record], report: dict[str, Any]) -> str:
         lines.append(_row(record["scene"], [_cell(x, 2) for x in figures]))
     mean = report["mean"][scale][preset]
     gains = report["worst"].get(scale, {}).get(preset)
-    for figure in FIGURES:
+    timed = any(row["seconds"] is not None for row in mean.values())
+    for figure in FIGURES if timed else FIGURES[:-1]:
         cells = [mean.get(name, {}).get(figure) for name in COLUMNS]
         cells += [gains["mean"]] if gains and figure == "psnr" else []
         shown = [_cell(x, _DIGITS[figure]) for x in cells]
