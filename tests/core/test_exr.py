@@ -1,0 +1,266 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+from numpy.typing import NDArray
+
+from xrds_core.errors import PictureError
+from xrds_core.exr import Names, read_beauty, read_guides, write_picture
+
+Array = NDArray[np.float32]
+LAYOUTS = ("flat", "layered", "parts", "named parts")
+
+
+def planes(seed: int, letters: str = "RGB", size: tuple[int, int] = (4, 6)) -> Any:
+    generator = np.random.default_rng(seed)
+    return {x: generator.random(size, dtype=np.float32) for x in letters}
+
+
+PASSES = {
+    "Combined": planes(0, "RGBA"),
+    "Noisy Image": planes(1, "RGBA"),
+    "Denoising Albedo": planes(2),
+    "Denoising Normal": planes(3, "XYZ"),
+    "Denoising Depth": planes(4, "Z"),
+}
+
+
+def stacked(name: str, letters: str = "RGB") -> Array:
+    return np.stack([PASSES[name][x] for x in letters], axis=-1)
+
+
+def header(**more: Any) -> dict[str, Any]:
+    return {"type": OpenEXR.scanlineimage, **more}
+
+
+def write(path: Path, channels: dict[str, Any], **more: Any) -> None:
+    # OpenEXR puts its own objects into the table it is given
+    OpenEXR.File(header(**more), dict(channels)).write(str(path))
+
+
+def write_passes(path: Path, passes: Any, layout: str) -> None:
+    """Write passes as Cycles has done in one version of Blender or another."""
+    prefix = "" if layout == "flat" else "View Layer."
+    full = {
+        f"{prefix}{name}": {f"{prefix}{name}.{k}": v for k, v in channels.items()}
+        for name, channels in passes.items()
+    }
+    if layout == "named parts":  # the letter alone in channels
+        full = {f"{prefix}{name}": dict(channels) for name, channels in passes.items()}
+    if "parts" in layout:
+        parts = [OpenEXR.Part(header(), x, name) for name, x in full.items()]
+        OpenEXR.File(parts).write(str(path))
+    else:
+        together = {k: v for channels in full.values() for k, v in channels.items()}
+        write(path, together)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "render.exr"
+
+
+# --- what Cycles writes ---------------------------------------------------------------
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_passes_are_found_under_any_prefix(path: Path, layout: str) -> None:
+    write_passes(path, PASSES, layout)
+    beauty = read_beauty(path)
+    np.testing.assert_array_equal(beauty.radiance, stacked("Combined"))
+    np.testing.assert_array_equal(beauty.alpha, PASSES["Combined"]["A"])
+    np.testing.assert_array_equal(beauty.picture, stacked("Combined", "RGBA"))
+    guides = read_guides(path, full=True)
+    np.testing.assert_array_equal(guides.albedo, stacked("Denoising Albedo"))
+    np.testing.assert_array_equal(guides.normal, stacked("Denoising Normal", "XYZ"))
+    np.testing.assert_array_equal(guides.radiance, stacked("Noisy Image"))
+    np.testing.assert_array_equal(guides.alpha, PASSES["Combined"]["A"])
+
+
+def test_a_plain_picture_with_and_without_alpha(path: Path) -> None:
+    for letters in ("RGBA", "RGB"):
+        channels = planes(5, letters)
+        write(path, channels)
+        beauty = read_beauty(path)
+        np.testing.assert_array_equal(beauty.radiance[..., 1], channels["G"])
+        assert beauty.picture.shape == (4, 6, len(letters))
+        assert (beauty.alpha is None) == (letters == "RGB")
+
+
+def test_full_guides_of_an_undenoised_render_are_the_picture(path: Path) -> None:
+    passes = {k: v for k, v in PASSES.items() if k != "Noisy Image"}
+    write_passes(path, passes, "layered")
+    guides = read_guides(path, full=True)
+    np.testing.assert_array_equal(guides.radiance, stacked("Combined"))
+    assert read_guides(path).radiance is None
+
+
+def test_normals_may_be_called_red_green_and_blue(path: Path) -> None:
+    passes = {**PASSES, "Denoising Normal": planes(3, "RGB")}
+    write_passes(path, passes, "layered")
+    expected = np.stack([*planes(3, "RGB").values()], axis=-1)
+    np.testing.assert_array_equal(read_guides(path).normal, expected)
+
+
+def test_half_floats_become_floats(path: Path) -> None:
+    half = {k: v.astype(np.float16) for k, v in planes(6).items()}
+    write(path, half)
+    radiance = read_beauty(path).radiance
+    assert radiance.dtype == np.float32
+    np.testing.assert_array_equal(radiance[..., 0], half["R"].astype(np.float32))
+
+
+def test_nan_is_left_to_those_who_count_it(path: Path) -> None:
+    channels = planes(7)
+    channels["G"][1, 2] = np.nan
+    write(path, channels)
+    assert np.isnan(read_beauty(path).radiance[1, 2, 1])
+
+
+def test_tiled_files_are_read(path: Path) -> None:
+    tiles = OpenEXR.TileDescription()
+    write(path, planes(8), type=OpenEXR.tiledimage, tiles=tiles)
+    np.testing.assert_array_equal(read_beauty(path).radiance[..., 2], planes(8)["B"])
+
+
+@pytest.mark.parametrize(
+    ("data", "display"),
+    [
+        ((2, 3), (0, 0, 9, 9)),  # a border render inside its frame
+        ((-2, -1), (0, 0, 9, 9)),  # overscan, cut off
+        ((5, 5), (3, 4, 7, 6)),  # both
+        ((40, 40), (0, 0, 3, 3)),  # nothing in sight
+    ],
+)
+def test_data_lie_where_the_display_window_has_them(
+    path: Path, data: tuple[int, int], display: tuple[int, int, int, int]
+) -> None:
+    channels = planes(9)
+    window = (data, (data[0] + 5, data[1] + 3))
+    windows = {"dataWindow": window, "displayWindow": (display[:2], display[2:])}
+    write(path, channels, **windows)
+    radiance = read_beauty(path).radiance
+    left, top, right, bottom = display
+    assert radiance.shape == (bottom - top + 1, right - left + 1, 3)
+    for y in range(top, bottom + 1):
+        for x in range(left, right + 1):
+            row, column = y - data[1], x - data[0]
+            inside = 0 <= row < 4 and 0 <= column < 6
+            expected = channels["R"][row, column] if inside else 0.0
+            assert radiance[y - top, x - left, 0] == expected
+
+
+# --- names ----------------------------------------------------------------------------
+
+
+def test_passes_of_other_renderers_by_their_names(path: Path) -> None:
+    passes = {"beauty": planes(0), "diffuse_albedo": planes(2), "N": planes(3, "XYZ")}
+    write_passes(path, passes, "flat")
+    names = Names(beauty="beauty", albedo="diffuse_albedo", normal="N")
+    np.testing.assert_array_equal(
+        read_beauty(path, names).radiance[..., 0], passes["beauty"]["R"]
+    )
+    guides = read_guides(path, names=names)
+    np.testing.assert_array_equal(guides.albedo[..., 0], passes["diffuse_albedo"]["R"])
+    assert guides.alpha is None
+
+
+def test_a_missing_pass_is_named_beside_what_is_there(path: Path) -> None:
+    write_passes(path, {"Combined": PASSES["Combined"]}, "layered")
+    message = r"no pass 'Denoising Albedo'; it holds View Layer\.Combined$"
+    with pytest.raises(PictureError, match=message):
+        read_guides(path)
+
+
+def test_a_depth_is_no_picture(path: Path) -> None:
+    write_passes(path, {"Combined": planes(0, "Z")}, "layered")
+    with pytest.raises(PictureError, match="no pass 'Combined'"):
+        read_beauty(path)
+
+
+def test_two_layers_are_told_apart_by_name(path: Path) -> None:
+    channels = {f"A.Combined.{k}": v for k, v in planes(0).items()}
+    channels |= {f"B.Combined.{k}": v for k, v in planes(1).items()}
+    write(path, channels)
+    with pytest.raises(PictureError, match=r"layers: A\.Combined, B\.Combined"):
+        read_beauty(path)
+    named = read_beauty(path, Names(beauty="B.Combined")).radiance
+    np.testing.assert_array_equal(named[..., 0], planes(1)["R"])
+
+
+def test_what_the_compositor_made_is_not_the_render(path: Path) -> None:
+    channels = {f"Composite.Combined.{k}": v for k, v in planes(0).items()}
+    channels |= {f"ViewLayer.Combined.{k}": v for k, v in planes(1).items()}
+    write(path, channels)
+    np.testing.assert_array_equal(read_beauty(path).radiance[..., 0], planes(1)["R"])
+
+
+# --- files that cannot be used --------------------------------------------------------
+
+
+@pytest.mark.parametrize("layout", ["layered", "parts"])
+def test_every_truncation_is_a_picture_error(
+    path: Path, layout: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    write_passes(path, PASSES, layout)
+    whole = path.read_bytes()
+    for percent in range(100):
+        path.write_bytes(whole[: len(whole) * percent // 100])
+        with pytest.raises(PictureError, match="not a whole OpenEXR file"):
+            read_beauty(path)
+    assert not capsys.readouterr().out, "stdout belongs to JSON"
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_bytes_are_a_picture_error(path: Path, seed: int) -> None:
+    path.write_bytes(np.random.default_rng(seed).bytes(900))
+    with pytest.raises(PictureError, match="not a whole OpenEXR file"):
+        read_beauty(path)
+
+
+def test_no_file_and_a_folder(path: Path) -> None:
+    for missing in (path, path.parent):
+        with pytest.raises(PictureError, match="no file"):
+            read_beauty(missing)
+
+
+def test_a_header_that_claims_too_much(path: Path) -> None:
+    write(path, planes(0))
+    name, kind = b"displayWindow\0", b"box2i\0" + (16).to_bytes(4, "little")
+    window = np.asarray([0, 0, 5, 3], "<i4").tobytes()
+    huge = np.asarray([0, 0, 10**6, 3], "<i4").tobytes()
+    whole = path.read_bytes()
+    assert name + kind + window in whole
+    path.write_bytes(whole.replace(name + kind + window, name + kind + huge))
+    with pytest.raises(PictureError, match="displayWindow of 1000001x4"):
+        read_beauty(path)
+
+
+# --- writing --------------------------------------------------------------------------
+
+
+def test_what_is_written_is_read_again(path: Path) -> None:
+    channels = planes(10, "RGBA", (7, 5))
+    channels["R"][0, 0] = 1e6  # above half floats
+    write_picture(path, {k: v[::-1] for k, v in channels.items()})
+    beauty = read_beauty(path)
+    np.testing.assert_array_equal(beauty.radiance[..., 0], channels["R"][::-1])
+    np.testing.assert_array_equal(beauty.alpha, channels["A"][::-1])
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_file_that_cannot_be_written_leaves_nothing(path: Path) -> None:
+    with pytest.raises(PictureError, match="cannot write"):
+        write_picture(path / "nowhere.exr", planes(0))
+    (path.parent / "folder.exr").mkdir()
+    with pytest.raises(PictureError, match=r"folder\.exr"):
+        write_picture(path.parent / "folder.exr", planes(0))
+    write_picture(path, planes(0))
+    with pytest.raises(PictureError, match=r"render\.exr"):
+        write_picture(path, {**planes(0), "A": np.zeros((9, 9), np.float32)})
+    np.testing.assert_array_equal(read_beauty(path).radiance[..., 0], planes(0)["R"])
+    assert {x.name for x in path.parent.iterdir()} == {"render.exr", "folder.exr"}

@@ -1,0 +1,92 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+
+from xrds_core import exr_upscale, weights
+from xrds_core.errors import PictureError
+from xrds_core.exr import read_beauty, write_picture
+from xrds_core.exr_upscale import upscale_file
+from xrds_core.network import XRDS, preset_config
+from xrds_core.upscaler import Upscaler
+
+
+def planes(name: str, letters: str, height: int, width: int) -> dict[str, np.ndarray]:
+    generator = np.random.default_rng(len(name))
+    size = (height, width)
+    return {f"{name}{x}": generator.random(size, np.float32) for x in letters}
+
+
+@pytest.fixture(params=["fast", "full"])
+def guides(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, guides: str) -> Path:
+    torch.manual_seed(0)
+    network = XRDS(preset_config("fast", 2, guides))
+    weights.save(network, tmp_path / weights.file_name("fast", 2, guides), {})
+    passes = {
+        **planes("ViewLayer.Combined.", "RGBA", 19, 16),
+        **planes("ViewLayer.Noisy Image.", "RGB", 19, 16),
+        **planes("ViewLayer.Denoising Albedo.", "RGB", 19, 16),
+        **planes("ViewLayer.Denoising Normal.", "XYZ", 19, 16),
+    }
+    write_picture(tmp_path / "guides.exr", passes)
+    for name, letters in (("opaque", "RGB"), ("low", "RGBA")):
+        write_picture(tmp_path / f"{name}.exr", planes("", letters, 10, 8))
+    return tmp_path
+
+
+@pytest.mark.parametrize(("name", "channels"), [("opaque", 3), ("low", 4)])
+def test_files_in_a_file_out(
+    folder: Path, guides: str, name: str, channels: int
+) -> None:
+    told = upscale_file(
+        folder / f"{name}.exr",
+        folder / "guides.exr",
+        folder / "out.exr",
+        guides=guides,
+        exposure=0.5,
+        device="cpu",
+        weights=folder,
+    )
+    assert told["output"] == str(folder / "out.exr")
+    assert told["seconds"] > 0.0
+    assert (told["bad_pixels"], told["tiles"]) == (0, 1)
+    result = read_beauty(folder / "out.exr").picture
+    assert result.shape == (19, 16, channels)
+
+    passes = exr_upscale.read_guides(folder / "guides.exr", full=guides == "full")
+    expected = Upscaler("fast", 2, guides, "cpu", weights=folder)(
+        read_beauty(folder / f"{name}.exr").picture,
+        passes.albedo,
+        passes.normal,
+        guide_radiance=passes.radiance,
+        guide_alpha=passes.alpha if channels == 4 else None,
+        exposure=0.5,
+    )
+    np.testing.assert_array_equal(result, expected.radiance)
+
+
+@pytest.mark.parametrize("guides", ["fast"])
+@pytest.mark.parametrize("output", ["nowhere/out.exr", "."])
+def test_an_output_that_cannot_be_is_told_before_the_work(
+    folder: Path, output: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(exr_upscale, "Upscaler", None)
+    low, guide = folder / "low.exr", folder / "guides.exr"
+    with pytest.raises(PictureError, match="cannot write"):
+        upscale_file(low, guide, folder / output, weights=folder)
+
+
+@pytest.mark.parametrize("guides", ["fast"])
+def test_a_wrong_guide_file_writes_nothing(folder: Path) -> None:
+    low = folder / "low.exr"
+    with pytest.raises(PictureError, match="Denoising Albedo"):
+        upscale_file(low, low, folder / "out.exr", weights=folder)
+    assert not (folder / "out.exr").exists()

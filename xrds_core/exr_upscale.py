@@ -1,0 +1,82 @@
+"""Enlarging a render from files: what `xrds upscale` does."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .errors import PictureError
+from .exr import CYCLES, Names, read_beauty, read_guides, write_picture
+from .upscaler import Upscaler
+
+if TYPE_CHECKING:
+    from .progress import Callback
+
+
+def upscale_file(
+    beauty: str | Path,
+    guide_file: str | Path,
+    output: str | Path,
+    *,
+    scale: int = 2,
+    preset: str = "fast",
+    guides: str = "fast",
+    exposure: float | None = None,
+    device: str = "auto",
+    memory_limit: int | None = None,
+    weights: str | Path | None = None,
+    names: Names = CYCLES,
+    progress: Callback | None = None,
+) -> dict[str, Any]:
+    """Enlarge a low-resolution EXR under full-resolution passes; write an EXR.
+
+    Args:
+        beauty: the low-resolution render, denoised, with alpha or without.
+        guide_file: albedo and normal; for ``full`` guides also a noisy picture.
+        output: gets R, G, B, scene-linear, and A where ``beauty`` has alpha.
+        weights: a folder of presets, or a file, in place of the shipped ones.
+        names: what the passes are called in both files.
+
+    The other arguments are those of `Upscaler`.
+
+    Returns:
+        {output, seconds, bad_pixels, tiles}; seconds of wall clock, files included.
+
+    Raises:
+        PictureError: a file cannot be read, written, or lacks a pass.
+        WeightsError, UsageError, Cancelled: as `Upscaler`.
+    """
+    start = time.perf_counter()
+    _check_output(Path(output))
+    upscaler = Upscaler(preset, scale, guides, device, weights=weights)
+    low = read_beauty(beauty, names)
+    passes = read_guides(guide_file, full=guides == "full", names=names)
+    result = upscaler(
+        low.picture,
+        passes.albedo,
+        passes.normal,
+        guide_radiance=passes.radiance,
+        guide_alpha=None if low.alpha is None else passes.alpha,
+        exposure=exposure,
+        memory_limit=memory_limit,
+        progress=progress,
+    )
+    planes = zip("RGBA", np.moveaxis(result.radiance, 2, 0), strict=False)
+    write_picture(output, dict(planes))
+    return {
+        "output": str(output),
+        "seconds": time.perf_counter() - start,
+        "bad_pixels": result.bad_pixels,
+        "tiles": result.tiles,
+    }
+
+
+def _check_output(path: Path) -> None:
+    """Tell now, not after the work, that a file cannot be written."""
+    folder = path.parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK) or path.is_dir():
+        raise PictureError(f"cannot write {path}: give a file in a folder that exists")
