@@ -72,7 +72,7 @@ def _blender_version() -> str | None:
 
 def _render(options: argparse.Namespace) -> dict[str, Any]:
     _need_blender("render")
-    from .render import RenderJob
+    from .job import RenderJob
     from .render_file import render_file
 
     job = RenderJob(
@@ -247,7 +247,7 @@ def _add_network(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     add("--guides", choices=GUIDES, default="fast")
     add("--preset", choices=PRESETS, default="fast")
-    add("--exposure", type=float, help="hold it for an animation or a border")
+    add("--exposure", type=_factor, help="hold it for an animation or a border")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
     add("--memory-limit", type=_bytes, help="of the network, as 500M or 4G")
     add("--weights", type=Path, help="weights file, or folder of such")
@@ -297,6 +297,13 @@ def _positive(text: str) -> int:
     value = int(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"{value} is below 1")
+    return value
+
+
+def _factor(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is no number above 0")
     return value
 
 

@@ -13,9 +13,7 @@ from xrds_core.errors import SceneError
 from . import picture_file
 
 if TYPE_CHECKING:
-    from .render import Picture, RenderJob
-
-STAGES = ("total", "sync", "beauty", "denoise", "guides", "network", "write")
+    from .job import Picture, RenderJob
 
 
 def render_file(
@@ -52,8 +50,8 @@ def render_file(
     return {
         "output": output,
         "resolution": [width, height],
-        "scale": 1 if job.plain else job.scale,
-        "preset": None if job.plain else job.preset,
+        "scale": 1 if job.is_plain else job.scale,
+        "preset": None if job.is_plain else job.preset,
         "device": job.device,
         "frames": [frame for frame, _ in told],
         "plan": [dataclasses.asdict(decision) for decision in last.plan],
@@ -83,7 +81,7 @@ def open_scene(path: Path) -> Any:
 
 def _check_weights(job: RenderJob) -> None:
     """Raise WeightsError now rather than after the Cycles renders."""
-    if not job.plain:
+    if not job.is_plain:
         from xrds_core import Upscaler
 
         Upscaler(job.preset, job.scale, job.guides, job.device, weights=job.weights)
@@ -101,7 +99,7 @@ def _frame(
     start = time.perf_counter()
     picture_file.save(target, picture.radiance, picture.alpha, scene)
     written = time.perf_counter() - start
-    seconds = {stage: picture.seconds.get(stage, 0.0) for stage in STAGES}
+    seconds = dict(picture.seconds)
     seconds["write"] += written
     seconds["total"] += written
     told = {

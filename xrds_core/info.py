@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -83,6 +84,7 @@ class _Counter:
         self.elementwise += ELEMENTWISE[type(module)] * out.numel()
 
 
+@lru_cache(maxsize=64)
 def count(config: NetworkConfig, size: int = PAPER_OUTPUT) -> Operations:
     """Count one forward pass for an output of `size` x `size` pixels.
 

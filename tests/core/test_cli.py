@@ -23,6 +23,8 @@ from xrds_core.errors import (
     WeightsError,
     XRDSError,
 )
+from xrds_core.network import XRDS, preset_config
+from xrds_core.weights import file_name, save
 
 MAIN = "import sys; from xrds_blender import cli; sys.exit(cli.main(sys.argv[1:]))"
 
@@ -53,6 +55,7 @@ def run(code: str, *words: str) -> subprocess.CompletedProcess[str]:
         ["render", "a.blend", "-o", "b.exr", "--samples", "0"],
         ["render", "a.blend", "-o", "b.exr", "--resolution", "0x5"],
         ["render", "a.blend", "-o", "b.exr", "--preset", "best"],
+        ["render", "a.blend", "-o", "b.exr", "--exposure", "0"],
         ["render", "a.blend", "-o", "b.exr", "--memory-limit", "much"],
         ["evaluate", "a.blend", "--windows", "w", "--references", "r", "--scale", "x"],
         ["evaluate", "a.blend", "--windows", "w", "--references", "r", "--guides", "x"],
@@ -143,8 +146,10 @@ def test_json_has_stdout_to_itself() -> None:
 
 
 def test_no_json_when_the_work_fails(tmp_path: Path) -> None:
-    beauty = tmp_path / "missing.exr"
-    words = ["upscale", str(beauty), str(beauty), "-o", str(tmp_path / "out.exr")]
+    beauty, out = str(tmp_path / "missing.exr"), str(tmp_path / "out.exr")
+    weights = tmp_path / file_name("fast", 2)
+    save(XRDS(preset_config("fast", 2)), weights, {})
+    words = ["upscale", beauty, beauty, "-o", out, "--weights", str(weights)]
     done = run(MAIN, *words, "--json")
     assert done.returncode == 1
     assert not done.stdout
@@ -152,6 +157,7 @@ def test_no_json_when_the_work_fails(tmp_path: Path) -> None:
     assert "missing.exr" in done.stderr
 
 
+@pytest.mark.timeout(300)
 def test_info_json_fields() -> None:
     done = run(MAIN, "info", "--json")
     told = json.loads(done.stdout)

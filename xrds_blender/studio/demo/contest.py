@@ -12,7 +12,8 @@ import numpy as np
 
 from xrds_core import metrics
 
-from ...render import Picture, RenderJob, render
+from ...job import Picture, RenderJob
+from ...render import render
 
 LOW_SAMPLES = 16  # per low-resolution pixel, the standard measure's
 GUIDE_SAMPLES = 4

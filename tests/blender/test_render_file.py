@@ -1,0 +1,128 @@
+"""`xrds render` as a shell sees it: files, JSON, streams and exit status."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from PIL import Image
+
+from xrds_blender import cli
+from xrds_core import exr, weights
+from xrds_core.network import XRDS, preset_config
+
+STAGES = {"total", "sync", "beauty", "denoise", "guides", "network", "write"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A scene file, one without a camera, a broken one, and untrained weights."""
+    folder = tmp_path_factory.mktemp("render_file")
+    bpy.ops.wm.read_factory_settings()
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = 62, 40
+    scene.cycles.samples = 4
+    scene.view_settings.view_transform = "Standard"
+    cube = bpy.data.objects["Cube"]
+    for frame in (1, 3):
+        cube.location.x = frame
+        cube.keyframe_insert("location", frame=frame)
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "scene.blend"))
+    scene.camera = None
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "blind.blend"))
+    (folder / "broken.blend").write_bytes(b"BLENDER-v405" + bytes(100))
+    network = XRDS(preset_config("fast", 2))
+    weights.save(network, folder / weights.file_name("fast", 2), {})
+    return folder
+
+
+def xrds(folder: Path, line: str) -> subprocess.CompletedProcess[str]:
+    """Run the command in `folder` as a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "xrds_blender.cli", *line.split()],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder,
+        timeout=110,
+    )
+
+
+def test_json_files_and_streams(folder: Path) -> None:
+    done = xrds(
+        folder, "render scene.blend -o f/##.exr --frames 1-2 --weights . --json"
+    )
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["resolution"] == [62, 40]
+    assert (told["scale"], told["preset"]) == (2, "fast")
+    assert [frame["frame"] for frame in told["frames"]] == [1, 2]
+    for frame in told["frames"]:
+        assert set(frame["seconds"]) >= STAGES
+        assert frame["seconds"]["total"] >= frame["seconds"]["beauty"] > 0
+        assert frame["peak_memory"] > 0
+        picture = exr.read_beauty(folder / frame["output"]).radiance
+        assert picture.shape == (40, 62, 3)
+        assert np.isfinite(picture).all()
+        assert picture.max() > 0.05
+    assert {path.name for path in (folder / "f").iterdir()} == {"01.exr", "02.exr"}
+    first, second = (exr.read_beauty(folder / "f" / f"0{i}.exr") for i in (1, 2))
+    assert np.abs(first.radiance - second.radiance).max() > 0.01  # the cube moved
+    for decision in told["plan"]:
+        assert set(decision) == {"decision", "value", "reason", "saving_seconds"}
+    assert "Fra:" in done.stderr
+    for word in ("Warning", "Error:", "Exception:"):
+        assert word not in done.stderr
+
+
+def test_progress_lines_stay_on_stdout_without_json(folder: Path) -> None:
+    done = xrds(folder, "render scene.blend -o p.png --plain --samples 1")
+    assert done.returncode == 0, done.stderr
+    assert "Fra:1" in done.stdout
+    assert "p.png" in done.stdout
+    assert Image.open(folder / "p.png").size == (62, 40)
+
+
+def test_resolution_is_the_one_asked_for(folder: Path) -> None:
+    line = "render scene.blend -o r.png --resolution 50x34 --weights . --samples 1"
+    done = xrds(folder, line)
+    assert done.returncode == 0, done.stderr
+    assert Image.open(folder / "r.png").size == (50, 34)
+
+
+@pytest.mark.parametrize(
+    ("line", "status", "told"),
+    [
+        ("render none.blend -o a.exr --weights .", 1, "no file none.blend"),
+        ("render broken.blend -o a.exr --weights .", 1, "cannot open broken.blend"),
+        ("render blind.blend -o a.exr --weights .", 1, "no camera"),
+        ("render scene.blend -o a.exr --scale 8 --weights .", 1, "fast_x2"),
+        ("render scene.blend -o scene.blend/a.exr --weights .", 1, "scene.blend"),
+        ("render scene.blend -o a.jpg --weights .", 2, "a.jpg"),
+        ("render scene.blend -o a.exr --frames 1-2 --weights .", 2, "####"),
+        ("render scene.blend -o a.exr --device abacus --weights .", 2, "abacus"),
+    ],
+)
+def test_refusals_come_before_rendering(
+    folder: Path,
+    line: str,
+    status: int,
+    told: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(folder)
+    assert cli.main(line.split()) == status
+    out, err = capfd.readouterr()
+    last = err.strip().splitlines()[-1]
+    assert last.startswith("xrds: ")
+    assert told in last
+    assert "Traceback" not in err
+    assert "Fra:" not in out
+    assert not (folder / "a.exr").exists()
