@@ -79,7 +79,7 @@ def _stood_on_floor(
     objects: list[bpy.types.Object], name: str, size: float
 ) -> bpy.types.Object:
     low, high = _bounds(objects)
-    scale = size / max(max(high - low), 1e-6)
+    scale = size / max(*(high - low), 1e-6)
     foot = Vector(((low.x + high.x) / 2, (low.y + high.y) / 2, low.z))
     base = bpy.data.objects.new(name, None)
     bpy.context.scene.collection.objects.link(base)

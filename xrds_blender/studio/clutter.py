@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from . import lighting, props
-from .geometry import box, cone, cylinder, sheet, sphere, torus
+from .geometry import Shape, box, cone, cylinder, sheet, sphere, torus
 from .stage import Stage, turned
 
 
@@ -16,12 +16,18 @@ def build(stage: Stage) -> None:
     if stage.chance(0.6):
         back = sheet(14, 6).rotated("x", math.pi / 2)
         stage.put(back, stage.paint.wall(1.0), (0, 3, 3))
-    materials = [stage.paint.any(rng.choice((0.2, 0.5, 1.0))) for _ in range(rng.randint(8, 24))]
+    materials = [
+        stage.paint.any(rng.choice((0.2, 0.5, 1.0))) for _ in range(rng.randint(8, 24))
+    ]
     materials += [stage.paint.varied()]
     floating, reach = stage.chance(0.4), rng.uniform(1.0, 2.5)
     meshes = [_primitive(stage) for _ in range(12)]
     for _ in range(rng.randint(80, 350)):
-        at = (rng.gauss(0, reach), rng.gauss(0, reach * 0.7), rng.uniform(0, 2) if floating else 0)
+        at = (
+            rng.gauss(0, reach),
+            rng.gauss(0, reach * 0.7),
+            rng.uniform(0, 2) if floating else 0,
+        )
         thing = stage.put(rng.choice(meshes), rng.choice(materials), at, turned(rng))
         thing.scale = (2 ** rng.uniform(-1.5, 1),) * 3
         if floating:
@@ -37,7 +43,7 @@ def build(stage: Stage) -> None:
         stage.look(eye, target, rng.choice((24, 35, 50, 70)))
 
 
-def _primitive(stage: Stage):
+def _primitive(stage: Stage) -> Shape:
     rng, size = stage.rng, stage.rng.uniform(0.08, 0.4)
     kinds = (
         lambda: box(size, size * rng.random(), size * rng.random()),
@@ -57,4 +63,11 @@ def _light(stage: Stage) -> None:
         lighting.sun(stage)
     for _ in range(rng.randint(0, 3)):
         at = (rng.uniform(-4, 4), rng.uniform(-5, 2), rng.uniform(1.5, 4))
-        lighting.area(stage, at, (0, 0, 0), rng.uniform(0.1, 2), rng.uniform(50, 500), props.tone(stage))
+        lighting.area(
+            stage,
+            at,
+            (0, 0, 0),
+            rng.uniform(0.1, 2),
+            rng.uniform(50, 500),
+            props.tone(stage),
+        )

@@ -16,12 +16,20 @@ from .stage import Stage, turned
 def build(stage: Stage) -> None:
     """A cave or a round tunnel with emitters and things on its floor."""
     rng = stage.rng
-    rock = stage.paint.pictured(2.0) if stage.chance(0.6) else stage.paint.patterned(2.0)
+    rock = (
+        stage.paint.pictured(2.0) if stage.chance(0.6) else stage.paint.patterned(2.0)
+    )
     tunnel = stage.chance(0.4)
     stage.put(_tunnel(stage) if tunnel else _cave(stage), rock)
     floor = sheet(16, 16, 60, 60)
-    floor = floor.bent(lambda v: v + np.c_[0 * v[:, :2], 0.1 * np.sin(v[:, 0] * 3) * np.sin(v[:, 1] * 2.3)])
-    stage.put(floor, rock if stage.chance(0.4) else stage.paint.floor(2.0), (0, 0, -0.1))
+    floor = floor.bent(
+        lambda v: (
+            v + np.c_[0 * v[:, :2], 0.1 * np.sin(v[:, 0] * 3) * np.sin(v[:, 1] * 2.3)]
+        )
+    )
+    stage.put(
+        floor, rock if stage.chance(0.4) else stage.paint.floor(2.0), (0, 0, -0.1)
+    )
     for _ in range(rng.randint(8, 30)):
         props.small_thing(stage, _spot(stage), rng.uniform(0.1, 0.9), 0.3)
     _crystals(stage)
@@ -51,7 +59,9 @@ def _tunnel(stage: Stage) -> Shape:
 
 
 def _crystals(stage: Stage) -> None:
-    material = stage.rng.choice((stage.paint.glass, stage.paint.glowing, stage.paint.coated))(0.3)
+    material = stage.rng.choice(
+        (stage.paint.glass, stage.paint.glowing, stage.paint.coated)
+    )(0.3)
     spikes = []
     for _ in range(stage.rng.randint(0, 25)):
         size = stage.rng.uniform(0.1, 0.7)
@@ -80,13 +90,21 @@ def _lights(stage: Stage) -> None:
         if kind < 0.35:
             lighting.point(stage, (x, y, z), rng.uniform(10, 80), colour, 0.05)
         elif kind < 0.5:
-            lighting.spot(stage, (x, y, z + 0.5), _spot(stage), rng.uniform(50, 400), colour)
+            lighting.spot(
+                stage, (x, y, z + 0.5), _spot(stage), rng.uniform(50, 400), colour
+            )
         elif kind < 0.75:
             radius = rng.uniform(0.03, 0.15)
-            stage.put(sphere(radius, 24), stage.paint.glowing(0.2, 0.5 / radius**2), (x, y, z))
+            stage.put(
+                sphere(radius, 24), stage.paint.glowing(0.2, 0.5 / radius**2), (x, y, z)
+            )
         else:
             shape = torus(0.3, 0.015) if stage.chance(0.5) else cylinder(0.015, 1.2, 8)
-            stage.put(shape.rotated("x", rng.uniform(0, 3)), stage.paint.glowing(0.5, rng.uniform(20, 60)), (x, y, z))
+            stage.put(
+                shape.rotated("x", rng.uniform(0, 3)),
+                stage.paint.glowing(0.5, rng.uniform(20, 60)),
+                (x, y, z),
+            )
 
 
 def _smoke(stage: Stage) -> None:

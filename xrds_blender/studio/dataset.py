@@ -44,7 +44,7 @@ class Recipe:
     window: int = 256
     views: int = 2
     windows: int = 2  # of each view
-    reference_samples: int = 32
+    reference_samples: int = 20
 
     def split(self, seed: int) -> str:
         """``train`` or ``validation``, by the scene's number alone."""
@@ -71,9 +71,14 @@ class Samples:
         """Log-uniform counts for each scale and each of the two qualities."""
         samples = cls(rng)
         samples.low = {
-            (scale, i): _log_uniform(rng, *cls.LOW[i]) for scale in scales for i in (0, 1)
+            (scale, i): _log_uniform(rng, *cls.LOW[i])
+            for scale in scales
+            for i in (0, 1)
         }
-        samples.guides = (_log_uniform(rng, *cls.GUIDES), _log_uniform(rng, *cls.GUIDES))
+        samples.guides = (
+            _log_uniform(rng, *cls.GUIDES),
+            _log_uniform(rng, *cls.GUIDES),
+        )
         return samples
 
 
@@ -125,13 +130,23 @@ def _scene(recipe: Recipe, seed: int) -> int:
         if not path.exists():
             scenes.show(stage, view)
             framing.set_border(stage.scene, window)
-            meta = {"seed": seed, "index": index, "kind": stage.kind, "build": built,
-                    "exposure": exposure, "view": view.__dict__}
+            meta = {
+                "seed": seed,
+                "index": index,
+                "kind": stage.kind,
+                "build": built,
+                "exposure": exposure,
+                "view": view.__dict__,
+            }
             _write(recipe, stage, path, window, meta)
             written += 1
         index += 1
-    record = {"seed": seed, "kind": stage.kind, "windows": index,
-              "seconds": round(time.perf_counter() - start, 2)}
+    record = {
+        "seed": seed,
+        "kind": stage.kind,
+        "windows": index,
+        "seconds": round(time.perf_counter() - start, 2),
+    }
     with (recipe.out / JOURNAL).open("a") as journal:
         journal.write(json.dumps(record) + "\n")
     return written
@@ -167,7 +182,9 @@ def _probe(stage: Stage, view: View, seed: int) -> tuple[np.ndarray, ...]:
     framing.set_border(stage.scene, None)
     stage.scene.render.resolution_percentage = framing.PROBE_PERCENT
     try:
-        guides = run_job(stage.scene, lambda passes: passes.guides(2, full=True, seed=seed))
+        guides = run_job(
+            stage.scene, lambda passes: passes.guides(2, full=True, seed=seed)
+        )
     finally:
         stage.scene.render.resolution_percentage = 100
     return guides.radiance, guides.albedo, guides.normal
@@ -179,7 +196,9 @@ def _write(
     rng = random.Random(f"{meta['seed']} {meta['index']} samples")
     samples = Samples.drawn(rng, recipe.scales)
     start = time.perf_counter()
-    arrays, seconds = run_job(stage.scene, lambda passes: _arrays(recipe, passes, samples))
+    arrays, seconds = run_job(
+        stage.scene, lambda passes: _arrays(recipe, passes, samples)
+    )
     render = stage.scene.render
     used = stage.library.used if stage.library else []
     meta |= {
@@ -222,7 +241,9 @@ def _arrays(
         return result
 
     for (scale, i), count in samples.low.items():
-        low = timed(f"low{scale}", lambda seed, s=scale, n=count: passes.beauty(s, n, seed=seed))
+        low = timed(
+            f"low{scale}", lambda seed, s=scale, n=count: passes.beauty(s, n, seed=seed)
+        )
         arrays[f"low{scale}_{i}"] = low.radiance
         arrays[f"low{scale}_{i}_noisy"] = low.noisy
     for name, count in zip("ab", samples.guides, strict=True):
@@ -230,8 +251,12 @@ def _arrays(
         arrays[f"guides_{name}"] = np.concatenate([guides.albedo, guides.normal], -1)
         full = timed("full", lambda seed: passes.guides(1, full=True, seed=seed))
         arrays[f"guide_radiance_{name}"] = full.radiance
-    reference = timed("reference", lambda seed: passes.beauty(
-        1, recipe.reference_samples, prefilter="ACCURATE", seed=seed))
+    reference = timed(
+        "reference",
+        lambda seed: passes.beauty(
+            1, recipe.reference_samples, prefilter="ACCURATE", seed=seed
+        ),
+    )
     arrays["reference"] = reference.radiance
     return arrays, seconds
 

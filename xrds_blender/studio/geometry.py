@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -70,7 +71,7 @@ def joined(shapes: Iterable[Shape]) -> Shape:
     starts = np.cumsum([0] + [len(part.vertices) for part in parts])
     faces = [
         tuple(index + int(start) for index in face)
-        for part, start in zip(parts, starts)
+        for part, start in zip(parts, starts, strict=False)
         for face in part.faces
     ]
     return Shape(
@@ -83,11 +84,20 @@ def joined(shapes: Iterable[Shape]) -> Shape:
 
 def box(x: float, y: float, z: float) -> Shape:
     """A box, its base centred on the origin."""
-    corners = np.array([(i, j, k) for k in (0, 1) for j in (-0.5, 0.5) for i in (-0.5, 0.5)])
-    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    corners = np.array(
+        [(i, j, k) for k in (0, 1) for j in (-0.5, 0.5) for i in (-0.5, 0.5)]
+    )
+    faces = [
+        (0, 2, 3, 1),
+        (4, 5, 7, 6),
+        (0, 1, 5, 4),
+        (2, 6, 7, 3),
+        (0, 4, 6, 2),
+        (1, 3, 7, 5),
+    ]
     vertices = corners * (x, y, z)
     axes = [(0, 1), (0, 1), (0, 2), (0, 2), (1, 2), (1, 2)]
-    uv = [vertices[list(face)][:, axis] for face, axis in zip(faces, axes)]
+    uv = [vertices[list(face)][:, axis] for face, axis in zip(faces, axes, strict=True)]
     return Shape(vertices, faces, np.concatenate(uv))
 
 
@@ -104,7 +114,9 @@ def quads(points: Array) -> Shape:
 
 def sheet(width: float, depth: float, columns: int = 1, rows: int = 1) -> Shape:
     """A level grid centred on the origin."""
-    u, v = np.meshgrid(np.linspace(0, width, columns + 1), np.linspace(0, depth, rows + 1))
+    u, v = np.meshgrid(
+        np.linspace(0, width, columns + 1), np.linspace(0, depth, rows + 1)
+    )
     flat = np.stack([u.ravel(), v.ravel()], axis=1)
     points = np.column_stack([flat - (width / 2, depth / 2), np.zeros(len(flat))])
     return _grid(points, flat, columns + 1, rows + 1)
@@ -112,9 +124,13 @@ def sheet(width: float, depth: float, columns: int = 1, rows: int = 1) -> Shape:
 
 def _grid(points: Array, uv: Array, columns: int, rows: int) -> Shape:
     index = np.arange(columns * rows).reshape(rows, columns)
-    cells = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], -1)
+    cells = np.stack(
+        [index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], -1
+    )
     faces = cells.reshape(-1, 4)
-    return Shape(points, [tuple(face) for face in faces.tolist()], uv[faces.ravel()], True)
+    return Shape(
+        points, [tuple(face) for face in faces.tolist()], uv[faces.ravel()], True
+    )
 
 
 def lathe(profile: Sequence[tuple[float, float]], segments: int = 32) -> Shape:
@@ -145,13 +161,17 @@ def cone(low: float, high: float, height: float, segments: int = 16) -> Shape:
 def sphere(radius: float, segments: int = 32) -> Shape:
     """A ball centred on the origin."""
     angles = np.linspace(-math.pi / 2, math.pi / 2, segments // 2 + 1)
-    return lathe([(radius * math.cos(a), radius * math.sin(a)) for a in angles], segments)
+    return lathe(
+        [(radius * math.cos(a), radius * math.sin(a)) for a in angles], segments
+    )
 
 
 def torus(radius: float, thickness: float, segments: int = 40) -> Shape:
     """A ring about z centred on the origin."""
     angles = np.linspace(0, 2 * math.pi, segments // 2 + 1)
-    profile = [(radius + thickness * math.cos(a), thickness * math.sin(a)) for a in angles]
+    profile = [
+        (radius + thickness * math.cos(a), thickness * math.sin(a)) for a in angles
+    ]
     return lathe(profile, segments)
 
 
@@ -177,7 +197,9 @@ def rod(start: Point, end: Point, radius: float, segments: int = 8) -> Shape:
     return tube([start, end], radius, segments)
 
 
-def lumpy(shape: Shape, rng: np.random.Generator, size: float, strength: float) -> Shape:
+def lumpy(
+    shape: Shape, rng: np.random.Generator, size: float, strength: float
+) -> Shape:
     """Vertices pushed from the origin by smooth noise of wavelength ``size``."""
 
     def push(vertices: Array) -> Array:
@@ -198,8 +220,8 @@ def wall(width: float, height: float, holes: Sequence[tuple[float, ...]]) -> Sha
     zs = sorted({0.0, height, *(z for hole in holes for z in hole[1::2])})
     cells = [
         [(x0, 0, z0), (x1, 0, z0), (x1, 0, z1), (x0, 0, z1)]
-        for x0, x1 in zip(xs, xs[1:])
-        for z0, z1 in zip(zs, zs[1:])
+        for x0, x1 in pairwise(xs)
+        for z0, z1 in pairwise(zs)
         if not any(h[0] <= x0 < h[2] and h[1] <= z0 < h[3] for h in holes)
     ]
     points = np.array(cells)

@@ -54,21 +54,29 @@ def _picture_sky(stage: Stage, strength: float) -> None:
     image.colorspace_settings.name = "Linear Rec.709"
     picture = nodes.add("TexEnvironment", image=image, Vector=at.outputs[0])
     # Night skies are made bright enough to light a scene.
-    _background(nodes, picture.outputs["Color"], strength * (8 if "night" in path.name else 1))
+    _background(
+        nodes, picture.outputs["Color"], strength * (8 if "night" in path.name else 1)
+    )
 
 
 def _painted_sky(stage: Stage, strength: float) -> None:
     nodes, rng = _world(stage), stage.rng
     way = nodes.add("TexCoord").outputs["Generated"]
     height = nodes.add("SeparateXYZ", Vector=way).outputs["Z"]
-    zenith = (0.1 + 0.2 * rng.random(), 0.25 + 0.2 * rng.random(), 0.5 + 0.4 * rng.random())
+    zenith = (
+        0.1 + 0.2 * rng.random(),
+        0.25 + 0.2 * rng.random(),
+        0.5 + 0.4 * rng.random(),
+    )
     horizon = tuple(0.5 + 0.5 * rng.random() for _ in range(3))
     ground = patterns.colour(rng, 0.05, 0.3)
     stops = [(0.0, ground), (0.49, ground), (0.5, horizon), (0.85, zenith)]
     base = nodes.ramp(nodes.span(height, 0.5, 1.0), stops, "LINEAR")
     if stage.chance(0.6):
         noise = nodes.add("TexNoise", Vector=way, Scale=rng.uniform(2, 6), Detail=3.0)
-        clouds = nodes.ramp(noise.outputs[0], [(0.5, (0,) * 3), (0.7, (1,) * 3)], "EASE")
+        clouds = nodes.ramp(
+            noise.outputs[0], [(0.5, (0,) * 3), (0.7, (1,) * 3)], "EASE"
+        )
         base = nodes.mix(base, (0.9, 0.9, 0.9), clouds)
     _background(nodes, base, strength)
 
@@ -143,7 +151,9 @@ def floor_lamp(stage: Stage, at: Point, height: float, watts: float) -> None:
     stage.put(cylinder(0.01, height), metal, at)
     wide = height * rng.uniform(0.1, 0.18)
     shade = lathe([(wide, 0), (wide * rng.uniform(0.5, 1), wide * 1.4)], 40)
-    stage.put(shade, stage.paint.glowing(0.5, rng.uniform(1, 6)), (x, y, z + height - wide))
+    stage.put(
+        shade, stage.paint.glowing(0.5, rng.uniform(1, 6)), (x, y, z + height - wide)
+    )
     _bulb(stage, (x, y, z + height), watts)
 
 

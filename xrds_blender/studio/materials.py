@@ -53,13 +53,17 @@ class Painter:
     def _pick(
         self, size: float, *kinds: tuple[Callable[[float], bpy.types.Material], float]
     ) -> bpy.types.Material:
-        makers, weights = zip(*kinds)
+        makers, weights = zip(*kinds, strict=True)
         return self.rng.choices(makers, weights)[0](size)
 
     def wall(self, size: float = 1.0) -> bpy.types.Material:
         """Wallpaper, paint, brick, panels or a picture texture."""
         return self._pick(
-            size, (self.wallpaper, 4), (self.pictured, 3), (self.plaster, 3), (self.wood, 1)
+            size,
+            (self.wallpaper, 4),
+            (self.pictured, 3),
+            (self.plaster, 3),
+            (self.wood, 1),
         )
 
     def floor(self, size: float = 1.0) -> bpy.types.Material:
@@ -85,7 +89,9 @@ class Painter:
         light = rng.random() < 0.7
         base = patterns.colour(rng, 0.4 if light else 0.05, 0.9)
         _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.4, 0.95)})
-        height = patterns._noise(nodes, rng, patterns.placed(nodes, rng, rng.uniform(5, 90)))
+        height = patterns._noise(
+            nodes, rng, patterns.placed(nodes, rng, rng.uniform(5, 90))
+        )
         self._bump(nodes, shader, height, 0.002)
         return material
 
@@ -94,9 +100,13 @@ class Painter:
         rng = self.rng
         material, nodes, shader = self._new("patterned")
         density = 2 ** rng.uniform(0, 5.5) / size
-        at = patterns.placed(nodes, rng, density, rng.choice((1, 1, 1, rng.uniform(0.1, 4))))
+        at = patterns.placed(
+            nodes, rng, density, rng.choice((1, 1, 1, rng.uniform(0.1, 4)))
+        )
         value = patterns.pattern(nodes, rng, at)
-        base = patterns.tinted(nodes, rng, value, patterns.colour(rng), rng.random() < 0.5)
+        base = patterns.tinted(
+            nodes, rng, value, patterns.colour(rng), rng.random() < 0.5
+        )
         _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.1, 1.0)})
         self._drive(nodes, shader, value, 0.3 / density)
         return material
@@ -106,8 +116,14 @@ class Painter:
         rng = self.rng
         material, nodes, shader = self._new("wallpaper")
         at = patterns.placed(nodes, rng, 2 ** rng.uniform(1.5, 5.0))
-        makers = (patterns._magic, patterns._checker, patterns._wave, patterns._weave,
-                  patterns._voronoi, patterns._brick)
+        makers = (
+            patterns._magic,
+            patterns._checker,
+            patterns._wave,
+            patterns._weave,
+            patterns._voronoi,
+            patterns._brick,
+        )
         value = rng.choice(makers)(nodes, rng, at)
         base = patterns.tinted(nodes, rng, value, patterns.colour(rng, 0.15), False)
         _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.3, 0.9)})
@@ -122,8 +138,16 @@ class Painter:
         value = patterns.grain(nodes, rng, 2 ** rng.uniform(2, 5) / max(size, 0.3))
         base = patterns.tinted(nodes, rng, value, patterns.wood_colour(rng), False)
         coat = rng.choice((0.0, 0.0, 1.0))
-        _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.2, 0.7),
-                             "Coat_Weight": coat, "Coat_Roughness": rng.uniform(0.01, 0.2)})
+        _set(
+            nodes,
+            shader,
+            {
+                "Base_Color": base,
+                "Roughness": rng.uniform(0.2, 0.7),
+                "Coat_Weight": coat,
+                "Coat_Roughness": rng.uniform(0.01, 0.2),
+            },
+        )
         self._drive(nodes, shader, value, 0.002)
         return material
 
@@ -134,9 +158,14 @@ class Painter:
         value = patterns.grain(nodes, rng, rng.uniform(4, 14))
         base = patterns.tinted(nodes, rng, value, patterns.wood_colour(rng), False)
         bricks = nodes.add(
-            "TexBrick", Vector=patterns.placed(nodes, rng, 1.0), Scale=1.0,
-            Color1=(1, 1, 1), Color2=(0.45, 0.45, 0.45), Mortar=(0.08, 0.08, 0.08),
-            Mortar_Size=rng.uniform(0.002, 0.006), Brick_Width=rng.uniform(0.6, 2.0),
+            "TexBrick",
+            Vector=patterns.placed(nodes, rng, 1.0),
+            Scale=1.0,
+            Color1=(1, 1, 1),
+            Color2=(0.45, 0.45, 0.45),
+            Mortar=(0.08, 0.08, 0.08),
+            Mortar_Size=rng.uniform(0.002, 0.006),
+            Brick_Width=rng.uniform(0.6, 2.0),
             Row_Height=rng.uniform(0.06, 0.2),
         )
         base = nodes.mix(base, bricks.outputs["Color"], 1.0, "MULTIPLY")
@@ -151,30 +180,57 @@ class Painter:
         edge = rng.uniform(0.05, 0.6)
         first = patterns.colour(rng, 0.1)
         bricks = nodes.add(
-            "TexBrick", offset=rng.choice((0.0, 0.5)), Scale=1.0,
-            Vector=patterns.placed(nodes, rng, 1.0), Color1=first,
+            "TexBrick",
+            offset=rng.choice((0.0, 0.5)),
+            Scale=1.0,
+            Vector=patterns.placed(nodes, rng, 1.0),
+            Color1=first,
             Color2=rng.choice((patterns.shade(rng, first, 0.2), patterns.colour(rng))),
-            Mortar=patterns.colour(rng, 0.05, 0.5), Mortar_Size=edge * 0.015,
-            Brick_Width=edge * rng.choice((1, 1, 2)), Row_Height=edge,
+            Mortar=patterns.colour(rng, 0.05, 0.5),
+            Mortar_Size=edge * 0.015,
+            Brick_Width=edge * rng.choice((1, 1, 2)),
+            Row_Height=edge,
         )
         rough = nodes.span(bricks.outputs["Fac"], rng.uniform(0.02, 0.3), 0.8)
         _set(nodes, shader, {"Base_Color": bricks.outputs["Color"], "Roughness": rough})
-        self._bump(nodes, shader, nodes.math("SUBTRACT", 1.0, bricks.outputs["Fac"]), 0.003)
+        self._bump(
+            nodes, shader, nodes.math("SUBTRACT", 1.0, bricks.outputs["Fac"]), 0.003
+        )
         return material
 
     def metal(self, size: float = 1.0) -> bpy.types.Material:
         """Steel, brass, copper or coloured metal; polished, brushed or patterned."""
         rng = self.rng
         material, nodes, shader = self._new("metal")
-        base = rng.choice(((0.9, 0.9, 0.9), (0.55, 0.55, 0.57), (0.9, 0.65, 0.3),
-                           (0.9, 0.5, 0.35), patterns.colour(rng, 0.3)))
+        base = rng.choice(
+            (
+                (0.9, 0.9, 0.9),
+                (0.55, 0.55, 0.57),
+                (0.9, 0.65, 0.3),
+                (0.9, 0.5, 0.35),
+                patterns.colour(rng, 0.3),
+            )
+        )
         rough: Value = rng.choice((0.02, rng.uniform(0.05, 0.5), rng.uniform(0.1, 0.4)))
         if rng.random() < 0.4:
-            value = patterns.pattern(nodes, rng, patterns.placed(
-                nodes, rng, 2 ** rng.uniform(1, 5) / size, rng.choice((1, 0.03, 20))))
+            value = patterns.pattern(
+                nodes,
+                rng,
+                patterns.placed(
+                    nodes, rng, 2 ** rng.uniform(1, 5) / size, rng.choice((1, 0.03, 20))
+                ),
+            )
             rough = nodes.span(value, rng.uniform(0.02, 0.2), rng.uniform(0.2, 0.6))
-        _set(nodes, shader, {"Base_Color": base, "Metallic": 1.0, "Roughness": rough,
-                             "Anisotropic": rng.choice((0.0, 0.0, 0.7))})
+        _set(
+            nodes,
+            shader,
+            {
+                "Base_Color": base,
+                "Metallic": 1.0,
+                "Roughness": rough,
+                "Anisotropic": rng.choice((0.0, 0.0, 0.7)),
+            },
+        )
         return material
 
     def coated(self, size: float = 1.0) -> bpy.types.Material:
@@ -183,27 +239,46 @@ class Painter:
         material, nodes, shader = self._new("coated")
         base: Value = patterns.colour(rng, 0.02, 0.7)
         if rng.random() < 0.4:
-            cells = nodes.add("TexVoronoi", Vector=patterns.placed(nodes, rng, 300), Scale=1.0)
+            cells = nodes.add(
+                "TexVoronoi", Vector=patterns.placed(nodes, rng, 300), Scale=1.0
+            )
             base = nodes.mix(base, patterns.shade(rng, base), cells.outputs["Color"])
         elif rng.random() < 0.4:
             value = patterns.pattern(nodes, rng, patterns.placed(nodes, rng, 6 / size))
             base = patterns.tinted(nodes, rng, value, base, True)
-        _set(nodes, shader, {"Base_Color": base, "Metallic": rng.choice((0.0, 0.0, 0.8)),
-                             "Roughness": rng.uniform(0.15, 0.6), "Coat_Weight": 1.0,
-                             "Coat_Roughness": rng.choice((0.0, 0.02, 0.1))})
+        _set(
+            nodes,
+            shader,
+            {
+                "Base_Color": base,
+                "Metallic": rng.choice((0.0, 0.0, 0.8)),
+                "Roughness": rng.uniform(0.15, 0.6),
+                "Coat_Weight": 1.0,
+                "Coat_Roughness": rng.choice((0.0, 0.02, 0.1)),
+            },
+        )
         return material
 
     def cloth(self, size: float = 1.0) -> bpy.types.Material:
         """Woven cloth with sheen."""
         rng = self.rng
         material, nodes, shader = self._new("cloth")
-        weave = patterns._weave(nodes, rng, patterns.placed(nodes, rng, rng.uniform(30, 200)))
+        weave = patterns._weave(
+            nodes, rng, patterns.placed(nodes, rng, rng.uniform(30, 200))
+        )
         value = weave
         if rng.random() < 0.6:
-            value = patterns.pattern(nodes, rng, patterns.placed(nodes, rng, rng.uniform(3, 30)))
-        base = patterns.tinted(nodes, rng, value, patterns.colour(rng), rng.random() < 0.3)
-        _set(nodes, shader, {"Base_Color": base, "Roughness": 0.9,
-                             "Sheen_Weight": rng.uniform(0, 1)})
+            value = patterns.pattern(
+                nodes, rng, patterns.placed(nodes, rng, rng.uniform(3, 30))
+            )
+        base = patterns.tinted(
+            nodes, rng, value, patterns.colour(rng), rng.random() < 0.3
+        )
+        _set(
+            nodes,
+            shader,
+            {"Base_Color": base, "Roughness": 0.9, "Sheen_Weight": rng.uniform(0, 1)},
+        )
         self._bump(nodes, shader, weave, 0.002)
         return material
 
@@ -211,8 +286,11 @@ class Painter:
         """Subsurface scattering."""
         rng = self.rng
         return self._solid(
-            "wax", Base_Color=patterns.colour(rng, 0.3), Roughness=rng.uniform(0.2, 0.6),
-            Subsurface_Weight=rng.uniform(0.4, 1), Subsurface_Scale=size * rng.uniform(0.02, 0.2),
+            "wax",
+            Base_Color=patterns.colour(rng, 0.3),
+            Roughness=rng.uniform(0.2, 0.6),
+            Subsurface_Weight=rng.uniform(0.4, 1),
+            Subsurface_Scale=size * rng.uniform(0.02, 0.2),
         )
 
     def glass(self, size: float = 1.0) -> bpy.types.Material:
@@ -220,19 +298,28 @@ class Painter:
         rng = self.rng
         tint = rng.choice(((1.0, 1.0, 1.0), patterns.colour(rng, 0.6, 1.0)))
         return self._solid(
-            "glass", Base_Color=tint, Transmission_Weight=1.0, IOR=rng.uniform(1.3, 1.7),
+            "glass",
+            Base_Color=tint,
+            Transmission_Weight=1.0,
+            IOR=rng.uniform(1.3, 1.7),
             Roughness=rng.choice((0.0, 0.0, rng.uniform(0.02, 0.3))),
         )
 
     def pane(self) -> bpy.types.Material:
         """Window glass: thin, does not shut out the sun."""
-        return self._solid("pane", Base_Color=(1, 1, 1), Roughness=0.0, Alpha=0.1, Metallic=1.0)
+        return self._solid(
+            "pane", Base_Color=(1, 1, 1), Roughness=0.0, Alpha=0.1, Metallic=1.0
+        )
 
     def mirror(self) -> bpy.types.Material:
         """A clean mirror."""
-        return self._solid("mirror", Base_Color=(0.95,) * 3, Metallic=1.0, Roughness=0.0)
+        return self._solid(
+            "mirror", Base_Color=(0.95,) * 3, Metallic=1.0, Roughness=0.0
+        )
 
-    def glowing(self, size: float = 1.0, power: float | None = None) -> bpy.types.Material:
+    def glowing(
+        self, size: float = 1.0, power: float | None = None
+    ) -> bpy.types.Material:
         """A lit surface, plain or with a pattern."""
         rng = self.rng
         material, nodes, shader = self._new("glowing")
@@ -241,8 +328,15 @@ class Painter:
             value = patterns.pattern(nodes, rng, patterns.placed(nodes, rng, 8 / size))
             base = patterns.tinted(nodes, rng, value, base, True)
         strength = power if power is not None else 2 ** rng.uniform(0, 4)
-        _set(nodes, shader, {"Base_Color": (0.1,) * 3, "Emission_Color": base,
-                             "Emission_Strength": strength})
+        _set(
+            nodes,
+            shader,
+            {
+                "Base_Color": (0.1,) * 3,
+                "Emission_Color": base,
+                "Emission_Strength": strength,
+            },
+        )
         return material
 
     def leaves(self, alpha: bool = False) -> bpy.types.Material:
@@ -250,7 +344,11 @@ class Painter:
         rng = self.rng
         material, nodes, shader = self._new("leaves")
         island = nodes.add("NewGeometry").outputs["Random Per Island"]
-        green = (rng.uniform(0.02, 0.2), rng.uniform(0.08, 0.3), rng.uniform(0.01, 0.08))
+        green = (
+            rng.uniform(0.02, 0.2),
+            rng.uniform(0.08, 0.3),
+            rng.uniform(0.01, 0.08),
+        )
         base = patterns.tinted(nodes, rng, island, green, False)
         _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.3, 0.8)})
         if alpha:
@@ -260,7 +358,7 @@ class Painter:
         return material
 
     def varied(self, gloss: bool = True) -> bpy.types.Material:
-        """Each object and each island of its mesh another colour: books, toys, tiles."""
+        """Each object and each island of it another colour: books, toys, tiles."""
         rng = self.rng
         material, nodes, shader = self._new("varied")
         island = nodes.add("NewGeometry").outputs["Random Per Island"]
@@ -269,10 +367,17 @@ class Painter:
         stops = [(i / 8, patterns.colour(rng)) for i in range(8)]
         base = nodes.ramp(value, stops, "CONSTANT")
         if rng.random() < 0.5:
-            lines = patterns.pattern(nodes, rng, patterns.placed(nodes, rng, rng.uniform(20, 90)))
-            base = nodes.mix(base, patterns.colour(rng), nodes.math("GREATER_THAN", lines, 0.6))
-        _set(nodes, shader, {"Base_Color": base,
-                             "Roughness": rng.uniform(0.1 if gloss else 0.5, 0.9)})
+            lines = patterns.pattern(
+                nodes, rng, patterns.placed(nodes, rng, rng.uniform(20, 90))
+            )
+            base = nodes.mix(
+                base, patterns.colour(rng), nodes.math("GREATER_THAN", lines, 0.6)
+            )
+        _set(
+            nodes,
+            shader,
+            {"Base_Color": base, "Roughness": rng.uniform(0.1 if gloss else 0.5, 0.9)},
+        )
         return material
 
     def pictured(
@@ -281,7 +386,11 @@ class Painter:
         """A texture set of the library (whose name has one of ``words``)."""
         if self.library is None:
             return self.patterned(size)
-        sets = [s for s in self.library.textures if not words or any(w in s.name for w in words)]
+        sets = [
+            s
+            for s in self.library.textures
+            if not words or any(w in s.name for w in words)
+        ]
         folder = self.rng.choice(sets or list(self.library.textures))
         material, nodes, shader = self._new(folder.name)
         density = 2 ** self.rng.uniform(-1, 1.5) / min(max(size, 0.1), 2.0)
@@ -290,21 +399,40 @@ class Painter:
         return material
 
     def _maps(
-        self, nodes: Nodes, shader: bpy.types.Node, folder: Path, at: Value, depth: float
+        self,
+        nodes: Nodes,
+        shader: bpy.types.Node,
+        folder: Path,
+        at: Value,
+        depth: float,
     ) -> None:
-        maps = {kind: self._map(nodes, folder, kind, at) for kind in
-                ("albedo", "roughness", "metallic", "opacity", "normal", "displacement")}
+        maps = {
+            kind: self._map(nodes, folder, kind, at)
+            for kind in (
+                "albedo",
+                "roughness",
+                "metallic",
+                "opacity",
+                "normal",
+                "displacement",
+            )
+        }
         base = maps["albedo"]
         if self.rng.random() < 0.4:
             tint = patterns.colour(self.rng, 0.3, 1.0)
             base = nodes.mix(base, tint, self.rng.uniform(0.2, 1.0), "MULTIPLY")
         rough = maps["roughness"]
-        _set(nodes, shader, {
-            "Base_Color": base,
-            "Roughness": self.rng.uniform(0.2, 0.9) if rough is None else rough,
-            "Metallic": maps["metallic"], "Alpha": maps["opacity"],
-            "Coat_Weight": self.rng.choice((0.0, 0.0, 0.0, 0.7)),
-        })
+        _set(
+            nodes,
+            shader,
+            {
+                "Base_Color": base,
+                "Roughness": self.rng.uniform(0.2, 0.9) if rough is None else rough,
+                "Metallic": maps["metallic"],
+                "Alpha": maps["opacity"],
+                "Coat_Weight": self.rng.choice((0.0, 0.0, 0.0, 0.7)),
+            },
+        )
         if maps["normal"] is not None:
             node = nodes.add("NormalMap", Color=maps["normal"])
             nodes.plug(shader.inputs["Normal"], node.outputs[0])

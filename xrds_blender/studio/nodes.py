@@ -59,13 +59,17 @@ class Nodes:
         """``value`` in 0..1 brought to low..high."""
         return self.math("ADD", self.math("MULTIPLY", value, high - low), low)
 
-    def ramp(self, factor: Value, stops: Sequence[tuple[float, Colour]], mode: str) -> Value:
+    def ramp(
+        self, factor: Value, stops: Sequence[tuple[float, Colour]], mode: str
+    ) -> Value:
         """A colour ramp with at least two (position, colour) stops."""
         node = self.add("ValToRGB", Fac=factor)
         ramp = node.color_ramp
         ramp.interpolation = mode
         while len(ramp.elements) < len(stops):
             ramp.elements.new(1.0)
-        for element, (position, colour) in zip(ramp.elements, sorted(stops)):
+        for element, (position, colour) in zip(
+            ramp.elements, sorted(stops), strict=True
+        ):
             element.position, element.color = position, (*colour, 1.0)
         return node.outputs["Color"]

@@ -9,8 +9,20 @@ import numpy as np
 
 from . import patterns
 from .geometry import (
-    Point, Shape, box, cone, cylinder, joined, lathe, lumpy, quads, rod, sheet, sphere,
-    torus, tube,
+    Point,
+    Shape,
+    box,
+    cone,
+    cylinder,
+    joined,
+    lathe,
+    lumpy,
+    quads,
+    rod,
+    sheet,
+    sphere,
+    torus,
+    tube,
 )
 from .stage import Stage, turned
 
@@ -27,7 +39,9 @@ def table(stage: Stage, at: Point, turn: float, x: float, y: float, z: float) ->
     rng = stage.rng
     top = stage.paint.wood(0.7) if stage.chance(0.6) else stage.paint.any(0.7)
     frame = top if stage.chance(0.5) else stage.paint.metal(0.3)
-    stage.put(legs(x, y, z, rng.uniform(0.025, 0.08), stage.chance(0.5)), frame, at, turn)
+    stage.put(
+        legs(x, y, z, rng.uniform(0.025, 0.08), stage.chance(0.5)), frame, at, turn
+    )
     slab = box(x, y, 0.035).shifted((0, 0, z))
     stage.put(slab, top, at, turn, 0.005)
     for _ in range(rng.randint(1, 7)):
@@ -37,7 +51,13 @@ def table(stage: Stage, at: Point, turn: float, x: float, y: float, z: float) ->
         small_thing(stage, spot, rng.uniform(0.08, 0.3))
 
 
-def chair(stage: Stage, at: Point, turn: float, seat, frame) -> None:
+def chair(
+    stage: Stage,
+    at: Point,
+    turn: float,
+    seat: bpy.types.Material,
+    frame: bpy.types.Material,
+) -> None:
     """A chair with thin legs and a slatted or solid back, of two materials."""
     rng = stage.rng
     thick, high = rng.uniform(0.018, 0.045), rng.uniform(0.38, 0.5)
@@ -56,7 +76,9 @@ def shelf(stage: Stage, at: Point, turn: float, x: float, z: float) -> None:
     rng, depth = stage.rng, 0.3
     rows = rng.randint(3, 7)
     step = z / rows
-    boards = [box(x, depth, 0.02).shifted((0, -depth / 2, i * step)) for i in range(rows + 1)]
+    boards = [
+        box(x, depth, 0.02).shifted((0, -depth / 2, i * step)) for i in range(rows + 1)
+    ]
     sides = [box(0.02, depth, z).shifted((i, -depth / 2, 0)) for i in (-x / 2, x / 2)]
     stage.put(joined(boards + sides), stage.paint.wood(0.8), at, turn)
     books = [
@@ -75,7 +97,11 @@ def _books(stage: Stage, length: float, depth: float, step: float) -> list[Shape
         tall = step * rng.uniform(0.5, 0.88)
         if rng.random() < 0.88:
             deep = depth * rng.uniform(0.5, 0.85)
-            row.append(box(thick * 0.94, deep, tall).shifted((x + thick / 2, -deep / 2 - 0.02, 0)))
+            row.append(
+                box(thick * 0.94, deep, tall).shifted(
+                    (x + thick / 2, -deep / 2 - 0.02, 0)
+                )
+            )
         x += thick
     return row
 
@@ -88,15 +114,25 @@ def vase(stage: Stage, at: Point, size: float) -> None:
     heights = np.linspace(0, size, 40)
     radius = np.interp(heights, np.linspace(0, size, count), knots)
     radius = np.convolve(np.pad(radius, 3, mode="edge"), np.ones(7) / 7, "valid")
-    profile = [(0.0, 0.0), *zip(radius.tolist(), heights.tolist())]
+    profile = [(0.0, 0.0), *zip(radius.tolist(), heights.tolist(), strict=True)]
     stage.put(lathe(profile, 48), stage.paint.any(size), at, turned(rng))
 
 
 def blob(stage: Stage, at: Point, size: float) -> None:
     """A smooth lump."""
     body = sphere(size / 2, 64)
-    body = lumpy(body, stage.dice, size * stage.rng.uniform(0.3, 1.2), stage.rng.uniform(0.1, 0.6))
-    stage.put(body, stage.paint.any(size), (at[0], at[1], at[2] + size * 0.45), turned(stage.rng))
+    body = lumpy(
+        body,
+        stage.dice,
+        size * stage.rng.uniform(0.3, 1.2),
+        stage.rng.uniform(0.1, 0.6),
+    )
+    stage.put(
+        body,
+        stage.paint.any(size),
+        (at[0], at[1], at[2] + size * 0.45),
+        turned(stage.rng),
+    )
 
 
 def ring(stage: Stage, at: Point, size: float) -> None:
@@ -106,7 +142,9 @@ def ring(stage: Stage, at: Point, size: float) -> None:
     lift = thick
     if stage.chance(0.5):
         shape, lift = shape.rotated("x", math.pi / 2), size / 2
-    stage.put(shape, stage.paint.any(size), (at[0], at[1], at[2] + lift), turned(stage.rng))
+    stage.put(
+        shape, stage.paint.any(size), (at[0], at[1], at[2] + lift), turned(stage.rng)
+    )
 
 
 def block(stage: Stage, at: Point, size: float) -> None:
@@ -124,7 +162,9 @@ def ball(stage: Stage, at: Point, size: float) -> None:
 def peg(stage: Stage, at: Point, size: float) -> None:
     """A cylinder or cone."""
     low = size * stage.rng.uniform(0.1, 0.5)
-    shape = cone(low, low * stage.rng.choice((1, 1, 0.5, 0)), size, stage.rng.choice((6, 32)))
+    shape = cone(
+        low, low * stage.rng.choice((1, 1, 0.5, 0)), size, stage.rng.choice((6, 32))
+    )
     stage.put(shape, stage.paint.any(size), at, turned(stage.rng))
 
 
@@ -139,12 +179,17 @@ def wire(stage: Stage, at: Point, size: float) -> None:
 
 def sign(stage: Stage, at: Point, size: float) -> None:
     """Standing letters."""
-    letters = "".join(stage.rng.choice("ABCDEGHKMPRSTUWXYZ 0123456789") for _ in range(6))
+    letters = "".join(
+        stage.rng.choice("ABCDEGHKMPRSTUWXYZ 0123456789") for _ in range(6)
+    )
     curve = bpy.data.curves.new("letters", "FONT")
     curve.body, curve.size, curve.extrude = letters, size * 0.5, size * 0.03
     curve.materials.append(stage.paint.any(size))
     thing = bpy.data.objects.new("letters", curve)
-    thing.location, thing.rotation_euler = at, (math.pi / 2, 0, stage.rng.uniform(-1, 1))
+    thing.location, thing.rotation_euler = (
+        at,
+        (math.pi / 2, 0, stage.rng.uniform(-1, 1)),
+    )
     stage.scene.collection.objects.link(thing)
 
 
@@ -174,10 +219,15 @@ def picture(stage: Stage, at: Point, turn: float, x: float, z: float) -> None:
     """A framed picture (or mirror) on a wall that faces -y before the turn."""
     rng, edge = stage.rng, stage.rng.uniform(0.015, 0.08)
     bars = [box(x + 2 * edge, 0.04, edge).shifted((0, -0.02, b)) for b in (-edge, z)]
-    bars += [box(edge, 0.04, z).shifted((b, -0.02, 0)) for b in (-(x + edge) / 2, (x + edge) / 2)]
+    bars += [
+        box(edge, 0.04, z).shifted((b, -0.02, 0))
+        for b in (-(x + edge) / 2, (x + edge) / 2)
+    ]
     stage.put(joined(bars), stage.paint.any(0.4), at, turn)
     makers = (stage.paint.pictured, stage.paint.patterned, stage.paint.wallpaper)
-    inside = stage.paint.mirror() if stage.chance(0.15) else rng.choice(makers)(min(x, z))
+    inside = (
+        stage.paint.mirror() if stage.chance(0.15) else rng.choice(makers)(min(x, z))
+    )
     stage.put(box(x, 0.01, z).shifted((0, -0.006, 0)), inside, at, turn)
     if stage.chance(0.3):
         stage.put(box(x, 0.003, z).shifted((0, -0.03, 0)), stage.paint.pane(), at, turn)
@@ -188,10 +238,12 @@ def curtain(stage: Stage, at: Point, turn: float, width: float, height: float) -
     waves, deep = stage.rng.uniform(4, 14) / width, stage.rng.uniform(0.02, 0.06)
     shape = sheet(width, height, 120, 6).rotated("x", math.pi / 2)
 
-    def fold(vertices):
+    def fold(vertices: np.ndarray) -> np.ndarray:
         out = vertices.copy()
         x, z = vertices[:, 0], vertices[:, 2]
-        out[:, 1] += deep * np.sin(waves * 6 * x + np.sin(2 * x + z)) * (0.7 + 0.3 * z / height)
+        out[:, 1] += (
+            deep * np.sin(waves * 6 * x + np.sin(2 * x + z)) * (0.7 + 0.3 * z / height)
+        )
         return out
 
     shape = shape.bent(fold).shifted((0, 0, height / 2))
@@ -204,7 +256,10 @@ def blinds(stage: Stage, at: Point, turn: float, width: float, height: float) ->
     low = stage.rng.uniform(0, 0.6) * height
     slat = box(width, pitch * 0.95, 0.0015).rotated("x", tilt)
     slats = [slat.shifted((0, 0, z)) for z in np.arange(low, height, pitch)]
-    cords = [cylinder(0.002, height - low, 6).shifted((x * width, 0, low)) for x in (-0.35, 0.35)]
+    cords = [
+        cylinder(0.002, height - low, 6).shifted((x * width, 0, low))
+        for x in (-0.35, 0.35)
+    ]
     stage.put(joined(slats + cords), stage.paint.painted(), at, turn)
 
 
@@ -217,14 +272,17 @@ def railing(stage: Stage, start: Point, end: Point, height: float) -> None:
     feet = [a + (b - a) * i / count for i in range(count + 1)]
     up = np.array((0, 0, height))
     posts = [rod(foot, foot + up, thin) for foot in feet]
-    rails = [rod(a + up * k, b + up * k, thin * 1.5) for k in rng.choice(((1,), (0.1, 1), (0.5, 1)))]
+    rails = [
+        rod(a + up * k, b + up * k, thin * 1.5)
+        for k in rng.choice(((1,), (0.1, 1), (0.5, 1)))
+    ]
     stage.put(joined(posts + rails), stage.paint.any(0.2))
 
 
 def plant(stage: Stage, at: Point, size: float) -> None:
     """A crown of many small leaves on a stem."""
     count = stage.rng.randint(150, 1500)
-    spots = stage.dice.normal(0, 0.22 * size, (count, 3)) + (0, 0, size * 0.7)
+    spots = stage.dice.normal((0, 0, size * 0.7), 0.22 * size, (count, 3))
     leaves = scattered(stage, spots, size * stage.rng.uniform(0.03, 0.1))
     alpha = stage.chance(0.15)
     stage.put(leaves, stage.paint.leaves(alpha), at)
@@ -253,21 +311,33 @@ def grass(stage: Stage, centre: Point, reach: float, count: int) -> None:
     side = dice.normal(0, 1, (count, 3)) * (1, 1, 0)
     side *= 0.006 / np.linalg.norm(side, axis=1, keepdims=True)
     top = foot + tall + lean
-    blades = quads(np.stack([foot - side, foot + side, top + side * 0.2, top - side * 0.2], 1))
+    blades = quads(
+        np.stack([foot - side, foot + side, top + side * 0.2, top - side * 0.2], 1)
+    )
     stage.put(blades, stage.paint.leaves(), centre)
 
 
 def stairs(stage: Stage, at: Point, turn: float, steps: int, width: float) -> None:
     """A straight flight of steps with a railing, climbing along +y before the turn."""
     rise, run = stage.rng.uniform(0.15, 0.19), stage.rng.uniform(0.24, 0.3)
-    treads = [box(width, run + 0.03, 0.04).shifted((0, i * run, (i + 1) * rise - 0.04)) for i in range(steps)]
-    risers = [box(width, 0.02, rise).shifted((0, i * run - run / 2, i * rise)) for i in range(steps)]
+    treads = [
+        box(width, run + 0.03, 0.04).shifted((0, i * run, (i + 1) * rise - 0.04))
+        for i in range(steps)
+    ]
+    risers = [
+        box(width, 0.02, rise).shifted((0, i * run - run / 2, i * rise))
+        for i in range(steps)
+    ]
     stage.put(joined(treads), stage.paint.wood(1.0), at, turn, 0.006)
     stage.put(joined(risers), stage.paint.any(0.5), at, turn)
     c, s = math.cos(turn), math.sin(turn)
     for x in (-width / 2, width / 2):
         low = (at[0] + c * x, at[1] + s * x, at[2] + rise)
-        high = (low[0] - s * steps * run, low[1] + c * steps * run, at[2] + steps * rise)
+        high = (
+            low[0] - s * steps * run,
+            low[1] + c * steps * run,
+            at[2] + steps * rise,
+        )
         railing(stage, low, high, 0.9)
 
 

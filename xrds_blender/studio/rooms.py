@@ -19,7 +19,9 @@ class Side:
     turn: float
     length: float
 
-    def at(self, along: float, height: float, off: float = 0.0) -> tuple[float, float, float]:
+    def at(
+        self, along: float, height: float, off: float = 0.0
+    ) -> tuple[float, float, float]:
         """A point ``along`` the wall, ``off`` metres into the room."""
         c, s = math.cos(self.turn), math.sin(self.turn)
         return (self.x + c * along + s * off, self.y + s * along - c * off, height)
@@ -75,7 +77,11 @@ def _shell(stage: Stage, room: Room) -> None:
 def _skirting(stage: Stage, side: Side, height: float) -> None:
     bars = [box(side.length, 0.02, 0.1).shifted((side.length / 2, -0.01, 0))]
     if stage.chance(0.4):
-        bars.append(box(side.length, 0.05, 0.06).shifted((side.length / 2, -0.025, height - 0.06)))
+        bars.append(
+            box(side.length, 0.05, 0.06).shifted(
+                (side.length / 2, -0.025, height - 0.06)
+            )
+        )
     if stage.chance(0.2):
         bars.append(box(side.length, 0.02, 0.05).shifted((side.length / 2, -0.01, 0.9)))
     stage.put(joined(bars), stage.paint.painted(), side.at(0, 0), side.turn)
@@ -110,7 +116,12 @@ def _frame(stage: Stage, x: float, z: float) -> object:
 
 
 def _dress(
-    stage: Stage, side: Side, at: tuple[float, float, float], x: float, z: float, how: float
+    stage: Stage,
+    side: Side,
+    at: tuple[float, float, float],
+    x: float,
+    z: float,
+    how: float,
 ) -> None:
     if how < 0.3:
         props.blinds(stage, at, side.turn, x, z)
@@ -121,8 +132,12 @@ def _dress(
             spot = (at[0] + c * off + s * 0.12, at[1] + s * off - c * 0.12, 0.05)
             props.curtain(stage, spot, side.turn, x * 0.4, at[2] + z + 0.1)
     elif how < 0.75:
-        stage.put(sheet(x, z).rotated("x", math.pi / 2).shifted((0, 0.1, z / 2)),
-                  stage.paint.pane(), at, side.turn)
+        stage.put(
+            sheet(x, z).rotated("x", math.pi / 2).shifted((0, 0.1, z / 2)),
+            stage.paint.pane(),
+            at,
+            side.turn,
+        )
 
 
 def _furnish(stage: Stage, room: Room) -> None:
@@ -136,15 +151,30 @@ def _furnish(stage: Stage, room: Room) -> None:
     _seats(stage, room)
     for side in room.sides():
         if stage.chance(0.45):
-            props.shelf(stage, side.at(rng.uniform(0.7, side.length - 0.7), 0, 0.02), side.turn,
-                        rng.uniform(0.6, 1.6), rng.uniform(0.8, 2.1))
+            props.shelf(
+                stage,
+                side.at(rng.uniform(0.7, side.length - 0.7), 0, 0.02),
+                side.turn,
+                rng.uniform(0.6, 1.6),
+                rng.uniform(0.8, 2.1),
+            )
     if stage.chance(0.35):
-        props.stairs(stage, room.spot(stage, 1.2), turned(rng), rng.randint(5, 12), rng.uniform(0.8, 1.2))
+        props.stairs(
+            stage,
+            room.spot(stage, 1.2),
+            turned(rng),
+            rng.randint(5, 12),
+            rng.uniform(0.8, 1.2),
+        )
     for _ in range(rng.randint(2, 10)):
         props.small_thing(stage, room.spot(stage), rng.uniform(0.1, 0.8), 0.4)
     if stage.chance(0.4):
-        stage.put(box(rng.uniform(1, 3), rng.uniform(1, 2.5), 0.012), stage.paint.cloth(),
-                  room.spot(stage, 1.2), turned(rng))
+        stage.put(
+            box(rng.uniform(1, 3), rng.uniform(1, 2.5), 0.012),
+            stage.paint.cloth(),
+            room.spot(stage, 1.2),
+            turned(rng),
+        )
     if stage.chance(0.5):
         props.plant(stage, room.spot(stage), rng.uniform(0.5, 1.6))
 
@@ -154,9 +184,26 @@ def _seats(stage: Stage, room: Room) -> None:
     for _ in range(stage.rng.randint(2, 7)):
         props.chair(stage, room.spot(stage), turned(stage.rng), seat, frame)
     for _ in range(stage.rng.randint(0, 3)):
-        stage.model(stage.rng.uniform(0.7, 1.8), room.spot(stage, 0.8), turned(stage.rng), (
-            "sofa", "Sofa", "Chair", "cabinet", "table", "stool", "bookshelf", "bed", "Lamp",
-            "chest", "barrel", "keg", "library"))
+        stage.model(
+            stage.rng.uniform(0.7, 1.8),
+            room.spot(stage, 0.8),
+            turned(stage.rng),
+            (
+                "sofa",
+                "Sofa",
+                "Chair",
+                "cabinet",
+                "table",
+                "stool",
+                "bookshelf",
+                "bed",
+                "Lamp",
+                "chest",
+                "barrel",
+                "keg",
+                "library",
+            ),
+        )
 
 
 def _classroom(stage: Stage, room: Room) -> None:
@@ -182,8 +229,10 @@ def _decorate(stage: Stage, room: Room) -> None:
             kind = props.picture if stage.chance(0.75) else props.plaque
             kind(stage, spot, side.turn, x, z)
     if stage.chance(0.25):
-        beams = [rod((x, -room.y / 2, room.z - 0.1), (x, room.y / 2, room.z - 0.1), 0.06)
-                 for x in (-room.x / 4, 0, room.x / 4)]
+        beams = [
+            rod((x, -room.y / 2, room.z - 0.1), (x, room.y / 2, room.z - 0.1), 0.06)
+            for x in (-room.x / 4, 0, room.x / 4)
+        ]
         stage.put(joined(beams), stage.paint.wood())
 
 
@@ -201,24 +250,47 @@ def _light(stage: Stage, room: Room) -> None:
         at = room.spot(stage, 0.6)
         top = (at[0], at[1], room.z - 0.02)
         if kind < 0.3:
-            lighting.pendant(stage, top, rng.uniform(0.4, 1.0), volume * rng.uniform(1, 4))
+            lighting.pendant(
+                stage, top, rng.uniform(0.4, 1.0), volume * rng.uniform(1, 4)
+            )
         elif kind < 0.55:
-            lighting.floor_lamp(stage, at, rng.uniform(0.5, 1.6), volume * rng.uniform(0.5, 2))
+            lighting.floor_lamp(
+                stage, at, rng.uniform(0.5, 1.6), volume * rng.uniform(0.5, 2)
+            )
         elif kind < 0.75:
             lighting.tube_light(stage, top, 1.2, turned(rng))
         else:
-            lighting.area(stage, top, (at[0], at[1], 0), 0.6, volume * rng.uniform(2, 6), (1, 1, 1))
+            lighting.area(
+                stage,
+                top,
+                (at[0], at[1], 0),
+                0.6,
+                volume * rng.uniform(2, 6),
+                (1, 1, 1),
+            )
     # A weak fill keeps corners from being pure noise.
-    lighting.area(stage, (0, 0, room.z - 0.03), (0, 0, 0), min(room.x, room.y) * 0.8,
-                  volume * rng.uniform(0.3, 3), props.tone(stage))
+    lighting.area(
+        stage,
+        (0, 0, room.z - 0.03),
+        (0, 0, 0),
+        min(room.x, room.y) * 0.8,
+        volume * rng.uniform(0.3, 3),
+        props.tone(stage),
+    )
 
 
 def _views(stage: Stage, room: Room) -> None:
     rng = stage.rng
     for _ in range(6):
         x, y = room.x / 2 - 0.3, room.y / 2 - 0.3
-        corner = (rng.choice((-1, 1)) * x * rng.uniform(0.4, 1),
-                  rng.choice((-1, 1)) * y * rng.uniform(0.4, 1), rng.uniform(0.5, 1.8))
-        there = (-corner[0] * rng.uniform(-0.3, 0.9), -corner[1] * rng.uniform(0, 0.9),
-                 rng.uniform(0.3, 1.5))
+        corner = (
+            rng.choice((-1, 1)) * x * rng.uniform(0.4, 1),
+            rng.choice((-1, 1)) * y * rng.uniform(0.4, 1),
+            rng.uniform(0.5, 1.8),
+        )
+        there = (
+            -corner[0] * rng.uniform(-0.3, 0.9),
+            -corner[1] * rng.uniform(0, 0.9),
+            rng.uniform(0.3, 1.5),
+        )
         stage.look(corner, there, rng.choice((20, 24, 28, 35, 50)))

@@ -12,8 +12,15 @@ from . import clutter, dark, outdoor, rooms, still
 from .assets import Library
 from .stage import Stage, View, aim
 
-VERSION = 1  # of the recipes; written into every data file
-FRAMES = ((1920, 1080), (1920, 1080), (1920, 1080), (1920, 1280), (1440, 1920), (1920, 816))
+VERSION = 2  # of the recipes; written into every data file
+FRAMES = (
+    (1920, 1080),
+    (1920, 1080),
+    (1920, 1080),
+    (1920, 1280),
+    (1440, 1920),
+    (1920, 816),
+)
 RECIPES = {
     "room": (rooms.build, 5),
     "still": (still.build, 3),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -66,7 +67,7 @@ class Stage:
     def model(
         self, size: float, at: Point, turn: float, words: tuple[str, ...] = ()
     ) -> bpy.types.Object | None:
-        """A model of the library (whose name has one of ``words``) standing at ``at``."""
+        """A model (whose name has one of ``words``) standing at ``at``."""
         if self.library is None:
             return None
         paths = [
@@ -75,16 +76,15 @@ class Stage:
             if not words or any(word in path.name for word in words)
         ]
         path = self.rng.choice(paths or list(self.library.models))
-        base = self._imported(path)
-        # The first one is a pattern of unit size, kept out of the picture's way.
-        base = copied(base)
+        base = copied(self._imported(path))
         base.location, base.rotation_euler[2] = at, turn
         base.scale = (size, size, size)
         return base
 
-    def _imported(self, path) -> bpy.types.Object:
+    def _imported(self, path: Path) -> bpy.types.Object:
         if path.name not in self.models:
             base = import_model(path, 1.0)
+            # The first one is only copied: it stays out of the picture's way.
             base.location = (0, 0, -500)
             self.models[path.name] = base
             self.library.note(path)
