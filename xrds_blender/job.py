@@ -54,15 +54,20 @@ class RenderJob:
 
     @classmethod
     def of(cls, settings: Any) -> RenderJob:
-        """The job that a scene's `xrds` settings describe."""
+        """The job that a scene's `xrds` settings and the preferences describe."""
+        from .preferences import machine
+
+        here = machine()
         return cls(
             scale=int(settings.scale),
             guide_samples=settings.guide_samples,
             guides=settings.guides,
             preset=settings.preset,
-            device=settings.device,
+            device=here.device if settings.device == "auto" else settings.device,
             exposure=settings.exposure if settings.use_exposure else None,
             plain=settings.plain,
+            memory_limit=here.memory_limit,
+            weights=here.weights,
         )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import bpy
 
+from . import cycles_session, low_camera, plan
 from .operators import ENGINE, XRDS_OT_render
 
 
@@ -62,20 +63,29 @@ class XRDS_PT_advanced(bpy.types.Panel):
 
 
 def summary(scene: bpy.types.Scene) -> list[str]:
-    """What the render will do, one line each."""
-    settings, render = scene.xrds, scene.render
+    """What the render will do and leave out, one line each."""
+    settings = scene.xrds
     if settings.plain:
         return ["Plain: one full-resolution Cycles render, no network"]
-    scale = int(settings.scale)
+    decisions = plan.decide(_facts(scene))
+    return [f"{d.decision.capitalize()}: {d.value}" for d in decisions]
+
+
+def _facts(scene: bpy.types.Scene) -> plan.Facts:
+    """What can be told before a render, from the scene as it stands."""
     width, height = (
-        size * render.resolution_percentage // 100
-        for size in (render.resolution_x, render.resolution_y)
+        size * scene.render.resolution_percentage // 100
+        for size in (scene.render.resolution_x, scene.render.resolution_y)
     )
-    low = f"{-(-width // scale)} × {-(-height // scale)}"
-    return [
-        f"Cycles renders {low} at {scene.cycles.samples} samples",
-        f"Guides: {width} × {height} at {settings.guide_samples} samples",
-    ]
+    return plan.Facts(
+        scale=int(scene.xrds.scale),
+        width=width,
+        height=height,
+        guides=scene.xrds.guides,
+        max_bounces=scene.cycles.max_bounces,
+        has_denoiser=cycles_session.has_denoiser(),
+        exact_camera=scene.camera is None or low_camera.is_exact(scene.camera.data),
+    )
 
 
 def _cycles_classes(base: Any = None) -> Iterator[Any]:

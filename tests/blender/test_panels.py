@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 import pytest
 
 import xrds_blender
 from xrds_blender import operators, panels, preferences
+from xrds_blender.job import RenderJob
 
 
 @pytest.fixture(autouse=True)
@@ -67,13 +70,14 @@ def test_panel_draws_every_property_it_names() -> None:
     assert {"use_exposure", "exposure"} <= set(drawn.layout.drawn)
 
 
-@pytest.mark.parametrize(("scale", "low"), [("2", "683 × 384"), ("8", "171 × 96")])
+@pytest.mark.parametrize(("scale", "low"), [("2", "683x384"), ("8", "171x96")])
 def test_summary_tells_the_low_size(scale: str, low: str) -> None:
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 1366, 768
     scene.render.resolution_percentage = 100
     scene.xrds.scale = scale
-    assert low in panels.summary(scene)[0]
+    assert f"Low frame: {low}" in panels.summary(scene)
+    assert "Guide bounces: 4, none diffuse" in panels.summary(scene)
     scene.xrds.plain = True
     assert "no network" in panels.summary(scene)[0]
 
@@ -85,3 +89,30 @@ def test_operator_needs_a_camera() -> None:
 
 def test_machine_without_add_on_has_defaults() -> None:
     assert preferences.machine() == preferences.Machine()
+
+
+def test_job_takes_the_preferences(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = preferences.Machine("cuda:1", 1 << 30, Path("folder"))
+    monkeypatch.setattr(preferences, "machine", lambda: here)
+    settings = bpy.context.scene.xrds
+    job = RenderJob.of(settings)
+    assert (job.device, job.memory_limit, job.weights) == (
+        here.device,
+        here.memory_limit,
+        here.weights,
+    )
+    settings.device = "cpu"  # the scene's own choice goes before
+    assert RenderJob.of(settings).device == "cpu"
+
+
+def test_operator_keeps_the_engine() -> None:
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x = scene.render.resolution_y = 16
+    scene.cycles.samples = 1
+    scene.xrds.plain = True
+    used: list[str] = []
+    bpy.app.handlers.render_init.append(lambda s, *_: used.append(s.render.engine))
+    assert bpy.ops.xrds.render() == {"FINISHED"}
+    assert used == ["XRDS"]
+    assert scene.render.engine == "CYCLES"
