@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import bpy
@@ -94,6 +97,28 @@ def test_resolution_is_the_one_asked_for(folder: Path) -> None:
     done = xrds(folder, line)
     assert done.returncode == 0, done.stderr
     assert Image.open(folder / "r.png").size == (50, 34)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send")
+def test_interrupt_ends_a_render_at_once(folder: Path) -> None:
+    line = "render scene.blend -o i.exr --plain --samples 1000000"
+    with subprocess.Popen(
+        [sys.executable, "-m", "xrds_blender.cli", *line.split()],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+    ) as child:
+        assert child.stdout is not None
+        while "Sample" not in child.stdout.readline():
+            assert child.poll() is None
+        start = time.perf_counter()
+        child.send_signal(signal.SIGINT)
+        _, err = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert time.perf_counter() - start < 20
+    assert err.endswith("xrds: interrupted\n")
+    assert not (folder / "i.exr").exists()
 
 
 @pytest.mark.parametrize(
