@@ -139,6 +139,7 @@ def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
         presets=options.preset,
         guides=options.guides,
         timing=options.timing,
+        timing_scenes=options.timing_scenes,
         out=options.out,
         weights=options.weights,
         progress=_progress,
@@ -264,6 +265,7 @@ def _add_evaluate(commands: Any) -> argparse.ArgumentParser:
     add("--preset", type=_names(PRESETS), default=("fast",), help="as fast,balanced")
     add("--guides", type=_names(GUIDES), default=("fast",), help="as fast,full")
     add("--timing", action="store_true", help="also time whole frames")
+    add("--timing-scenes", type=_parts, help="of these alone, as bmw27,house")
     add("--weights", type=Path, help="folder of weights files")
     add("--out", type=Path, help="folder for results.json")
     command.set_defaults(work=_evaluate, lines=lambda _: ())
@@ -309,6 +311,10 @@ def _factor(text: str) -> float:
 
 def _integers(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in text.split(","))
+
+
+def _parts(text: str) -> tuple[str, ...]:
+    return tuple(text.split(","))
 
 
 def _names(known: Sequence[str]) -> Callable[[str], tuple[str, ...]]:

@@ -167,6 +167,8 @@ def test_weights_and_whole_frames(world: World) -> None:
     assert record["frame_seconds"]["oidn_equal_time"]["samples"] >= 1
 
 
-def test_unknown_guides_are_refused(world: World) -> None:
+def test_unknown_names_are_refused(world: World) -> None:
     with pytest.raises(UsageError, match="noisy"):
         world.run(guides=["noisy"])
+    with pytest.raises(UsageError, match="boat"):
+        world.run(timing=True, timing_scenes=["floor", "boat"])

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core import exr, metrics
 from xrds_core.atomic import replacing
+from xrds_core.errors import UsageError
 
 from . import table
 from .contenders import Contenders, Settings
@@ -60,7 +61,11 @@ def evaluate(
     chosen = Settings(tuple(scales), tuple(presets), tuple(guides), **settings)
     contenders = Contenders(chosen, Folder(cache), weights, progress or _silent)
     records: list[dict[str, Any]] = []
-    for shot in find_shots(scenes, windows, references):
+    shots = find_shots(scenes, windows, references)
+    absent = set(timing_scenes or ()) - {shot.name for shot in shots}
+    if absent:
+        raise UsageError(f"{sorted(absent)} cannot be timed: not among the scenes")
+    for shot in shots:
         timed = timing and (timing_scenes is None or shot.name in timing_scenes)
         frame = FrameSeconds(shot, contenders, timing_rounds) if timed else None
         for case in chosen.cases:
