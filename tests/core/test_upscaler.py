@@ -1,6 +1,8 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -200,6 +202,18 @@ def test_poison_in_everything_gives_finite_light(fast: Upscaler, value: float) -
     assert result.bad_pixels == (6 if bad else 2 if value < 0.0 else 0)
 
 
+@pytest.mark.parametrize("value", [np.nan, -100.0, 3.4e38])
+def test_poison_reaches_no_farther_than_the_network_sees(
+    fast: Upscaler, value: float
+) -> None:
+    clean, spoilt = picture(8, 180), picture(8, 180)
+    for x in spoilt:
+        x[2:4, 2] = value
+    first, second = (fast(*x, exposure=0.1).radiance for x in (clean, spoilt))
+    assert not np.array_equal(first[:, :8], second[:, :8])
+    np.testing.assert_array_equal(first[:, 320:], second[:, 320:])
+
+
 @pytest.mark.parametrize("value", POISON)
 def test_constant_poison_gives_finite_light(fast: Upscaler, value: float) -> None:
     sizes = ((6, 5), (12, 10), (12, 10))
@@ -295,6 +309,37 @@ def test_a_memory_limit_makes_tiles(fast: Upscaler) -> None:
     assert whole.tiles == 1
     assert tiled.tiles == 4
     assert range_error(tiled.radiance, whole.radiance, whole.exposure) < 1e-3
+
+
+MEASURE = """
+import sys
+import numpy as np
+from xrds_core.network import XRDS, preset_config
+from xrds_core.upscaler import Upscaler
+
+def status(key):
+    lines = open("/proc/self/status").read().splitlines()
+    return 1024 * int(next(x for x in lines if x.startswith(key)).split()[1])
+
+made = Upscaler(device="cpu", weights=XRDS(preset_config("fast", 2)))
+low, high = np.ones((320, 320, 3), np.float32), np.ones((640, 640, 3), np.float32)
+made(low[:8, :8], high[:16, :16], high[:16, :16])  # what is loaded once
+open("/proc/self/clear_refs", "w").write("5")
+before = status("VmRSS")
+result = made(low, high, high, memory_limit=int(sys.argv[1])).radiance
+print(status("VmHWM") - before - result.nbytes)
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_memory_limit_is_kept() -> None:
+    def peak(limit: int) -> int:
+        command = [sys.executable, "-c", MEASURE, str(limit)]
+        done = subprocess.run(command, capture_output=True, check=True, text=True)
+        return int(done.stdout)
+
+    limit = 100 << 20
+    assert peak(limit) < limit < peak(limit * 100)
 
 
 def test_the_cost_per_pixel_is_that_of_larger_pictures(fast: Upscaler) -> None:

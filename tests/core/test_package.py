@@ -1,0 +1,24 @@
+from __future__ import annotations
+
+import pytest
+
+import xrds_core
+from xrds_core import errors
+
+
+def test_every_public_name_is_there() -> None:
+    for name in xrds_core.__all__:
+        assert callable(getattr(xrds_core, name))
+        assert name in dir(xrds_core)
+
+
+def test_other_names_are_not() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'downscale'"):
+        _ = xrds_core.downscale
+
+
+def test_all_errors_can_be_caught_as_one() -> None:
+    found = [x for x in vars(errors).values() if isinstance(x, type)]
+    assert len(found) > 4
+    assert all(issubclass(error, xrds_core.XRDSError) for error in found)
+    assert str(errors.Cancelled()) == "cancelled"
