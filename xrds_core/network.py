@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
@@ -98,6 +98,11 @@ class NetworkConfig:
     def guide_count(self) -> int:
         """Channels of the guide stack that `XRDS.forward` is given: 6 or 9."""
         return 9 if self.guides == "full" else 6
+
+    @property
+    def source_count(self) -> int:
+        """Pictures that the base is gathered from, see `find_sources`; 1 without."""
+        return self.guide_count // 3 if self.base else 1
 
     @property
     def low_multiple(self) -> int:
@@ -392,6 +397,34 @@ class Deshuffle(nn.Sequential):
 # --- tails ----------------------------------------------------------------------------
 
 
+class Source(NamedTuple):
+    """Linear radiance that kernels gather at low resolution, and its full-size factor."""
+
+    low: Tensor  # (B, 3, h, w)
+    modulator: Tensor  # (B, 3 or 1, H, W)
+
+
+Sources = list[Source]
+
+
+def find_sources(radiance: Tensor, guides: Tensor, scale: int) -> Sources:
+    """The radiance as it is, and demodulated by each guide that can modulate it.
+
+    `radiance` (B, 3, h, w) is in the transfer domain. The division is by the area mean
+    of the modulator, so that modulating again keeps the mean of the low-resolution
+    pixel.
+    """
+    low = torch.expm1(radiance.float())
+    guides = guides.float()
+    sources = [Source(low, torch.ones_like(guides[:, :1]))]
+    modulators = [guides[:, :3] + ALBEDO_EPSILON]
+    if guides.shape[1] > 6:
+        modulators.append(torch.expm1(guides[:, 6:9]) + RADIANCE_EPSILON)
+    for modulator in modulators:
+        sources.append(Source(low / F.avg_pool2d(modulator, scale), modulator))
+    return sources
+
+
 class PixelTail(nn.Module):
     """The paper's: pixel shuffle by 2, step by step, then the picture itself."""
 
@@ -403,7 +436,7 @@ class PixelTail(nn.Module):
             layers += [conv3(c, 4 * c), nn.PixelShuffle(2)]
         self.layers = nn.Sequential(*layers, conv3(c, 3))
 
-    def forward(self, features: Tensor, radiance: Tensor, guides: Tensor) -> Tensor:
+    def forward(self, features: Tensor, guides: Tensor, sources: Sources) -> Tensor:
         return self.layers(features)
 
 
@@ -430,54 +463,55 @@ def bilinear_logits(scale: int) -> Tensor:
 class KernelTail(nn.Module):
     """The demodulated base, its kernels predicted.
 
-    Every output pixel is a convex combination of its 3x3 low-resolution neighbours: of
-    their radiance, and of their radiance divided by a modulator's area mean and
-    multiplied by the modulator at the pixel. The modulators are the albedo and, with
-    `full` guides, the full-resolution radiance. A gain, bounded by `GAIN_LIMIT`, scales
-    the result. So nothing rings, turns negative or becomes coloured by itself. Kernels
-    start from bilinear weights and fall with the distance between guides, as a joint
-    bilateral filter's, as fast as the network asks; untrained, they are bilinear on the
-    demodulated radiance.
+    Every output pixel is a convex combination of its 3x3 low-resolution neighbours in
+    every source: the radiance as it is, and demodulated by the albedo and, with `full`
+    guides, by the full-resolution radiance, then modulated at the pixel. A gain,
+    bounded by `GAIN_LIMIT`, scales the result. So nothing rings, turns negative or
+    becomes coloured by itself. Kernels start from bilinear weights and fall with the
+    distance between guides, as a joint bilateral filter's, as fast as the network asks;
+    untrained, they are bilinear on the demodulated radiance.
     """
 
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         self.scale, self.cell = config.scale, config.cell
-        self.modulators = 2 if config.guides == "full" else 1
-        width = config.tail_channels
+        width, sources = config.tail_channels, config.source_count
         self.expand = conv3(config.channels, width * config.cell**2)
-        self.mix = conv3(width + config.guide_count, width)
-        # per pixel: logits of each candidate, sharpness by albedo and by normal, gain
-        self.predict = nn.Conv2d(width, 9 * (self.modulators + 1) + 3, 1)
+        self.mix = conv3(width + config.guide_count + 3 * sources, width)
+        # per pixel: logits of each source, sharpness by albedo and by normal, gain
+        self.predict = nn.Conv2d(width, 9 * sources + 3, 1)
         for parameter in self.predict.parameters():
             nn.init.zeros_(parameter)
-        prior = torch.tensor([-4.0] + [0.0] * self.modulators)  # plain radiance, others
+        prior = torch.tensor([-4.0] + [0.0] * (sources - 1))  # plain radiance, others
         logits = prior[:, None, None] + bilinear_logits(config.scale)
         self.prior: Tensor
         self.register_buffer("prior", logits, persistent=False)
 
-    def forward(self, features: Tensor, radiance: Tensor, guides: Tensor) -> Tensor:
+    def forward(self, features: Tensor, guides: Tensor, sources: Sources) -> Tensor:
         x = F.pixel_shuffle(self.expand(features), self.cell)
-        x = F.relu(self.mix(torch.cat((x, guides.to(x)), dim=1)))
+        bases = [torch.log1p(self.bilinear(source)) for source in sources]
+        x = F.relu(self.mix(torch.cat((x, guides, *bases), dim=1)))
         x = F.pixel_unshuffle(self.predict(x), self.scale)
         # sums over radiance need float32, whatever the precision of the layers above
-        return torch.log1p(self.combine(x.float(), radiance.float(), guides.float()))
+        return torch.log1p(self.combine(x.float(), guides.float(), sources))
 
-    def combine(self, predicted: Tensor, radiance: Tensor, guides: Tensor) -> Tensor:
-        s2 = self.scale**2
-        predicted = predicted.unflatten(1, (-1, s2))  # (B, n, s*s, h, w)
+    def bilinear(self, source: Source) -> Tensor:
+        size = source.modulator.shape[-2:]
+        return F.interpolate(source.low, size=size, mode="bilinear") * source.modulator
+
+    def combine(self, predicted: Tensor, guides: Tensor, sources: Sources) -> Tensor:
+        predicted = predicted.unflatten(1, (-1, self.scale**2))  # (B, n, s*s, h, w)
         kernels = self.kernels(predicted, guides)
-        low = torch.expm1(radiance)
-        out = self.gather(kernels[:, 0], low)
-        for m, modulator in enumerate(self.modulations(guides)):
-            demodulated = low / F.avg_pool2d(modulator, self.scale)
-            cells = F.pixel_unshuffle(modulator, self.scale).unflatten(1, (3, s2))
-            out = out + self.gather(kernels[:, m + 1], demodulated) * cells
+        out = torch.zeros((), device=guides.device)
+        for m, source in enumerate(sources):
+            cells = F.pixel_unshuffle(source.modulator, self.scale)
+            cells = cells.unflatten(1, (-1, self.scale**2))
+            out = out + self.gather(kernels[:, m], source.low) * cells
         gain = torch.exp(math.log(GAIN_LIMIT) * torch.tanh(predicted[:, -1:]))
         return F.pixel_shuffle((out * gain).flatten(1, 2), self.scale)
 
     def kernels(self, predicted: Tensor, guides: Tensor) -> Tensor:
-        """Softmax over all candidates: (B, 1 + modulators, 9, s*s, h, w)."""
+        """Softmax over the neighbours of all sources: (B, sources, 9, s*s, h, w)."""
         logits = predicted[:, :-3].unflatten(1, (-1, 9)) + self.prior[..., None, None]
         distance = torch.zeros_like(logits[:, 0])
         for channel, guide in ((-3, guides[:, :3]), (-2, guides[:, 3:6])):
@@ -491,12 +525,6 @@ class KernelTail(nn.Module):
         cells = F.pixel_unshuffle(guide, self.scale).unflatten(1, (3, -1))
         means = neighbours(F.avg_pool2d(guide, self.scale))
         return torch.stack([(cells - mean).square().sum(1) for mean in means], dim=1)
-
-    def modulations(self, guides: Tensor) -> list[Tensor]:
-        modulations = [guides[:, :3] + ALBEDO_EPSILON]
-        if self.modulators == 2:
-            modulations.append(torch.expm1(guides[:, 6:9]) + RADIANCE_EPSILON)
-        return modulations
 
     @staticmethod
     def gather(kernel: Tensor, low: Tensor) -> Tensor:
@@ -519,7 +547,7 @@ class XRDS(nn.Module):
         steps = int(math.log2(config.cell // config.guide_stride))
         inputs = len(GUIDE_CHANNELS[config.guides]) or config.guide_count
         self.radiance_head = nn.Sequential(
-            nn.PixelUnshuffle(fold), conv3(3 * fold**2, c)
+            nn.PixelUnshuffle(fold), conv3(3 * config.source_count * fold**2, c)
         )
         self.guide_head = nn.Sequential(
             nn.PixelUnshuffle(config.guide_stride),
@@ -553,8 +581,12 @@ class XRDS(nn.Module):
         if guides.shape[1:] != expected:
             raise ValueError(f"guides are {tuple(guides.shape[1:])}, not {expected}")
         radiance, guides = self.pad(radiance, 1), self.pad(guides, s)
+        sources: Sources = []
+        if self.config.base:
+            sources = find_sources(radiance, guides, s)
+            radiance = torch.cat([torch.log1p(x.low) for x in sources], dim=1)
         features = self.features(radiance, guides)
-        return self.tail(features, radiance, guides)[..., : s * h, : s * w]
+        return self.tail(features, guides, sources)[..., : s * h, : s * w]
 
     def features(self, radiance: Tensor, guides: Tensor) -> Tensor:
         """The transformer: (B, C, cells, cells)."""
