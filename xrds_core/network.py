@@ -398,7 +398,7 @@ class Deshuffle(nn.Sequential):
 
 
 class Source(NamedTuple):
-    """Linear radiance that kernels gather at low resolution, and its full-size factor."""
+    """Linear radiance for kernels to gather, and what then multiplies it."""
 
     low: Tensor  # (B, 3, h, w)
     modulator: Tensor  # (B, 3 or 1, H, W)
@@ -416,13 +416,11 @@ def find_sources(radiance: Tensor, guides: Tensor, scale: int) -> Sources:
     """
     low = torch.expm1(radiance.float())
     guides = guides.float()
-    sources = [Source(low, torch.ones_like(guides[:, :1]))]
+    plain = Source(low, torch.ones_like(guides[:, :1]))
     modulators = [guides[:, :3] + ALBEDO_EPSILON]
     if guides.shape[1] > 6:
         modulators.append(torch.expm1(guides[:, 6:9]) + RADIANCE_EPSILON)
-    for modulator in modulators:
-        sources.append(Source(low / F.avg_pool2d(modulator, scale), modulator))
-    return sources
+    return [plain, *(Source(low / F.avg_pool2d(m, scale), m) for m in modulators)]
 
 
 class PixelTail(nn.Module):
