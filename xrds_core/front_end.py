@@ -28,7 +28,7 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec.709
 
 _MOST_BINS = 16  # along each axis
 _DARKEST_BIN = 1e-4  # of the brightest; darker bins say nothing of the exposure
-_LARGEST = np.finfo(np.float32).max
+_LARGEST = np.float32(3.4e38)  # blended tiles may round up and stay finite
 # Of k e x: its square, over the epsilons that networks divide by, is a float32 still.
 _LARGEST_EXPOSED = 1e18
 _LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32

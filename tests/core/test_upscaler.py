@@ -342,6 +342,15 @@ def test_a_memory_limit_is_kept() -> None:
     assert peak(limit) < limit < peak(limit * 100)
 
 
+def test_the_brightest_tiles_are_blended_without_overflow(fast: Upscaler) -> None:
+    sizes = ((150, 8), (300, 16), (300, 16))
+    brightest = (np.full((*size, 3), 3.4e38, np.float32) for size in sizes)
+    result = fast(*brightest, exposure=1e-36, tile=1)
+    assert result.tiles > 1
+    assert np.isfinite(result.radiance).all()
+    assert result.radiance.max() > 1e38
+
+
 def test_the_cost_per_pixel_is_that_of_larger_pictures(fast: Upscaler) -> None:
     values = 0
 
