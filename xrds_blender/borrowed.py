@@ -45,6 +45,10 @@ class Borrowed:
             owner, name, value = self._old.pop()
             setattr(owner, name, value)
 
+    def forget(self) -> None:
+        """Give nothing back: the owners are gone, and touching them would crash."""
+        self._old.clear()
+
 
 class PipelineSettings:
     """The numbers of the running render that Python may not set, set in place.
