@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import bpy
@@ -26,9 +27,12 @@ class XRDSRender(bpy.types.RenderEngine):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.session = None
+        self.most_samples = 0
 
     def __del__(self) -> None:
-        cycles_session.free(self)
+        # Blender may have taken its half of the object away already.
+        with suppress(ReferenceError):
+            cycles_session.free(self)
 
     def update_render_passes(self, scene: Any, layer: Any) -> None:
         cycles_session.functions().register_passes(self, scene, layer)

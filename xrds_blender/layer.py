@@ -51,6 +51,7 @@ def _plain(
             clock = cycles_session.run(engine, depsgraph)
         finally:
             if not keeps:
+                borrowed.forget()  # Cycles frees the evaluated scene as it syncs
                 cycles_session.free(engine)
     _stop_if_cancelled(engine)
     seconds |= {"sync": clock.sync, "beauty": clock.render}
@@ -82,19 +83,12 @@ def _enlarged(
     name = depsgraph.view_layer_eval.name
     with CyclesPasses(engine, depsgraph) as passes:
         decisions = plan.decide(_facts(depsgraph, job, passes))
-        guide_seed = None if job.seed is None else job.seed + 1
-        engine.update_stats("XRDS", "Rendering low resolution")
-        beauties = passes.beauties(job.scale, job.samples, seed=job.seed)
-        exposure = job.exposure or passes.border_exposure()
-        engine.update_stats("XRDS", "Rendering guides")
-        guides = passes.guides_by_view(
-            job.guide_samples, full=job.guides == "full", seed=guide_seed
-        )
+        beauties, guides, exposure = _passes(engine, job, passes)
     first = passes.views[0]
-    for stage in (beauties[first].seconds, guides[first].seconds):
-        for key, value in stage.items():
-            seconds[key] += value
-    decisions += plan.after(beauties[first].seconds["sync"])
+    stages = beauties[first].seconds, guides[first].seconds
+    for key, value in [item for stage in stages for item in stage.items()]:
+        seconds[key] += value
+    decisions += plan.after(max(stage["sync"] for stage in stages))
     started = time.perf_counter()
     pictures = {
         view: _upscale(engine, upscaler, job, exposure, beauties[view], guides[view])
@@ -116,6 +110,32 @@ def _enlarged(
         decisions,
         peak_memory(),
     )
+
+
+def _passes(
+    engine: Any, job: RenderJob, passes: CyclesPasses
+) -> tuple[dict[str, Beauty], dict[str, Guides], float | None]:
+    """Render both; the result then holds the guides' data passes at full size."""
+    full = job.guides == "full"
+    seed = None if job.seed is None else job.seed + 1
+
+    def guide() -> dict[str, Guides]:
+        engine.update_stats("XRDS", "Rendering guides")
+        return passes.guides_by_view(job.guide_samples, full=full, seed=seed)
+
+    def beauty() -> tuple[dict[str, Beauty], float | None]:
+        engine.update_stats("XRDS", "Rendering low resolution")
+        low = passes.beauties(job.scale, job.samples, seed=job.seed)
+        return low, job.exposure or passes.border_exposure()
+
+    if not full:
+        low, exposure = beauty()
+        return low, guide(), exposure
+    # Fewer samples first: noise that matters, and one sync all the same.
+    guides, data = guide(), passes.data_passes()
+    low, exposure = beauty()
+    passes.put_back(data)
+    return low, guides, exposure
 
 
 def _facts(depsgraph: Any, job: RenderJob, passes: CyclesPasses) -> plan.Facts:
@@ -172,7 +192,7 @@ def _upscale(
     def tell(done: float) -> bool:
         engine.update_stats("XRDS", f"Network {done:.0%}")
         engine.update_progress(done)
-        return not engine.test_break()
+        return not cycles_session.is_stopped(engine)
 
     picture: Upscaled = upscaler(
         np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1),
@@ -219,7 +239,7 @@ def _bilinear(
 
 
 def _stop_if_cancelled(engine: Any) -> None:
-    if engine.test_break():
+    if cycles_session.is_stopped(engine):
         raise Cancelled
 
 

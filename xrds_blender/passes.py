@@ -43,6 +43,10 @@ LIGHT_PASSES = frozenset(
 )
 
 
+def _is_light(name: str) -> bool:
+    return name in LIGHT_PASSES or name.startswith("Combined_")
+
+
 @dataclass(frozen=True)
 class Beauty:
     """The low-resolution radiance (h, w, 3), premultiplied, and alpha (h, w).
@@ -205,9 +209,22 @@ class CyclesPasses:
         with Borrowed() as borrowed:
             set_sampling(borrowed, self._scene, OVERVIEW_SAMPLES, None)
             set_denoising(borrowed, self._scene, self._layer_eval, False, None)
-            self._run_low(borrowed, LowGrid(self.frame, scale, whole, exact=True))
+            grid = LowGrid(self.frame, scale, whole, exact=True)
+            self._run_low(borrowed, grid, exact=False)
         picture = self._read_corner(self._radiance(self.views[0], False), whole)
         return auto_exposure(np.ascontiguousarray(picture[..., :3]))
+
+    def data_passes(self) -> dict[tuple[str, str], Array]:
+        """All passes by (view, name) but the picture and its light, as they are now."""
+        names = dict.fromkeys(item.name for item in self._layer().passes)
+        kept = [n for n in names if n != COMBINED and not _is_light(n)]
+        found = {(view, n): self._read(n, view) for view in self.views for n in kept}
+        return {key: pixels for key, pixels in found.items() if pixels is not None}
+
+    def put_back(self, passes: dict[tuple[str, str], Array]) -> None:
+        """Write passes that `data_passes` gave into the result again."""
+        for (view, name), pixels in passes.items():
+            cycles_session.write_pass(self._layer(), name, view, pixels)
 
     def guides(
         self,
@@ -221,6 +238,7 @@ class CyclesPasses:
 
         Only mirror and glass bounces are followed, which is all that albedo and normal
         need; `full` keeps every bounce and gives the radiance too, denoised if asked.
+        Beauty and full guides in order of rising samples share one sync of the scene.
         """
         return self.guides_by_view(samples, full=full, denoise=denoise, seed=seed)[
             self.views[0]
@@ -241,7 +259,7 @@ class CyclesPasses:
             set_denoising(borrowed, self._scene, self._layer_eval, denoise, None)
             if not full:
                 set_guide_bounces(borrowed, self._scene)
-            clock = self._run((self.width, self.height), self.region)
+            clock = self._run((self.width, self.height), self.region, exact=full)
         seconds = {"sync": clock.sync, "guides": clock.render}
         return {
             view: self._read_guides(view, full, denoise, seconds) for view in self.views
@@ -259,14 +277,19 @@ class CyclesPasses:
         exact = scale == 1 or is_exact(self._scene.camera.data)
         return LowGrid(self.frame, scale, window, exact)
 
-    def _run_low(self, borrowed: Borrowed, grid: LowGrid) -> cycles_session.StageClock:
+    def _run_low(
+        self, borrowed: Borrowed, grid: LowGrid, *, exact: bool = True
+    ) -> cycles_session.StageClock:
         if grid.scale > 1:
             set_box_filter(borrowed, self._scene, grid.scale)
             for camera in self._cameras():
                 widen(borrowed, camera, self.frame, grid.scale)
-        return self._run(self.frame.low_size(grid.scale), grid.rendered(self._size))
+        size = self.frame.low_size(grid.scale)
+        return self._run(size, grid.rendered(self._size), exact=exact)
 
-    def _run(self, size: tuple[int, int], window: Region) -> cycles_session.StageClock:
+    def _run(
+        self, size: tuple[int, int], window: Region, *, exact: bool
+    ) -> cycles_session.StageClock:
         """Render `window` of a frame of `size` into the lower left of the result."""
         depth = self._pipeline.depth
         with Borrowed() as borrowed:
@@ -284,11 +307,11 @@ class CyclesPasses:
                         / height,
                         border_max_y=min(1.0, (height - window.y + 0.25) / height),
                     )
-                clock = cycles_session.run(self._engine, self._depsgraph)
+                clock = cycles_session.run(self._engine, self._depsgraph, exact=exact)
             finally:
                 self._pipeline.give_back(keep=depth)
         self.peak_memory = max(self.peak_memory, clock.peak)
-        if self._engine.test_break():
+        if cycles_session.is_stopped(self._engine):
             raise Cancelled
         return clock
 
@@ -329,7 +352,7 @@ class CyclesPasses:
     def _light_passes(self, view: str) -> Iterator[tuple[str, Array]]:
         names = dict.fromkeys(item.name for item in self._layer().passes)
         for name in names:
-            if name in LIGHT_PASSES or name.startswith("Combined_"):
+            if _is_light(name):
                 pixels = self._read(name, view)
                 if pixels is not None:
                     yield name, pixels

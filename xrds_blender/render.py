@@ -78,10 +78,15 @@ def render_in(engine: Any, depsgraph: Any) -> None:
     except Cancelled:
         return  # Blender knows: it is who told us
     except XRDSError as error:
-        engine.error_set(str(error))
-    except Exception as error:  # Blender calls: show it instead of a black picture
+        _fail(engine, str(error))
+    except Exception as error:  # Blender calls: show it beside the black picture
         traceback.print_exc()
-        engine.error_set(f"XRDS failed: {type(error).__name__}: {error}")
+        _fail(engine, f"XRDS failed: {type(error).__name__}: {error}")
+
+
+def _fail(engine: Any, message: str) -> None:
+    """One line in Blender's log and reports; nothing is saved then."""
+    engine.report({"ERROR"}, message)
 
 
 def _run(scene: Any, work: Callable[[Any, Any], T], layer: str | None) -> T:
