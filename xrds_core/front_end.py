@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
+from .network import ALBEDO_EPSILON
+
 Picture = NDArray[np.float32]
 ArrayOrTensor = TypeVar("ArrayOrTensor", NDArray[np.float32], Tensor)
 
 TRANSFER_GAIN = 10.0
 EXPOSURE_KEY = 0.18
-ALBEDO_EPSILON = 0.02
 EXPOSURE_RANGE = (1e-36, 1e36)  # times the gain, still a normal float32
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec.709
 

@@ -16,7 +16,7 @@ window, s scale.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
 
 import torch
@@ -119,7 +119,12 @@ class NetworkConfig:
         return cls(**values)
 
 
-PRESETS = ("paper", "balanced", "fast")
+# What differs from the paper in the presets that are the same class, but smaller.
+SMALL_PRESETS: dict[str, dict[str, Any]] = {
+    "balanced": {"groups": 2, "blocks": 2, "channels": 48, "tail_channels": 24},
+    "fast": {"groups": 1, "blocks": 1, "channels": 32, "tail_channels": 16},
+}
+PRESETS = ("paper", *SMALL_PRESETS)
 
 
 def preset_config(preset: str, scale: int, guides: str = "fast") -> NetworkConfig:
@@ -128,34 +133,15 @@ def preset_config(preset: str, scale: int, guides: str = "fast") -> NetworkConfi
     `paper` is the published network. `balanced` and `fast` are the same class with
     smaller numbers, a grid of at most a quarter of the output and the kernel base.
     """
+    paper = NetworkConfig(scale=scale, guides=guides)
     if preset == "paper":
-        return NetworkConfig(scale=scale, guides=guides)
-    small: dict[str, Any] = {
-        "scale": scale,
-        "guides": guides,
-        "cell": max(scale, 4),
-        "guide_stride": max(scale, 4),
-        "base": True,
-    }
-    if preset == "balanced":
-        return NetworkConfig(
-            groups=2,
-            blocks=2,
-            channels=48,
-            guide_channels=48,
-            tail_channels=24,
-            **small,
-        )
-    if preset == "fast":
-        return NetworkConfig(
-            groups=1,
-            blocks=1,
-            channels=32,
-            guide_channels=32,
-            tail_channels=16,
-            **small,
-        )
-    raise ValueError(f"preset is {preset!r}; there are {', '.join(PRESETS)}")
+        return paper
+    if preset not in SMALL_PRESETS:
+        raise ValueError(f"preset is {preset!r}; there are {', '.join(PRESETS)}")
+    sizes = SMALL_PRESETS[preset]
+    width, cell = sizes["channels"], max(scale, 4)
+    grid = {"guide_channels": width, "cell": cell, "guide_stride": cell, "base": True}
+    return replace(paper, **sizes, **grid)
 
 
 def conv3(inputs: int, outputs: int) -> nn.Conv2d:
