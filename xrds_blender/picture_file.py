@@ -90,7 +90,10 @@ def _save_png(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -
         rows = np.dstack((radiance, alpha))[::-1]  # Blender's first row is the lowest
         image.pixels.foreach_set(np.ascontiguousarray(rows, np.float32).ravel())
         with _png_settings(scene):
-            image.save_render(str(path), scene=scene)
+            image.save_render(str(path.resolve()), scene=scene)
+    except RuntimeError as error:
+        reason = " ".join(str(error).removeprefix("Error:").split())
+        raise PictureError(f"Blender cannot save the picture: {reason}") from error
     finally:
         bpy.data.images.remove(image)
 

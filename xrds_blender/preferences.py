@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import dataclass
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +54,8 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
         layout.prop(self, "device")
         layout.prop(self, "memory_limit")
         layout.prop(self, "weights")
+        for line in torch_status():
+            layout.label(text=line, icon="INFO")
 
 
 def machine() -> Machine:
@@ -65,6 +69,15 @@ def machine() -> Machine:
         memory_limit=told.memory_limit * MEBIBYTE or None,
         weights=Path(bpy.path.abspath(told.weights)) if told.weights else None,
     )
+
+
+def torch_status() -> list[str]:
+    """Which PyTorch is used, or how this Blender's Python gets one."""
+    try:
+        return [f"PyTorch {metadata.version('torch')}"]
+    except metadata.PackageNotFoundError:
+        command = f'"{sys.executable}" -m pip install torch safetensors'
+        return ["PyTorch is not there; XRDS can only render plain.", command]
 
 
 def register(package: str) -> None:

@@ -116,3 +116,13 @@ def test_operator_keeps_the_engine() -> None:
     assert bpy.ops.xrds.render() == {"FINISHED"}
     assert used == ["XRDS"]
     assert scene.render.engine == "CYCLES"
+
+
+def test_preferences_tell_how_to_get_torch(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert preferences.torch_status()[0].startswith("PyTorch 2.")
+
+    def missing(name: str) -> str:
+        raise preferences.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(preferences.metadata, "version", missing)
+    assert preferences.torch_status()[1].endswith("-m pip install torch safetensors")
