@@ -166,7 +166,7 @@ def _load(
     except ImportError as error:
         raise XRDSError(
             f"XRDS needs PyTorch, which Blender's Python does not find ({error}): "
-            "install it from the add-on's preferences, or render plain"
+            "the add-on's preferences tell how to install it; or render plain"
         ) from error
     return Upscaler(preset, scale, guides, device, weights=weights)
 
