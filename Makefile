@@ -19,6 +19,7 @@ $(STAMP): pyproject.toml
 
 test: install
 	$(RUN) -m ruff check .
+	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 	$(RUN) tests/run.py
 
