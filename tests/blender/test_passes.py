@@ -161,7 +161,7 @@ def test_a_border_holds_the_pixels_of_the_whole(still_life: Build, crop: bool) -
 
     def job(passes: Any) -> Any:
         scales = (1, 2, 4)
-        beauties = [passes.beauty(s, 256, denoise=False, seed=1) for s in scales]
+        beauties = [passes.beauty(s, 64, denoise=False, seed=1) for s in scales]
         return passes.region, beauties, passes.guides(16, seed=1)
 
     _, whole, guides = run_job(scene, job)
@@ -182,7 +182,7 @@ def test_a_border_holds_the_pixels_of_the_whole(still_life: Build, crop: bool) -
         height, width = part.radiance.shape[:2]
         assert height == -(-(region.height + dy) // scale)
         difference = part.radiance - all_.radiance[y : y + height, x : x + width]
-        assert np.abs(difference).mean() < 0.03, scale
+        assert np.abs(difference).mean() < 0.05, scale
 
 
 def test_what_a_job_raises_reaches_the_caller(still_life: Build) -> None:
@@ -233,13 +233,36 @@ def test_an_unknown_blender_is_refused(
         run_job(scene, lambda passes: passes.width)
 
 
-def test_seconds_tell_sync_from_rendering(still_life: Build) -> None:
+def test_seconds_of_every_stage_are_told(still_life: Build) -> None:
     def job(passes: Any) -> Any:
         return passes.beauty(2, 8, denoise=False).seconds, passes.guides(1).seconds
 
-    first, second = run_job(still_life(96, 72), job)
-    assert first["sync"] > 0
-    assert first["beauty"] > 0
-    assert second["guides"] > 0
-    # The second pass keeps what the first has synced.
-    assert second["sync"] < first["sync"]
+    for seconds in run_job(still_life(96, 72), job):
+        stage = (seconds.keys() & {"beauty", "guides"}).pop()
+        assert seconds["sync"] > 0
+        assert seconds[stage] > 0
+
+
+@pytest.mark.parametrize(("counts", "sessions"), [((2, 2, 8), 1), ((8, 2, 8), 2)])
+def test_a_session_ends_only_when_samples_fall(
+    still_life: Build,
+    monkeypatch: pytest.MonkeyPatch,
+    counts: tuple[int, ...],
+    sessions: int,
+) -> None:
+    cycles, made = cycles_session.functions(), []
+    create = cycles.create
+
+    def counting(*arguments: Any, **options: Any) -> None:
+        made.append(1)
+        create(*arguments, **options)
+
+    monkeypatch.setattr(cycles, "create", counting)
+
+    def job(passes: Any) -> None:
+        for count in counts:
+            passes.beauty(4, count, denoise=False)
+            passes.guides(1)
+
+    run_job(still_life(), job)
+    assert len(made) == sessions
