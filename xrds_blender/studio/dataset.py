@@ -1,7 +1,14 @@
 """The training-set generator: random scenes rendered into small windows.
 
 Every window is rendered by the code the product renders with, at the pixel density of
-a whole frame. One ``.npz`` file per window, see ``Recipe`` and ``_arrays``.
+a whole frame. One ``.npz`` file per window holds, in half precision and row 0 on top,
+
+- ``reference`` (H, W, 3): radiance at full resolution, denoised;
+- ``low{S}_{i}``, ``low{S}_{i}_noisy`` (H / S, W / S, 3): radiance at 1 / S of the size
+  through a box filter, denoised and as rendered, for two sample counts i = 0, 1;
+- ``guides_a``, ``guides_b`` (H, W, 6): albedo and camera-space normal, two seeds;
+- ``guide_radiance_a``, ``guide_radiance_b`` (H, W, 3): one full sample each;
+- ``meta``: a JSON string with seeds, window, sample counts, seconds and assets.
 """
 
 from __future__ import annotations
@@ -12,7 +19,7 @@ import random
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +51,11 @@ class Recipe:
     window: int = 256
     views: int = 2
     windows: int = 2  # of each view
-    reference_samples: int = 20
+    reference_samples: int = 24  # in the training split
+
+    def reference(self, seed: int) -> int:
+        """Samples of a reference; twice as many where checkpoints are compared."""
+        return self.reference_samples * (1 if self.split(seed) == "train" else 2)
 
     def split(self, seed: int) -> str:
         """``train`` or ``validation``, by the scene's number alone."""
@@ -55,31 +66,27 @@ class Recipe:
         return self.out / self.split(seed) / f"{seed:06d}_{index:02d}.npz"
 
 
-@dataclass
+@dataclass(frozen=True)
 class Samples:
-    """The sample counts of one window, drawn from its number."""
+    """The sample counts of one window, and the dice for the seeds of its renders."""
 
     rng: random.Random
-    low: dict[tuple[int, int], int] = field(init=False)
-    guides: tuple[int, int] = field(init=False)
+    low: dict[tuple[int, int], int]  # by scale and quality, 0 or 1
+    guides: tuple[int, int]
+    reference: int
 
     LOW = ((4, 16), (16, 32))
     GUIDES = (1, 8)
 
     @classmethod
-    def drawn(cls, rng: random.Random, scales: Sequence[int]) -> Samples:
+    def drawn(
+        cls, rng: random.Random, scales: Sequence[int], reference: int
+    ) -> Samples:
         """Log-uniform counts for each scale and each of the two qualities."""
-        samples = cls(rng)
-        samples.low = {
-            (scale, i): _log_uniform(rng, *cls.LOW[i])
-            for scale in scales
-            for i in (0, 1)
-        }
-        samples.guides = (
-            _log_uniform(rng, *cls.GUIDES),
-            _log_uniform(rng, *cls.GUIDES),
-        )
-        return samples
+        pairs = [(scale, i) for scale in scales for i in (0, 1)]
+        low = {(scale, i): _log_uniform(rng, *cls.LOW[i]) for scale, i in pairs}
+        guides = (_log_uniform(rng, *cls.GUIDES), _log_uniform(rng, *cls.GUIDES))
+        return cls(rng, low, guides, reference)
 
 
 def _log_uniform(rng: random.Random, low: int, high: int) -> int:
@@ -194,11 +201,9 @@ def _write(
     recipe: Recipe, stage: Stage, path: Path, window: Window, meta: dict[str, Any]
 ) -> None:
     rng = random.Random(f"{meta['seed']} {meta['index']} samples")
-    samples = Samples.drawn(rng, recipe.scales)
+    samples = Samples.drawn(rng, recipe.scales, recipe.reference(meta["seed"]))
     start = time.perf_counter()
-    arrays, seconds = run_job(
-        stage.scene, lambda passes: _arrays(recipe, passes, samples)
-    )
+    arrays, seconds = run_job(stage.scene, lambda passes: _arrays(passes, samples))
     render = stage.scene.render
     used = stage.library.used if stage.library else []
     meta |= {
@@ -207,7 +212,7 @@ def _write(
         "low_spp": {f"{scale}_{i}": n for (scale, i), n in samples.low.items()},
         "guide_spp": list(samples.guides),
         "guide_radiance_spp": 1,
-        "reference_spp": recipe.reference_samples,
+        "reference_spp": samples.reference,
         "seconds": seconds | {"total": round(time.perf_counter() - start, 3)},
         "blender_series": "{}.{}".format(*bpy.app.version),
         "recipes": scenes.VERSION,
@@ -224,9 +229,7 @@ def _half(array: np.ndarray) -> np.ndarray:
     return np.clip(clean, -HALF_MAX, HALF_MAX).astype(np.float16)
 
 
-def _arrays(
-    recipe: Recipe, passes: CyclesPasses, samples: Samples
-) -> tuple[Arrays, dict[str, float]]:
+def _arrays(passes: CyclesPasses, samples: Samples) -> tuple[Arrays, dict[str, float]]:
     """All renders of one window; every one has noise of its own."""
     arrays: Arrays = {}
     seconds: dict[str, float] = {}
@@ -254,7 +257,7 @@ def _arrays(
     reference = timed(
         "reference",
         lambda seed: passes.beauty(
-            1, recipe.reference_samples, prefilter="ACCURATE", seed=seed
+            1, samples.reference, prefilter="ACCURATE", seed=seed
         ),
     )
     arrays["reference"] = reference.radiance
