@@ -12,6 +12,7 @@ from xrds_core.errors import Cancelled, XRDSError
 
 from . import cycles_session, low_camera, plan
 from .borrowed import Borrowed
+from .colour import converted, to_rec709, working_space
 from .cycles_settings import set_sampling
 from .job import STAGES, Picture, RenderJob
 from .passes import COMBINED, Beauty, CyclesPasses, Guides
@@ -181,6 +182,7 @@ def _upscale(
 ) -> Array:
     """The region's radiance and alpha, (H, W, 4)."""
     rows, columns = beauty.offset
+    matrix = to_rec709(working_space())
 
     def placed(guide: Array | None) -> Array | None:
         """Guides start where the first low-resolution pixel does."""
@@ -189,22 +191,29 @@ def _upscale(
         margin = ((rows, 0), (columns, 0), *[(0, 0)] * (guide.ndim - 2))
         return np.pad(guide, margin, mode="edge")
 
+    def seen(colour: Array | None) -> Array | None:
+        """In the network's colour space."""
+        if matrix is None or colour is None:
+            return colour
+        return converted(colour, matrix)
+
     def tell(done: float) -> bool:
         engine.update_stats("XRDS", f"Network {done:.0%}")
         engine.update_progress(done)
         return not cycles_session.is_stopped(engine)
 
     picture: Upscaled = upscaler(
-        np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1),
-        placed(guides.albedo),
+        seen(np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1)),
+        placed(seen(guides.albedo)),
         placed(guides.normal),
-        guide_radiance=placed(guides.radiance),
+        guide_radiance=placed(seen(guides.radiance)),
         guide_alpha=placed(guides.alpha),
         exposure=exposure,
         memory_limit=job.memory_limit,
         progress=tell,
     )
-    return picture.radiance[rows:, columns:]
+    region = picture.radiance[rows:, columns:]
+    return region if matrix is None else converted(region, np.linalg.inv(matrix))
 
 
 def _write(

@@ -185,6 +185,37 @@ def test_a_border_holds_the_pixels_of_the_whole(still_life: Build, crop: bool) -
         assert np.abs(difference).mean() < 0.05, scale
 
 
+def test_tiles_change_no_pixel(still_life: Build) -> None:
+    """Larger pictures go through a file of tiles; the low one may need none."""
+    scene = still_life(150, 100, samples=1)
+
+    def job(passes: Any) -> list[np.ndarray]:
+        low = passes.beauty(4, denoise=False, seed=1).radiance
+        return [low, passes.guides(1, seed=1).normal]
+
+    whole = run_job(scene, job)
+    scene.cycles.use_auto_tile, scene.cycles.tile_size = True, 64
+    for tiled, one in zip(run_job(scene, job), whole, strict=True):
+        np.testing.assert_array_equal(tiled, one)
+
+
+def test_stereo_renders_both_views(still_life: Build) -> None:
+    scene = still_life(45, 33, samples=4)
+    scene.render.use_multiview = True
+    scene.camera.data.stereo.interocular_distance = 0.5
+
+    def job(passes: Any) -> Any:
+        beauties = passes.beauties(2, denoise=False, seed=1)
+        return passes.views, beauties, passes.guides_by_view(4, seed=1)
+
+    views, beauties, guides = run_job(scene, job)
+    assert views == ["left", "right"]
+    for told in (beauties, guides):
+        left, right = (told[view] for view in views)
+        kind = "radiance" if told is beauties else "normal"
+        assert np.abs(getattr(left, kind) - getattr(right, kind)).mean() > 0.01
+
+
 def test_what_a_job_raises_reaches_the_caller(still_life: Build) -> None:
     def job(passes: Any) -> None:
         passes.beauty(2, 1)
