@@ -30,7 +30,7 @@ def test_decisions_of_an_ordinary_render() -> None:
 
 
 def test_every_decision_has_a_reason() -> None:
-    for decision in plan.decide(FACTS) + plan.after(0.5) + plan.plain("asked for"):
+    for decision in plan.decide(FACTS) + plan.after(0.5, 0.0) + plan.plain("asked for"):
         assert decision.reason
         assert "\n" not in decision.reason
 
@@ -53,5 +53,6 @@ def test_a_panorama_says_that_it_is_resampled() -> None:
     assert "resampled" in low.reason
 
 
-def test_what_one_session_saved_is_the_first_sync() -> None:
-    assert plan.after(1.5)[0].saving_seconds == 1.5
+def test_what_one_session_saved_is_the_second_sync() -> None:
+    assert plan.after(1.5, 0.5)[0].saving_seconds == 1.0
+    assert plan.after(0.5, 0.6)[0].saving_seconds == 0.0

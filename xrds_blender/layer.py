@@ -89,7 +89,8 @@ def _enlarged(
     stages = beauties[first].seconds, guides[first].seconds
     for key, value in [item for stage in stages for item in stage.items()]:
         seconds[key] += value
-    decisions += plan.after(max(stage["sync"] for stage in stages))
+    syncs = sorted(stage["sync"] for stage in stages)
+    decisions += plan.after(syncs[1], syncs[0])
     started = time.perf_counter()
     pictures = {
         view: _upscale(engine, upscaler, job, exposure, beauties[view], guides[view])

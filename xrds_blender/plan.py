@@ -44,10 +44,11 @@ def decide(facts: Facts) -> tuple[Decision, ...]:
     return (_denoise(facts), _bounces(facts), _low_frame(facts))
 
 
-def after(sync_seconds: float) -> tuple[Decision, ...]:
-    """What the render itself showed: `sync_seconds` are those of its first pass."""
+def after(first_sync: float, second_sync: float) -> tuple[Decision, ...]:
+    """What the render itself showed: seconds of scene sync and BVH of both passes."""
     reason = "the second render keeps geometry, images and BVH of the first"
-    return (Decision("sessions", "one", reason, sync_seconds),)
+    saving = max(first_sync - second_sync, 0.0)
+    return (Decision("sessions", "one", reason, saving),)
 
 
 def guide_bounces(max_bounces: int) -> int:
