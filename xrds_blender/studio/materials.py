@@ -10,7 +10,7 @@ import bpy
 
 from . import patterns
 from .assets import Library, load_image, texture_map
-from .nodes import Colour, Nodes, Value
+from .nodes import Nodes, Value
 
 
 class Painter:
@@ -470,8 +470,3 @@ def _set(nodes: Nodes, shader: bpy.types.Node, inputs: dict[str, Value | None]) 
     for name, value in inputs.items():
         if value is not None:
             nodes.plug(shader.inputs[name.replace("_", " ")], value)
-
-
-def neutral(value: float) -> Colour:
-    """A grey."""
-    return (value, value, value)
