@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from .network import ALBEDO_EPSILON
+from .kernels import ALBEDO_EPSILON
 
 Picture = NDArray[np.float32]
 ArrayOrTensor = TypeVar("ArrayOrTensor", NDArray[np.float32], Tensor)

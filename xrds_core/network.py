@@ -17,11 +17,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
+
+from .kernels import KernelTail, Sources, find_sources
 
 # Channels of the guide stack: albedo 0-2, normal 3-5, full-resolution radiance 6-8.
 GUIDE_CHANNELS: dict[str, tuple[int, ...]] = {
@@ -31,15 +33,6 @@ GUIDE_CHANNELS: dict[str, tuple[int, ...]] = {
     "fast": (0, 1, 2, 3, 4, 5),
     "full": (0, 1, 2, 3, 4, 5, 6, 7, 8),
 }
-
-# Added to albedo before it divides radiance: bounds the quotient on black surfaces.
-ALBEDO_EPSILON = 0.02
-# The same for the radiance of `full` guides, in units of k e x.
-RADIANCE_EPSILON = 0.05
-# Unit of the predicted sharpness: logits per squared distance between guides.
-SHARPNESS_UNIT = 10.0
-# The base may brighten or darken what its kernels gather by this factor at most.
-GAIN_LIMIT = 4.0
 
 
 @dataclass(frozen=True)
@@ -383,32 +376,6 @@ class Deshuffle(nn.Sequential):
 # --- tails ----------------------------------------------------------------------------
 
 
-class Source(NamedTuple):
-    """Linear radiance for kernels to gather, and what then multiplies it."""
-
-    low: Tensor  # (B, 3, h, w)
-    modulator: Tensor  # (B, 3 or 1, H, W)
-
-
-Sources = list[Source]
-
-
-def find_sources(radiance: Tensor, guides: Tensor, scale: int) -> Sources:
-    """The radiance as it is, and demodulated by each guide that can modulate it.
-
-    `radiance` (B, 3, h, w) is in the transfer domain. The division is by the area mean
-    of the modulator, so that modulating again keeps the mean of the low-resolution
-    pixel.
-    """
-    low = torch.expm1(radiance.float())
-    guides = guides.float()
-    plain = Source(low, torch.ones_like(guides[:, :1]))
-    modulators = [guides[:, :3] + ALBEDO_EPSILON]
-    if guides.shape[1] > 6:
-        modulators.append(torch.expm1(guides[:, 6:9]) + RADIANCE_EPSILON)
-    return [plain, *(Source(low / F.avg_pool2d(m, scale), m) for m in modulators)]
-
-
 class PixelTail(nn.Module):
     """The paper's: pixel shuffle by 2, step by step, then the picture itself."""
 
@@ -422,99 +389,6 @@ class PixelTail(nn.Module):
 
     def forward(self, features: Tensor, guides: Tensor, sources: Sources) -> Tensor:
         return self.layers(features)
-
-
-def neighbours(low: Tensor) -> list[Tensor]:
-    """The 3x3 neighbours of every pixel, edge clamped: nine of (B, C, 1, h, w)."""
-    h, w = low.shape[-2:]
-    padded = F.pad(low, (1, 1, 1, 1), mode="replicate")
-    return [
-        padded[:, :, None, y : y + h, x : x + w] for y in range(3) for x in range(3)
-    ]
-
-
-def bilinear_logits(scale: int) -> Tensor:
-    """(9, s * s): log of the bilinear weights of the 3x3 neighbours.
-
-    The floor keeps neighbours that bilinear interpolation leaves out within reach.
-    """
-    offset = (torch.arange(scale) + 0.5) / scale - 0.5  # of output pixels in their cell
-    axis = torch.stack((-offset, 1 - offset.abs(), offset)).clamp(min=0)  # (3, s)
-    weights = axis[:, None, :, None] * axis[None, :, None, :]  # (3, 3, s, s)
-    return (weights + 0.01).log().view(9, scale * scale)
-
-
-class KernelTail(nn.Module):
-    """The demodulated base, its kernels predicted.
-
-    Every output pixel is a convex combination of its 3x3 low-resolution neighbours in
-    every source: the radiance as it is, and demodulated by the albedo and, with `full`
-    guides, by the full-resolution radiance, then modulated at the pixel. A gain,
-    bounded by `GAIN_LIMIT`, scales the result. So nothing rings, turns negative or
-    becomes coloured by itself. Kernels start from bilinear weights and fall with the
-    distance between guides, as a joint bilateral filter's, as fast as the network asks;
-    untrained, they are bilinear on the demodulated radiance.
-    """
-
-    def __init__(self, config: NetworkConfig) -> None:
-        super().__init__()
-        self.scale, self.cell = config.scale, config.cell
-        width, sources = config.tail_channels, config.source_count
-        self.expand = conv3(config.channels, width * config.cell**2)
-        self.mix = conv3(width + config.guide_count + 3 * sources, width)
-        # per pixel: logits of each source, sharpness by albedo and by normal, gain
-        self.predict = nn.Conv2d(width, 9 * sources + 3, 1)
-        for parameter in self.predict.parameters():
-            nn.init.zeros_(parameter)
-        prior = torch.tensor([-4.0] + [0.0] * (sources - 1))  # plain radiance, others
-        logits = prior[:, None, None] + bilinear_logits(config.scale)
-        self.prior: Tensor
-        self.register_buffer("prior", logits, persistent=False)
-
-    def forward(self, features: Tensor, guides: Tensor, sources: Sources) -> Tensor:
-        x = F.pixel_shuffle(self.expand(features), self.cell)
-        bases = [torch.log1p(self.bilinear(source)) for source in sources]
-        x = F.relu(self.mix(torch.cat((x, guides, *bases), dim=1)))
-        x = F.pixel_unshuffle(self.predict(x), self.scale)
-        # sums over radiance need float32, whatever the precision of the layers above
-        return torch.log1p(self.combine(x.float(), guides.float(), sources))
-
-    def bilinear(self, source: Source) -> Tensor:
-        size = source.modulator.shape[-2:]
-        return F.interpolate(source.low, size=size, mode="bilinear") * source.modulator
-
-    def combine(self, predicted: Tensor, guides: Tensor, sources: Sources) -> Tensor:
-        predicted = predicted.unflatten(1, (-1, self.scale**2))  # (B, n, s*s, h, w)
-        kernels = self.kernels(predicted, guides)
-        out = torch.zeros((), device=guides.device)
-        for m, source in enumerate(sources):
-            cells = F.pixel_unshuffle(source.modulator, self.scale)
-            cells = cells.unflatten(1, (-1, self.scale**2))
-            out = out + self.gather(kernels[:, m], source.low) * cells
-        gain = torch.exp(math.log(GAIN_LIMIT) * torch.tanh(predicted[:, -1:]))
-        return F.pixel_shuffle((out * gain).flatten(1, 2), self.scale)
-
-    def kernels(self, predicted: Tensor, guides: Tensor) -> Tensor:
-        """Softmax over the neighbours of all sources: (B, sources, 9, s*s, h, w)."""
-        logits = predicted[:, :-3].unflatten(1, (-1, 9)) + self.prior[..., None, None]
-        distance = torch.zeros_like(logits[:, 0])
-        for channel, guide in ((-3, guides[:, :3]), (-2, guides[:, 3:6])):
-            sharpness = SHARPNESS_UNIT * predicted[:, channel, None]
-            distance = distance + sharpness * self.distances(guide)
-        logits = logits - distance[:, None]
-        return logits.flatten(1, 2).softmax(dim=1).unflatten(1, (-1, 9))
-
-    def distances(self, guide: Tensor) -> Tensor:
-        """Squared distance of pixels' guides to neighbours': (B, 9, s*s, h, w)."""
-        cells = F.pixel_unshuffle(guide, self.scale).unflatten(1, (3, -1))
-        means = neighbours(F.avg_pool2d(guide, self.scale))
-        return torch.stack([(cells - mean).square().sum(1) for mean in means], dim=1)
-
-    @staticmethod
-    def gather(kernel: Tensor, low: Tensor) -> Tensor:
-        """Kernels (B, 9, s*s, h, w) over (B, 3, h, w): (B, 3, s*s, h, w)."""
-        taps = (kernel[:, k, None] * x for k, x in enumerate(neighbours(low)))
-        return sum(taps, torch.zeros((), device=low.device))
 
 
 # --- the network ----------------------------------------------------------------------
@@ -545,7 +419,11 @@ class XRDS(nn.Module):
         )
         self.groups = nn.ModuleList(XDG(config) for _ in range(config.groups))
         self.fuse = conv3(2 * c, c)
-        self.tail = KernelTail(config) if config.base else PixelTail(config)
+        if config.base:
+            sizes = config.cell, c, config.tail_channels, config.source_count
+            self.tail: nn.Module = KernelTail(config.scale, *sizes)
+        else:
+            self.tail = PixelTail(config)
 
     def forward(self, radiance: Tensor, guides: Tensor) -> Tensor:
         """Enlarge one batch.

@@ -9,8 +9,8 @@ import torch
 from torch import nn
 from torch.nn import functional as F
 
+from xrds_core.kernels import ALBEDO_EPSILON
 from xrds_core.network import (
-    ALBEDO_EPSILON,
     GUIDE_CHANNELS,
     XRDS,
     NetworkConfig,
