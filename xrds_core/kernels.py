@@ -89,11 +89,11 @@ class KernelTail(nn.Module):
     ) -> None:
         super().__init__()
         self.scale, self.cell = scale, cell
-        guides = 3 * (sources + 1)
         # unbounded features make every softmax a hard choice, which no longer learns
         self.norm = nn.LayerNorm(channels)
         self.expand = nn.Conv2d(channels, width * cell**2, 3, padding=1)
-        inputs = width + guides + 3 * (sources - 1)
+        # features, guides, and how the other sources differ from plain radiance
+        inputs = width + 3 * sources + 3 * (sources - 1)
         self.mix = nn.Conv2d(inputs, width, 3, padding=1)
         # per pixel: logits of each source, sharpness by albedo and by normal, gain
         self.predict = nn.Conv2d(width, 9 * sources + 3, 1)
