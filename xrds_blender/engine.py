@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 
 from . import cycles_session
+from .passes import GUIDE_PASSES
 from .render import render_in
 
 
@@ -35,7 +36,12 @@ class XRDSRender(bpy.types.RenderEngine):
             cycles_session.free(self)
 
     def update_render_passes(self, scene: Any, layer: Any) -> None:
-        cycles_session.functions().register_passes(self, scene, layer)
+        cycles = cycles_session.functions()
+        cycles.register_passes(self, scene, layer)
+        known = {name for name, *_ in cycles.list_render_passes(scene, layer)}
+        for name, letters, kind in GUIDE_PASSES:
+            if not scene.xrds.plain and name not in known:
+                self.register_pass(scene, layer, name, len(letters), letters, kind)
 
     def update(self, data: Any, depsgraph: Any) -> None:
         # A final render makes its sessions itself, with their own sizes.

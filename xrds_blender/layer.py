@@ -238,14 +238,11 @@ def _write(
 def _bilinear(
     low: Array, scale: int, offset: tuple[int, int], shape: tuple[int, ...]
 ) -> Array:
-    import torch
-
-    from xrds_core.front_end import upsample_bilinear
-
-    planes = torch.from_numpy(np.ascontiguousarray(low.transpose(2, 0, 1)))[None]
-    large: Array = upsample_bilinear(planes, scale)[0].numpy().transpose(1, 2, 0)
-    top, left = offset
-    return large[top : top + shape[0], left : left + shape[1]]
+    """Enlarge (h, w, channels) and cut the region out."""
+    for axis in (0, 1):
+        centres = np.arange(shape[axis]) + offset[axis] + 0.5
+        low = low_camera.interpolate(low, centres / scale - 0.5, axis)
+    return low
 
 
 def _stop_if_cancelled(engine: Any) -> None:

@@ -97,7 +97,7 @@ class LowGrid:
             return picture.copy()
         y = self._positions(0, self.window.y, self.window.height) - rendered.y
         x = self._positions(1, self.window.x, self.window.width) - rendered.x
-        return _interpolate(_interpolate(picture, y, 0), x, 1)
+        return interpolate(interpolate(picture, y, 0), x, 1)
 
     def _is_aligned(self) -> bool:
         return self.exact or self.frame.covered(self.scale) == self.frame
@@ -117,7 +117,7 @@ class LowGrid:
         return start, min(stop - start, most)
 
 
-def _interpolate(picture: Array, at: NDArray[np.float64], axis: int) -> Array:
+def interpolate(picture: Array, at: NDArray[np.float64], axis: int) -> Array:
     """Values at fractional positions along an axis, the edge repeated."""
     last = picture.shape[axis] - 1
     at = np.clip(at, 0, last)

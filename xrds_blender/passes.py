@@ -29,6 +29,7 @@ from .cycles_settings import (
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
 
 ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth"
+GUIDE_PASSES = ((ALBEDO, "RGB", "COLOR"), (NORMAL, "XYZ", "VECTOR"))
 COMBINED, NOISY = "Combined", "Noisy Image"
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
@@ -124,9 +125,11 @@ class CyclesPasses:
         cycles_session.prepare(self._engine, self._depsgraph)
         self._scene = self._depsgraph.scene_eval
         self._layer_eval = self._depsgraph.view_layer_eval
-        for name, channels, letters in self._wanted_passes():
+        for name, letters in self._wanted_passes():
             if name not in self._layer().passes:
-                self._engine.add_pass(name, channels, letters, layer=self._layer_name)
+                self._engine.add_pass(
+                    name, len(letters), letters, layer=self._layer_name
+                )
         return self
 
     def __exit__(
@@ -142,11 +145,9 @@ class CyclesPasses:
             self._borrowed.give_back()
             self._pipeline.give_back()
 
-    def _wanted_passes(self) -> list[tuple[str, int, str]]:
-        wanted = [(ALBEDO, 3, "RGB"), (NORMAL, 3, "XYZ")]
-        if self._extra:
-            wanted += [(DEPTH, 1, "Z"), (NOISY, 4, "RGBA")]
-        return wanted
+    def _wanted_passes(self) -> list[tuple[str, str]]:
+        wanted = [(name, letters) for name, letters, _ in GUIDE_PASSES]
+        return wanted + [(DEPTH, "Z"), (NOISY, "RGBA")] * self._extra
 
     def _layer(self) -> Any:
         return self._engine.get_result().layers[self._layer_name]

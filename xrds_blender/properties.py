@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
@@ -24,6 +26,12 @@ _DEVICES = [
     ("cpu", "CPU", "Run the network on the processor"),
     ("cuda", "CUDA", "Run the network on an NVIDIA GPU"),
 ]
+
+
+def _ask_for_passes(settings: bpy.types.PropertyGroup, _: Any) -> None:
+    """Plain renders have no guides: the Render Layers nodes lose their sockets."""
+    for layer in settings.id_data.view_layers:
+        layer.update_render_passes()
 
 
 class XRDSSettings(bpy.types.PropertyGroup):
@@ -63,4 +71,5 @@ class XRDSSettings(bpy.types.PropertyGroup):
     plain: BoolProperty(
         name="Plain Cycles",
         description="Render with Cycles alone, as if the engine were Cycles",
+        update=_ask_for_passes,
     )

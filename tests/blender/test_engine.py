@@ -225,13 +225,17 @@ def test_the_compositor_gets_the_picture(life: Any, network: Any, written: Any) 
 
 
 def test_the_compositor_gets_the_guides(life: Any, network: Any, written: Any) -> None:
-    life.view_layers[0].cycles.denoising_store_passes = True
+    life.render.engine = "XRDS"
     tree, end = compositor(life)
     layers = tree.nodes.new("CompositorNodeRLayers")
+    assert layers.outputs["Denoising Normal"].enabled
     tree.links.new(layers.outputs["Denoising Albedo"], end)
     picture = written(life)
     call = network[0].calls[0]
     np.testing.assert_allclose(picture[..., :3], call["albedo"], atol=1e-6)
+    life.xrds.plain = True
+    sockets = [socket.name for socket in layers.outputs if socket.enabled]
+    assert "Denoising Normal" not in sockets
 
 
 def test_full_guides_bring_radiance_and_keep_data_passes(
