@@ -185,10 +185,16 @@ def _need_blender(command: str) -> None:
 # --- the options ----------------------------------------------------------------------
 
 
+class _Parser(argparse.ArgumentParser):
+    """Tells wrong usage in one line, as every other error is told."""
+
+    def error(self, message: str) -> NoReturn:
+        line = f"xrds: {message}; see {self.prog} --help\n"
+        self.exit(console.WRONG_USAGE, line)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "xrds", description="Guided super-resolution of Cycles renders."
-    )
+    parser = _Parser("xrds", description="Guided super-resolution of Cycles renders.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for add in (
         _add_info,

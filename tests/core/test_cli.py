@@ -66,7 +66,8 @@ def test_wrong_usage_is_2(words: list[str], capfd: pytest.CaptureFixture[str]) -
     assert cli.main(words) == 2
     out, err = capfd.readouterr()
     assert not out
-    assert "xrds" in err
+    assert err.startswith("xrds: ")
+    assert err.count("\n") == 1
 
 
 def test_help_is_0(capfd: pytest.CaptureFixture[str]) -> None:
