@@ -31,6 +31,7 @@ FULL_VARIATION = Variation(
     tint_stops=0.5,
     rotated_normals=0.2,
     black=0.1,
+    shaded=0.3,
     symmetries=True,
 )
 
@@ -75,7 +76,7 @@ def test_crops_stay_aligned(config: TrainingConfig, guides: str) -> None:
     window = read_window(Path(config.data) / "train" / "0.npz", 2, guides)
     for seed in range(20):
         random = np.random.default_rng(seed)
-        variation = replace(FULL_VARIATION, black=0.0)
+        variation = replace(FULL_VARIATION, black=0.0, shaded=0.0)
         batch = draw(window, 2, guides, variation, random, 16)
         assert batch.guides.shape == (1, 9 if guides == "full" else 6, 16, 16)
         reference = torch.expm1(batch.reference)
@@ -100,6 +101,20 @@ def test_normals_turn_with_the_picture() -> None:
         np.testing.assert_allclose(high["guides"][..., 3:], dome, atol=1e-6)
         seen.add(low.tobytes())
     assert len(seen) == 8
+
+
+def test_shaded_crops_are_albedo_under_smooth_light(config: TrainingConfig) -> None:
+    window = read_window(Path(config.data) / "train" / "0.npz", 2, "fast")
+    random = np.random.default_rng(1)
+    batch = draw(window, 2, "fast", Variation(shaded=1.0), random)
+    reference, low = torch.expm1(batch.reference), torch.expm1(batch.radiance)
+    means = torch.nn.functional.avg_pool2d(reference, 2)
+    torch.testing.assert_close(means, low, rtol=1e-3, atol=1e-4)
+    light = reference / batch.guides[:, :3]
+    steps = light.diff(dim=-1).abs().mean() / light.mean()
+    texture = reference.diff(dim=-1).abs().mean() / reference.mean()
+    assert steps < 0.5 * texture
+    assert light.std() / light.mean() > 0.1
 
 
 def test_rotations_are_rotations() -> None:

@@ -72,6 +72,12 @@ class Variation:
     """Share of crops whose normals are turned at random, as if of another space."""
     black: float = 0.0
     """Share of crops without any light under their guides."""
+    shaded: float = 0.0
+    """Share of crops lit anew: their albedo under smooth light, without path tracing.
+
+    There demodulation is exact, which teaches the network to trust it where radiance
+    over albedo is smooth.
+    """
     symmetries: bool = False
     """Flips, transposition and permutations of the colour channels."""
 
@@ -106,15 +112,22 @@ def draw(
     noisy = "_noisy" if random.random() < variation.noisy else ""
     low, _ = clean_radiance(window.array(f"low{scale}_{random.integers(2)}{noisy}"))
     exposure = auto_exposure(low) * 2 ** random.normal(0, variation.exposure_stops)
+    both = window.array("guides_a")[..., :3] + window.array("guides_b")[..., :3]
     high = {
         "reference": window.array("reference"),
         "guides": mix_guides(window, random),
+        "albedo": clean_albedo(both / 2)[0],
     }
     if guides == "full":
         which = "ab"[random.integers(2)]
         high["radiance"], _ = clean_radiance(window.array(f"guide_radiance_{which}"))
     if size is not None:
         low, high = crop(low, high, scale, size, random)
+    if random.random() < variation.shaded:
+        low, high["reference"] = shade(high["albedo"], scale, exposure, random)
+        if "radiance" in high:
+            high["radiance"] = high["reference"]
+    del high["albedo"]
     if random.random() < variation.black:
         low, high["reference"] = low * 0, high["reference"] * 0
         if "radiance" in high:
@@ -140,6 +153,21 @@ def mix_guides(window: Window, random: np.random.Generator) -> Array:
 
 
 Pictures = dict[str, Array]
+
+
+def shade(
+    albedo: Array, scale: int, exposure: float, random: np.random.Generator
+) -> tuple[Array, Array]:
+    """Radiance of `albedo` under a smooth, coloured light: low-resolution and full."""
+    stops = random.normal(0, 1, (1, 1, 4, 4)) + random.normal(0, 0.2, (1, 3, 1, 1))
+    light = torch.nn.functional.interpolate(
+        torch.from_numpy(np.exp2(stops)), size=albedo.shape[:2], mode="bicubic"
+    )
+    smooth = light[0].permute(1, 2, 0).clamp(min=0.05).numpy() / (4 * exposure)
+    reference = (albedo * smooth).astype(np.float32)
+    h, w = (n // scale for n in albedo.shape[:2])
+    low = reference.reshape(h, scale, w, scale, 3).mean(axis=(1, 3))
+    return low, reference
 
 
 def crop(
