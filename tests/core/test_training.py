@@ -14,14 +14,16 @@ from xrds_core import weights
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.training.config import TrainingConfig, read_config
 from xrds_core.training.data import (
+    Crop,
     Variation,
     draw,
     random_rotation,
-    read_window,
     transpose_and_flip,
 )
 from xrds_core.training.losses import LOSSES
 from xrds_core.training.train import CHECKPOINT, Trainer, train
+from xrds_core.training.validation import Scores, validate
+from xrds_core.training.windows import WindowSet, read_window
 
 SIZE = 32
 TINY = {"channels": 8, "guide_channels": 8, "window_size": 4, "tail_channels": 4}
@@ -61,7 +63,7 @@ def config(tmp_path: Path) -> TrainingConfig:
         split = "validation" if seed == 3 else "train"
         write_window(tmp_path / "data" / split / f"{seed}.npz", seed)
     return TrainingConfig(
-        data=str(tmp_path / "data"),
+        data=(str(tmp_path / "data"),),
         network=TINY,
         steps=6,
         batch=2,
@@ -73,7 +75,7 @@ def config(tmp_path: Path) -> TrainingConfig:
 
 @pytest.mark.parametrize("guides", ["fast", "full"])
 def test_crops_stay_aligned(config: TrainingConfig, guides: str) -> None:
-    window = read_window(Path(config.data) / "train" / "0.npz", 2, guides)
+    window = read_window(Path(config.data[0]) / "train" / "0.npz", 2, guides)
     for seed in range(20):
         random = np.random.default_rng(seed)
         variation = replace(FULL_VARIATION, black=0.0, shaded=0.0)
@@ -92,19 +94,19 @@ def test_normals_turn_with_the_picture() -> None:
     axis = np.linspace(-0.7, 0.7, 8, dtype=np.float32)
     x, y = np.meshgrid(axis, -axis)  # y up, rows downwards
     dome = np.stack((x, y, np.sqrt(1 - x**2 - y**2)), axis=-1)
-    guides = np.concatenate((np.zeros_like(dome), dome), axis=-1)
     seen = set()
     for seed in range(64):
         random = np.random.default_rng(seed)
         marked = np.arange(64, dtype=np.float32).reshape(8, 8, 1)
-        low, high = transpose_and_flip(marked, {"guides": guides}, random)
-        np.testing.assert_allclose(high["guides"][..., 3:], dome, atol=1e-6)
-        seen.add(low.tobytes())
+        whole = Crop(marked, marked, marked, dome, None, 1.0)
+        turned = transpose_and_flip(whole, random)
+        np.testing.assert_allclose(turned.normal, dome, atol=1e-6)
+        seen.add(turned.low.tobytes())
     assert len(seen) == 8
 
 
 def test_shaded_crops_are_albedo_under_smooth_light(config: TrainingConfig) -> None:
-    window = read_window(Path(config.data) / "train" / "0.npz", 2, "fast")
+    window = read_window(Path(config.data[0]) / "train" / "0.npz", 2, "fast")
     random = np.random.default_rng(1)
     batch = draw(window, 2, "fast", Variation(shaded=1.0), random)
     reference, low = torch.expm1(batch.reference), torch.expm1(batch.radiance)
@@ -171,7 +173,7 @@ def test_weights_start_another_scale(config: TrainingConfig, tmp_path: Path) -> 
     write_window(tmp_path / "data4" / "train" / "0.npz", 9, scale=4)
     write_window(tmp_path / "data4" / "validation" / "1.npz", 8, scale=4)
     source = tmp_path / "x2" / "weights.safetensors"
-    data = str(tmp_path / "data4")
+    data = (str(tmp_path / "data4"),)
     other = Trainer(
         replace(config, data=data, scale=4, start=str(source)), tmp_path / "x4"
     )
@@ -182,8 +184,57 @@ def test_weights_start_another_scale(config: TrainingConfig, tmp_path: Path) -> 
     )
 
 
+def test_folders_are_read_together_and_windows_without_the_scale_left_out(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
+    for split in ("train", "validation"):
+        write_window(tmp_path / "more" / split / "0.npz", 7)
+        write_window(tmp_path / "more" / split / "1.npz", 7, scale=4)
+    data = (*config.data, str(tmp_path / "more"))
+    first = Trainer(replace(config, data=data), tmp_path / "run").windows
+    assert [path.stem for path in first["train"].paths] == ["0", "1", "2", "0"]
+    assert first["train"].paths[-1].is_relative_to(tmp_path / "more")
+    write_window(tmp_path / "more" / "train" / "9.npz", 9)
+    again = Trainer(replace(config, data=data), tmp_path / "run").windows
+    assert again["train"].paths == first["train"].paths  # a run keeps its windows
+
+
+def test_windows_beyond_the_memory_are_read_again(config: TrainingConfig) -> None:
+    paths = sorted((Path(config.data[0]) / "train").glob("*.npz"))
+    size = read_window(paths[0], 2, "fast", noisy=False).size
+    windows = WindowSet(paths, 2, "fast", noisy=False, memory=2.5 * size)
+    kept = [windows[i] is windows[i] for i in range(len(paths))]
+    assert kept == [True, True, False]
+    again = windows[2]
+    np.testing.assert_array_equal(
+        again.array("reference"), windows[2].array("reference")
+    )
+
+
+def test_validation_knows_where_demodulation_is_exact(config: TrainingConfig) -> None:
+    paths = sorted((Path(config.data[0]) / "train").glob("*.npz"))
+    windows = WindowSet(paths, 2, "fast", noisy=False, memory=0)
+    scores = validate(lambda batch: batch.reference, windows, 2, 2, "fast")
+    for name, means in scores.means().items():
+        assert means["xrds"] == np.inf
+        assert means["demodulated"] > means["bicubic"] + 10, name
+    again = validate(lambda batch: batch.reference, windows, 2, 2, "fast")
+    assert again.psnr == scores.psnr  # the same crops, the same light
+
+
+def test_gain_is_over_the_better_enlargement_of_each_window() -> None:
+    rows = {"xrds": [30.0, 31.0], "bicubic": [29.0, 20.0], "demodulated": [10.0, 33.0]}
+    shaded = {
+        "xrds": [40.0, 40.0],
+        "bicubic": [30.0, 30.0],
+        "demodulated": [43.0, 43.0],
+    }
+    scores = Scores({"rendered": rows, "shaded": shaded})
+    assert scores.gain() == pytest.approx((1 - 2 - 3 - 3) / 4)
+
+
 def test_damaged_window_is_named(config: TrainingConfig) -> None:
-    path = Path(config.data) / "train" / "0.npz"
+    path = Path(config.data[0]) / "train" / "0.npz"
     path.write_bytes(path.read_bytes()[:500])
     with pytest.raises(PictureError, match=r"0\.npz"):
         read_window(path, 2, "fast")
@@ -191,7 +242,7 @@ def test_damaged_window_is_named(config: TrainingConfig) -> None:
 
 def test_missing_scale_is_named(config: TrainingConfig) -> None:
     with pytest.raises(PictureError, match="scale 4"):
-        read_window(Path(config.data) / "train" / "0.npz", 4, "fast")
+        read_window(Path(config.data[0]) / "train" / "0.npz", 4, "fast")
 
 
 @pytest.mark.parametrize(
@@ -216,10 +267,10 @@ def test_configuration_paths_are_relative_to_the_file(tmp_path: Path) -> None:
     path = tmp_path / "run.toml"
     path.write_text("data = 'windows'\nscale = 4\n[loss]\nl1 = 2.0\n")
     config = read_config(path)
-    assert config.data == str(tmp_path / "windows")
+    assert config.data == (str(tmp_path / "windows"),)
     assert config.loss == {"l1": 2.0}
 
 
 def test_no_windows_is_said(config: TrainingConfig, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no windows"):
-        Trainer(replace(config, data=str(tmp_path)), tmp_path / "run")
+        Trainer(replace(config, data=(str(tmp_path),)), tmp_path / "run")

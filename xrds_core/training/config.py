@@ -17,8 +17,8 @@ from .losses import LOSSES
 class TrainingConfig:
     """What a run depends on, beside the code and the files of its windows."""
 
-    data: str
-    """Folder of `xrds dataset`, with `train` and `validation` in it."""
+    data: tuple[str, ...]
+    """Folders of `xrds dataset`, with `train` and `validation` in them."""
     preset: str = "fast"
     scale: int = 2
     guides: str = "fast"
@@ -46,6 +46,8 @@ class TrainingConfig:
     """`fp32` or `bf16`."""
     validate_every: int = 1000
     validation_windows: int = 24
+    cache_gigabytes: float = 8.0
+    """Memory for windows; those beyond it are read from disk each time."""
     variation: Variation = field(default_factory=Variation)
 
     def __post_init__(self) -> None:
@@ -76,7 +78,9 @@ def read_config(path: Path) -> TrainingConfig:
             f"{path}: unknown {sorted(unknown)}; known are {sorted(known)}"
         )
     try:
-        values["data"] = str(path.parent / values["data"])
+        folders = values["data"]
+        folders = [folders] if isinstance(folders, str) else folders
+        values["data"] = tuple(str(path.parent / folder) for folder in folders)
         if values.get("start"):
             values["start"] = str(path.parent / values["start"])
         values["variation"] = Variation(**values.get("variation", {}))

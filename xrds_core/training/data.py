@@ -1,61 +1,16 @@
-"""Training windows: reading them, and the crops and variations that they are cut into.
-
-A window file (`.npz`) holds one window of a frame: the reference, two guide renders of
-different seeds, and two low-resolution renders per scale, denoised and noisy.
-"""
+"""Crops of training windows, and how they are varied."""
 
 from __future__ import annotations
 
-import json
-import zipfile
-from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
-from ..errors import PictureError
-from ..front_end import auto_exposure, clean_albedo, clean_radiance, transfer
-
-Array = NDArray[np.float32]
-
-
-@dataclass(frozen=True)
-class Window:
-    """One window, half float (height, width, channels), scene-linear."""
-
-    path: Path
-    arrays: dict[str, NDArray[np.float16]]
-    meta: dict[str, Any]
-
-    def array(self, name: str) -> Array:
-        """One array as float32."""
-        return self.arrays[name].astype(np.float32)
-
-
-def read_window(path: Path, scale: int, guides: str) -> Window:
-    """Read what training at one scale needs.
-
-    Raises:
-        PictureError: the file is damaged or was rendered without that scale.
-    """
-    names = ["reference", "guides_a", "guides_b"]
-    names += [f"low{scale}_{i}{kind}" for i in (0, 1) for kind in ("", "_noisy")]
-    if guides == "full":
-        names += ["guide_radiance_a", "guide_radiance_b"]
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in names}
-            meta = json.loads(str(file["meta"]))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-        raise PictureError(
-            f"{path} is no training window for scale {scale}, {guides} guides: {error}"
-        ) from error
-    return Window(path, arrays, meta)
+from ..front_end import clean_albedo, clean_radiance, transfer
+from .windows import LOW_RENDERS, WHOLE, Array, Box, Window, low_name
 
 
 @dataclass(frozen=True)
@@ -80,6 +35,33 @@ class Variation:
     """
     symmetries: bool = False
     """Flips, transposition and permutations of the colour channels."""
+
+
+@dataclass(frozen=True)
+class Crop:
+    """Pictures of one place, float32 (height, width, 3), scene-linear."""
+
+    low: Array
+    reference: Array
+    albedo: Array
+    normal: Array
+    guide_radiance: Array | None
+    """Of `full` guides."""
+    exposure: float
+
+    def with_light(self, change: Callable[[Array], Array]) -> Crop:
+        """Change the radiance."""
+        guide = None if self.guide_radiance is None else change(self.guide_radiance)
+        low, reference = change(self.low), change(self.reference)
+        return replace(self, low=low, reference=reference, guide_radiance=guide)
+
+    def with_colours(self, change: Callable[[Array], Array]) -> Crop:
+        """Change radiance and albedo alike."""
+        return replace(self.with_light(change), albedo=change(self.albedo))
+
+    def with_pictures(self, change: Callable[[Array], Array]) -> Crop:
+        """Change all pictures alike."""
+        return replace(self.with_colours(change), normal=change(self.normal))
 
 
 @dataclass(frozen=True)
@@ -109,50 +91,80 @@ def draw(
     size: int | None = None,
 ) -> Batch:
     """Cut one varied crop of `size` output pixels (None: the whole window)."""
-    noisy = "_noisy" if random.random() < variation.noisy else ""
-    low, _ = clean_radiance(window.array(f"low{scale}_{random.integers(2)}{noisy}"))
-    exposure = auto_exposure(low) * 2 ** random.normal(0, variation.exposure_stops)
-    both = window.array("guides_a")[..., :3] + window.array("guides_b")[..., :3]
-    high = {
-        "reference": window.array("reference"),
-        "guides": mix_guides(window, random),
-        "albedo": clean_albedo(both / 2)[0],
-    }
-    if guides == "full":
-        which = "ab"[random.integers(2)]
-        high["radiance"], _ = clean_radiance(window.array(f"guide_radiance_{which}"))
-    if size is not None:
-        low, high = crop(low, high, scale, size, random)
-    if random.random() < variation.shaded:
-        low, high["reference"] = shade(high["albedo"], scale, exposure, random)
-        if "radiance" in high:
-            high["radiance"] = high["reference"]
-    del high["albedo"]
+    crop = cut(window, scale, guides, variation, random, size)
     if random.random() < variation.black:
-        low, high["reference"] = low * 0, high["reference"] * 0
-        if "radiance" in high:
-            high["radiance"] = high["radiance"] * 0
+        crop = crop.with_light(np.zeros_like)
     if variation.symmetries:
-        low, high = permute_colours(low, high, random)
-        low, high = transpose_and_flip(low, high, random)
+        crop = permute_colours(crop, random)
+        crop = transpose_and_flip(crop, random)
     if variation.tint_stops:
-        low, high = tint(low, high, variation.tint_stops, random)
+        crop = tint(crop, variation.tint_stops, random)
     if random.random() < variation.rotated_normals:
-        high["guides"][..., 3:6] = high["guides"][..., 3:6] @ random_rotation(random)
-    return to_batch(low, high, exposure)
+        crop = replace(crop, normal=crop.normal @ random_rotation(random))
+    return to_batch(crop)
 
 
-def mix_guides(window: Window, random: np.random.Generator) -> Array:
-    """One of the two guide renders, or their mean by samples: (H, W, 6)."""
+def cut(
+    window: Window,
+    scale: int,
+    guides: str,
+    variation: Variation,
+    random: np.random.Generator,
+    size: int | None,
+) -> Crop:
+    """One crop of one low-resolution render and one quality of guides."""
+    noisy = random.random() < variation.noisy
+    name = low_name(scale, int(random.integers(LOW_RENDERS)), bool(noisy))
+    stops = random.normal(0, variation.exposure_stops)
+    exposure = window.exposures[name] * float(2**stops)
+    low_box, box = boxes(window.arrays[name].shape, scale, size, random)
+    albedo, normal = mix_guides(window, box, random)
+    if random.random() < variation.shaded:
+        low, reference = shade(mean_albedo(window, box), scale, exposure, random)
+        guide_radiance = reference if guides == "full" else None
+    else:
+        low, _ = clean_radiance(window.array(name, low_box))
+        reference, _ = clean_radiance(window.array("reference", box))
+        guide_radiance = (
+            noisy_radiance(window, box, random) if guides == "full" else None
+        )
+    return Crop(low, reference, albedo, normal, guide_radiance, exposure)
+
+
+def boxes(
+    shape: tuple[int, ...], scale: int, size: int | None, random: np.random.Generator
+) -> tuple[Box, Box]:
+    """A random square, in low-resolution and in output pixels; None for the whole."""
+    if size is None:
+        return WHOLE, WHOLE
+    side = size // scale
+    y, x = (int(random.integers(n - side + 1)) for n in shape[:2])
+    low = np.s_[y : y + side, x : x + side]
+    return low, np.s_[y * scale : (y + side) * scale, x * scale : (x + side) * scale]
+
+
+def mix_guides(
+    window: Window, box: Box, random: np.random.Generator
+) -> tuple[Array, Array]:
+    """Albedo and normal of one of the two guide renders, or their mean by samples."""
     a, b = window.meta["guide_spp"]
     share = ((a / (a + b)), 1.0, 0.0)[random.integers(3)]
-    mixed: Array = window.array("guides_a") * np.float32(share)
-    mixed += window.array("guides_b") * np.float32(1 - share)
-    mixed[..., :3] = clean_albedo(mixed[..., :3])[0]
-    return mixed
+    parts = {"guides_a": np.float32(share), "guides_b": np.float32(1 - share)}
+    mixed = sum(window.array(name, box) * part for name, part in parts.items() if part)
+    albedo, normal = np.split(mixed, 2, axis=-1)
+    return clean_albedo(albedo)[0], normal
 
 
-Pictures = dict[str, Array]
+def mean_albedo(window: Window, box: Box) -> Array:
+    """Of both guide renders: the least noisy there is."""
+    both = [window.array(name, box)[..., :3] for name in ("guides_a", "guides_b")]
+    return clean_albedo((both[0] + both[1]) / 2)[0]
+
+
+def noisy_radiance(window: Window, box: Box, random: np.random.Generator) -> Array:
+    """The full-resolution radiance of one of the two guide renders."""
+    which = "ab"[random.integers(2)]
+    return clean_radiance(window.array(f"guide_radiance_{which}", box))[0]
 
 
 def shade(
@@ -170,65 +182,40 @@ def shade(
     return low, reference
 
 
-def crop(
-    low: Array, high: Pictures, scale: int, size: int, random: np.random.Generator
-) -> tuple[Array, Pictures]:
-    """The same random square from every picture, on whole low-resolution pixels."""
-    side = size // scale
-    y, x = (int(random.integers(n - side + 1)) for n in low.shape[:2])
-    box = np.s_[y * scale : (y + side) * scale, x * scale : (x + side) * scale]
-    return low[y : y + side, x : x + side], {k: v[box] for k, v in high.items()}
-
-
-def permute_colours(
-    low: Array, high: Pictures, random: np.random.Generator
-) -> tuple[Array, Pictures]:
+def permute_colours(crop: Crop, random: np.random.Generator) -> Crop:
     """The same permutation of the channels of radiance and albedo."""
     order = random.permutation(3)
-    high = {k: v if k == "guides" else v[..., order] for k, v in high.items()}
-    albedo, normal = np.split(high["guides"], 2, axis=-1)
-    high["guides"] = np.concatenate((albedo[..., order], normal), axis=-1)
-    return low[..., order], high
+    return crop.with_colours(lambda x: x[..., order])
 
 
-def transpose_and_flip(
-    low: Array, high: Pictures, random: np.random.Generator
-) -> tuple[Array, Pictures]:
+def transpose_and_flip(crop: Crop, random: np.random.Generator) -> Crop:
     """One of the eight symmetries of the square; normals turn with the picture.
 
     Normals are in camera space, x to the right and y up, rows run downwards: so a
     transposed picture has x' = -y, y' = -x.
     """
     transposed, flip_y, flip_x = random.integers(2, size=3)
-    normals = np.eye(3, dtype=np.float32)
+    turn = np.eye(3, dtype=np.float32)
     if transposed:
-        low = low.swapaxes(0, 1)
-        high = {k: v.swapaxes(0, 1) for k, v in high.items()}
-        normals = np.array([[0, -1, 0], [-1, 0, 0], [0, 0, 1]], np.float32)
+        crop = crop.with_pictures(lambda x: x.swapaxes(0, 1))
+        turn = np.array([[0, -1, 0], [-1, 0, 0], [0, 0, 1]], np.float32)
     if flip_y:
-        low, high = low[::-1], {k: v[::-1] for k, v in high.items()}
-        normals = normals * np.array([1, -1, 1], np.float32)
+        crop = crop.with_pictures(lambda x: x[::-1])
+        turn = turn * np.array([1, -1, 1], np.float32)
     if flip_x:
-        low, high = low[:, ::-1], {k: v[:, ::-1] for k, v in high.items()}
-        normals = normals * np.array([-1, 1, 1], np.float32)
-    albedo, normal = np.split(high["guides"], 2, axis=-1)
-    high["guides"] = np.concatenate((albedo, normal @ normals), axis=-1)
-    return low, high
+        crop = crop.with_pictures(lambda x: x[:, ::-1])
+        turn = turn * np.array([-1, 1, 1], np.float32)
+    return replace(crop, normal=crop.normal @ turn)
 
 
-def tint(
-    low: Array, high: Pictures, stops: float, random: np.random.Generator
-) -> tuple[Array, Pictures]:
+def tint(crop: Crop, stops: float, random: np.random.Generator) -> Crop:
     """Colour surfaces: a factor per channel, at most 1, on radiance and albedo.
 
     Of one bounce of light; longer paths would be tinted more than once.
     """
     factor = np.exp2(random.normal(0, stops, 3)).astype(np.float32)
     factor /= factor.max()
-    high = {k: v if k == "guides" else v * factor for k, v in high.items()}
-    albedo, normal = np.split(high["guides"], 2, axis=-1)
-    high["guides"] = np.concatenate((albedo * factor, normal), axis=-1)
-    return low * factor, high
+    return crop.with_colours(lambda x: x * factor)
 
 
 def random_rotation(random: np.random.Generator) -> Array:
@@ -239,16 +226,15 @@ def random_rotation(random: np.random.Generator) -> Array:
     return q.astype(np.float32)
 
 
-def to_batch(low: Array, high: Pictures, exposure: float) -> Batch:
-    """Pictures to a batch of one, radiance in the transfer domain."""
-    guides = [high["guides"]]
-    if "radiance" in high:
-        guides.append(transfer(high["radiance"], exposure))
-    reference, _ = clean_radiance(high["reference"])
+def to_batch(crop: Crop) -> Batch:
+    """A batch of one, radiance in the transfer domain."""
+    guides = [crop.albedo, crop.normal]
+    if crop.guide_radiance is not None:
+        guides.append(transfer(crop.guide_radiance, crop.exposure))
     return Batch(
-        to_tensor(transfer(low, exposure)),
+        to_tensor(transfer(crop.low, crop.exposure)),
         to_tensor(np.concatenate(guides, axis=-1)),
-        to_tensor(transfer(reference, exposure)),
+        to_tensor(transfer(crop.reference, crop.exposure)),
     )
 
 

@@ -9,8 +9,6 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections import OrderedDict
-from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -22,16 +20,16 @@ from tqdm import tqdm
 
 from .. import weights
 from ..atomic import replacing
-from ..errors import UsageError
-from ..front_end import ALBEDO_EPSILON, area_mean, inverse_transfer, upsample_bilinear
-from ..metrics import psnr, to_srgb
 from ..network import XRDS, preset_config
 from .config import TrainingConfig
-from .data import Batch, Variation, Window, draw, read_window
+from .data import Batch, draw
 from .losses import weighted
+from .validation import Scores, validate
+from .windows import WindowSet, array_names, find_windows, paths_of
 
 CHECKPOINT = "checkpoint.pt"
 WINDOWS = "windows.json"
+SPLITS = ("train", "validation")
 
 
 class Trainer:
@@ -52,63 +50,39 @@ class Trainer:
         )
         self.step = 0
         self.best = -math.inf
-        self.files = self.choose_files()
-        self.windows: OrderedDict[str, Window] = OrderedDict()
+        self.windows = self.find_windows()
 
     # --- data -------------------------------------------------------------------------
 
-    def choose_files(self) -> dict[str, list[str]]:
+    def find_windows(self) -> dict[str, WindowSet]:
         """The windows of this run: those that lay there when it began."""
-        kept = self.folder / WINDOWS
-        if kept.exists():
-            return json.loads(kept.read_text())
-        data = Path(self.config.data)
-        files = {
-            split: sorted(p.name for p in (data / split).glob("*.npz"))
-            for split in ("train", "validation")
-        }
-        for split, names in files.items():
-            if not names:
-                raise UsageError(f"no windows in {data / split}; run `xrds dataset`")
-        with replacing(kept) as part:
-            part.write_text(json.dumps(files))
-        return files
-
-    def window(self, split: str, name: str) -> Window:
-        if name not in self.windows:
-            path = Path(self.config.data) / split / name
-            self.windows[name] = read_window(
-                path, self.config.scale, self.config.guides
+        c = self.config
+        kept, folders = self.folder / WINDOWS, [Path(folder) for folder in c.data]
+        noisy = c.variation.noisy > 0
+        if not kept.exists():
+            low, high = array_names(c.scale, c.guides, noisy)
+            found = {s: find_windows(folders, s, low + high) for s in SPLITS}
+            with replacing(kept) as part:
+                part.write_text(json.dumps(found))
+        files = json.loads(kept.read_text())
+        memory = c.cache_gigabytes * 1e9
+        return {
+            split: WindowSet(
+                paths_of(folders, split, files[split]), c.scale, c.guides, noisy, memory
             )
-        return self.windows[name]
+            for split in SPLITS
+        }
 
     def training_batch(self) -> Batch:
-        config = self.config
-        random = np.random.default_rng((config.seed, self.step))
-        names = random.choice(self.files["train"], config.batch)
-        crops = [
-            draw(
-                self.window("train", name),
-                config.scale,
-                config.guides,
-                config.variation,
-                random,
-                config.crop,
-            )
-            for name in names
-        ]
-        return Batch.stack(crops)
+        """The crops of this step; each follows from (seed, step, place) alone."""
+        c = self.config
+        return Batch.stack([self.training_crop(place) for place in range(c.batch)])
 
-    def validation_batches(self) -> Iterator[Batch]:
-        """Whole windows as they are, spread over the split, the same ones each time."""
-        names = self.files["validation"]
-        count = min(self.config.validation_windows, len(names))
-        for i in range(count):
-            window = self.window("validation", names[i * len(names) // count])
-            random = np.random.default_rng(i)
-            yield draw(
-                window, self.config.scale, self.config.guides, Variation(), random
-            )
+    def training_crop(self, place: int) -> Batch:
+        c, windows = self.config, self.windows["train"]
+        random = np.random.default_rng((c.seed, self.step, place))
+        window = windows[int(random.integers(len(windows)))]
+        return draw(window, c.scale, c.guides, c.variation, random, c.crop)
 
     # --- steps ------------------------------------------------------------------------
 
@@ -145,20 +119,16 @@ class Trainer:
             self.average[name].lerp_(value, 1 - decay)
         return loss.item()
 
-    def validate(self) -> dict[str, float]:
-        """Mean PSNR in dB of the averaged weights and of plain enlargements."""
+    def validate(self) -> Scores:
+        """Score the averaged weights."""
         trained = {k: v.clone() for k, v in self.network.state_dict().items()}
         self.network.load_state_dict(self.average)
-        methods = {"xrds": self.forward, "bicubic": bicubic, "demodulated": demodulated}
-        scores: dict[str, list[float]] = {name: [] for name in methods}
-        with torch.inference_mode():
-            for batch in self.validation_batches():
-                reference = displayed(batch.reference)
-                for name, method in methods.items():
-                    picture = displayed(method(batch).cpu())
-                    scores[name].append(psnr(picture, reference))
+        c, windows = self.config, self.windows["validation"]
+        scores = validate(
+            self.forward, windows, c.validation_windows, c.scale, c.guides
+        )
         self.network.load_state_dict(trained)
-        return {name: float(np.mean(values)) for name, values in scores.items()}
+        return scores
 
     # --- the run ----------------------------------------------------------------------
 
@@ -168,7 +138,7 @@ class Trainer:
         progress = tqdm(total=self.config.steps, initial=self.step, unit="step")
         losses: list[float] = []
         began = time.perf_counter()
-        scores: dict[str, Any] = {}
+        told: dict[str, Any] = {}
         try:
             while self.step < self.config.steps:
                 losses.append(self.train_step())
@@ -178,45 +148,48 @@ class Trainer:
                     scores = self.validate()
                     seconds = (time.perf_counter() - began) / len(losses)
                     self.record(float(np.mean(losses)), seconds, scores)
-                    progress.set_postfix(scores)
+                    told = {"gain": scores.gain(), "psnr": scores.means()}
+                    progress.set_postfix(gain=told["gain"], **told["psnr"]["rendered"])
                     losses, began = [], time.perf_counter()
         except KeyboardInterrupt:
             self.save_checkpoint()
             raise
         finally:
             progress.close()
-        return {"step": self.step, **scores}
+        return {"step": self.step, **told}
 
-    def record(self, loss: float, seconds: float, scores: dict[str, float]) -> None:
+    def record(self, loss: float, seconds: float, scores: Scores) -> None:
         """Write the statistics line, the checkpoint and, where it is best, weights."""
         line = {
             "step": self.step,
             "loss": loss,
             "learning_rate": self.learning_rate(),
             "seconds_per_step": seconds,
-            "psnr": scores,
+            "gain": scores.gain(),
+            "psnr": scores.means(),
         }
         with (self.folder / "stats.jsonl").open("a") as stats:
             stats.write(json.dumps(line) + "\n")
-        if scores["xrds"] > self.best:
-            self.best = scores["xrds"]
+        if scores.gain() > self.best:
+            self.best = scores.gain()
             self.save_weights(scores)
         self.save_checkpoint()
 
-    def save_weights(self, scores: dict[str, float]) -> None:
+    def save_weights(self, scores: Scores) -> None:
         """Write the averaged weights with what they were trained on."""
         network = XRDS(self.network.config)
         network.load_state_dict({k: v.cpu() for k, v in self.average.items()})
-        series = self.window("train", self.files["train"][0]).meta["blender_series"]
+        series = self.windows["train"][0].meta["blender_series"]
         record = {
             "preset": self.config.preset,
             "blender_series": series,
             "training": json.dumps(
                 {
                     "step": self.step,
-                    "windows": len(self.files["train"]),
-                    "validation_psnr": scores,
-                    "config": asdict(replace(self.config, data="", start="")),
+                    "windows": len(self.windows["train"]),
+                    "validation_gain": scores.gain(),
+                    "validation_psnr": scores.means(),
+                    "config": asdict(replace(self.config, data=(), start="")),
                 }
             ),
         }
@@ -251,25 +224,6 @@ def start_from(network: XRDS, path: Path) -> None:
     own = network.state_dict()
     own |= {k: v for k, v in source.items() if k in own and v.shape == own[k].shape}
     network.load_state_dict(own)
-
-
-def bicubic(batch: Batch) -> Tensor:
-    """Plain interpolation of the radiance, in the transfer domain."""
-    size = batch.reference.shape[-2:]
-    return torch.nn.functional.interpolate(batch.radiance, size=size, mode="bicubic")
-
-
-def demodulated(batch: Batch) -> Tensor:
-    """Bilinear interpolation of the radiance over the albedo, then times the albedo."""
-    scale = batch.reference.shape[-1] // batch.radiance.shape[-1]
-    albedo = batch.guides[:, :3] + ALBEDO_EPSILON
-    lighting = torch.expm1(batch.radiance) / area_mean(albedo, scale)
-    return torch.log1p(upsample_bilinear(lighting, scale) * albedo)
-
-
-def displayed(t: Tensor) -> np.ndarray:
-    """(1, 3, H, W) in the transfer domain to sRGB at the picture's own exposure."""
-    return to_srgb(inverse_transfer(t.float(), 1.0)[0].permute(1, 2, 0).numpy())
 
 
 def train(config: TrainingConfig, folder: Path) -> dict[str, Any]:
