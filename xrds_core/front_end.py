@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from .kernels import ALBEDO_EPSILON
+from .regression import ALBEDO_EPSILON, regress
 
 Picture = NDArray[np.float32]
 ArrayOrTensor = TypeVar("ArrayOrTensor", NDArray[np.float32], Tensor)
@@ -186,6 +186,22 @@ def demodulated_base(radiance: Picture, albedo: Picture, scale: int) -> Picture:
     guide = _to_tensor(albedo) + ALBEDO_EPSILON
     lighting = _to_tensor(radiance) / area_mean(guide, scale)
     return _to_picture(upsample_bilinear(lighting, scale) * guide)
+
+
+def regressed_base(
+    radiance: Picture, albedo: Picture, normal: Picture, scale: int
+) -> Picture:
+    """Return up(L / down(E)) E with E what the guides explain of L around every pixel.
+
+    As `demodulated_base`, but the picture itself decides how much of the albedo and of
+    the normal's shading goes into E: see `regression.regress`.
+    """
+    gain = _gain(auto_exposure(radiance))
+    low = _to_tensor(radiance * gain)
+    guides = torch.cat((_to_tensor(albedo), _to_tensor(normal)), dim=1)
+    explained, _ = regress(low, guides, scale)
+    rest = low / area_mean(explained, scale)
+    return _to_picture(upsample_bilinear(rest, scale) * explained) / gain
 
 
 def upsample_alpha(low_alpha: Picture, guide_alpha: Picture, scale: int) -> Picture:

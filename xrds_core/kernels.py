@@ -12,9 +12,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-# Added to albedo before it divides radiance: bounds the quotient on black surfaces.
-ALBEDO_EPSILON = 0.02
-# The same for the radiance of `full` guides, in units of k e x.
+from .regression import ALBEDO_EPSILON, regress
+
+# Added to the radiance of `full` guides, in units of k e x, before it divides.
 RADIANCE_EPSILON = 0.05
 # Unit of the predicted sharpness: logits per squared distance between guides.
 SHARPNESS_UNIT = 4.0
@@ -22,6 +22,11 @@ SHARPNESS_UNIT = 4.0
 SHARPENING_LIMIT = 0.3
 # The base may brighten or darken what its kernels gather by this factor at most.
 GAIN_LIMIT = 4.0
+# Steps towards a picture whose area means are the low-resolution radiance, the factor
+# that one step may change a pixel by, and what is added to both sides of its quotient.
+MATCHING_STEPS, MATCHING_LIMIT, MATCHING_EPSILON = 2, 3.0, 0.02
+# Logit of how far a step goes, untrained.
+TRUST = 3.0
 
 
 class Source(NamedTuple):
@@ -34,8 +39,13 @@ class Source(NamedTuple):
 Sources = list[Source]
 
 
-def find_sources(radiance: Tensor, guides: Tensor, scale: int) -> Sources:
-    """The radiance as it is, and demodulated by each guide that can modulate it.
+def find_sources(
+    radiance: Tensor, guides: Tensor, scale: int
+) -> tuple[Sources, Tensor]:
+    """The radiance as it is and demodulated in several ways, and slopes (B, 4, h, w).
+
+    By albedo, by the radiance of `full` guides, and last by what albedo and normal
+    explain of it around every pixel, with the slopes of that (`regression.regress`).
 
     `radiance` (B, 3, h, w) is in the transfer domain. The division is by the area mean
     of the modulator, so that modulating again keeps the mean of the low-resolution
@@ -47,7 +57,10 @@ def find_sources(radiance: Tensor, guides: Tensor, scale: int) -> Sources:
     modulators = [guides[:, :3] + ALBEDO_EPSILON]
     if guides.shape[1] > 6:
         modulators.append(torch.expm1(guides[:, 6:9]) + RADIANCE_EPSILON)
-    return [plain, *(Source(low / F.avg_pool2d(m, scale), m) for m in modulators)]
+    explained, slopes = regress(low, guides, scale)
+    modulators.append(explained)
+    demodulated = [Source(low / F.avg_pool2d(m, scale), m) for m in modulators]
+    return [plain, *demodulated], slopes
 
 
 def neighbours(low: Tensor) -> list[Tensor]:
@@ -74,18 +87,24 @@ class KernelTail(nn.Module):
     """The demodulated base, its kernels predicted.
 
     Every output pixel is a convex combination of its 3x3 low-resolution neighbours in
-    every source: the radiance as it is, and demodulated by the albedo and, with `full`
-    guides, by the full-resolution radiance, then modulated at the pixel. What bicubic
+    every source of `find_sources`, modulated at the pixel. What bicubic
     interpolation adds to bilinear is added to each source: a low-resolution pixel is
     the mean over its area, which is smoother than the picture. A gain, bounded by
     `GAIN_LIMIT`, scales the result. So nothing turns negative or becomes coloured by
-    itself. Kernels start from bilinear weights and fall with the distance between
+    itself. At last the picture's area means are brought near the low-resolution
+    radiance. Kernels start from bilinear weights and fall with the distance between
     guides, as a joint bilateral filter's, as fast as the network asks; untrained, the
-    result is bicubic interpolation of the demodulated radiance.
+    result is all but bicubic interpolation of the last source.
     """
 
     def __init__(
-        self, scale: int, cell: int, channels: int, width: int, sources: int
+        self,
+        scale: int,
+        cell: int,
+        channels: int,
+        width: int,
+        guides: int,
+        sources: int,
     ) -> None:
         super().__init__()
         self.scale, self.cell = scale, cell
@@ -93,13 +112,13 @@ class KernelTail(nn.Module):
         self.norm = nn.LayerNorm(channels)
         self.expand = nn.Conv2d(channels, width * cell**2, 3, padding=1)
         # features, guides, and how the other sources differ from plain radiance
-        inputs = width + 3 * sources + 3 * (sources - 1)
+        inputs = width + guides + 3 * (sources - 1)
         self.mix = nn.Conv2d(inputs, width, 3, padding=1)
-        # per pixel: logits of each source, sharpness by albedo and by normal, gain
-        self.predict = nn.Conv2d(width, 9 * sources + 3, 1)
+        # per pixel: logits of sources, sharpness by albedo and by normal, gain, trust
+        self.predict = nn.Conv2d(width, 9 * sources + 4, 1)
         for parameter in self.predict.parameters():
             nn.init.zeros_(parameter)
-        prior = torch.tensor([-3.0] + [0.0] * (sources - 1))  # plain radiance, others
+        prior = torch.tensor([-3.0] * (sources - 1) + [0.0])
         logits = prior[:, None, None] + bilinear_logits(scale)
         self.prior: Tensor
         self.register_buffer("prior", logits, persistent=False)
@@ -113,15 +132,16 @@ class KernelTail(nn.Module):
         ]
         differences = [other - plain for other in others]
         x = F.relu(self.mix(torch.cat((x, guides, *differences), dim=1)))
-        x = F.pixel_unshuffle(self.predict(x), self.scale)
         # sums over radiance need float32, whatever the precision of the layers above
-        return torch.log1p(self.combine(x.float(), guides.float(), sources))
+        x = self.predict(x).float()
+        picture = self.combine(x[:, :-1], guides.float(), sources)
+        return torch.log1p(self.match(picture, x[:, -1:], sources[0].low))
 
     def enlarge(self, low: Tensor, mode: str) -> Tensor:
         return F.interpolate(low, scale_factor=self.scale, mode=mode)
 
     def combine(self, predicted: Tensor, guides: Tensor, sources: Sources) -> Tensor:
-        predicted = predicted.unflatten(1, (-1, self.scale**2))  # (B, n, s*s, h, w)
+        predicted = self.fold(predicted)  # (B, n, s*s, h, w)
         kernels = self.kernels(predicted, guides)
         out = torch.zeros((), device=guides.device)
         for m, (low, modulator) in enumerate(sources):
@@ -131,6 +151,21 @@ class KernelTail(nn.Module):
             out = out + gathered * self.fold(modulator)
         gain = torch.exp(math.log(GAIN_LIMIT) * torch.tanh(predicted[:, -1:]))
         return F.pixel_shuffle((out * gain).clamp(min=0).flatten(1, 2), self.scale)
+
+    def match(self, picture: Tensor, trust: Tensor, low: Tensor) -> Tensor:
+        """Bring the area means of the picture near the low-resolution radiance.
+
+        Back-projection (Irani and Peleg, 1991) by factors, so that black stays black;
+        where the radiance is noise rather than picture, `trust` can withhold it.
+        """
+        power = torch.sigmoid(F.avg_pool2d(trust, self.scale) + TRUST)
+        most = math.log(MATCHING_LIMIT)
+        for _ in range(MATCHING_STEPS):
+            means = F.avg_pool2d(picture, self.scale) + MATCHING_EPSILON
+            factor = ((low + MATCHING_EPSILON) / means).log() * power
+            factor = factor.clamp(-most, most).exp()
+            picture = picture * self.enlarge(factor, "bilinear")
+        return picture
 
     def sharpening(self, low: Tensor) -> Tensor:
         smooth = self.enlarge(low, "bilinear")

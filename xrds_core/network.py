@@ -24,6 +24,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from .kernels import KernelTail, Sources, find_sources
+from .regression import FEATURES
 
 # Channels of the guide stack: albedo 0-2, normal 3-5, full-resolution radiance 6-8.
 GUIDE_CHANNELS: dict[str, tuple[int, ...]] = {
@@ -95,7 +96,12 @@ class NetworkConfig:
     @property
     def source_count(self) -> int:
         """Pictures that the base is gathered from, see `find_sources`; 1 without."""
-        return self.guide_count // 3 if self.base else 1
+        return self.guide_count // 3 + 1 if self.base else 1
+
+    @property
+    def radiance_count(self) -> int:
+        """Channels that the radiance branch is given: see `find_sources`."""
+        return 3 * self.source_count + (FEATURES if self.base else 0)
 
     @property
     def low_multiple(self) -> int:
@@ -138,7 +144,7 @@ def preset_config(preset: str, scale: int, guides: str = "fast") -> NetworkConfi
 
 
 def conv3(inputs: int, outputs: int) -> nn.Conv2d:
-    """The only convolution here: 3x3, stride 1, zero padding, bias."""
+    """The only convolution here: 3x3, stride 1, padded, bias."""
     return nn.Conv2d(inputs, outputs, 3, padding=1)
 
 
@@ -405,7 +411,7 @@ class XRDS(nn.Module):
         steps = int(math.log2(config.cell // config.guide_stride))
         inputs = len(GUIDE_CHANNELS[config.guides]) or config.guide_count
         self.radiance_head = nn.Sequential(
-            nn.PixelUnshuffle(fold), conv3(3 * config.source_count * fold**2, c)
+            nn.PixelUnshuffle(fold), conv3(config.radiance_count * fold**2, c)
         )
         self.guide_head = nn.Sequential(
             nn.PixelUnshuffle(config.guide_stride),
@@ -420,10 +426,15 @@ class XRDS(nn.Module):
         self.groups = nn.ModuleList(XDG(config) for _ in range(config.groups))
         self.fuse = conv3(2 * c, c)
         if config.base:
-            sizes = config.cell, c, config.tail_channels, config.source_count
-            self.tail: nn.Module = KernelTail(config.scale, *sizes)
+            sizes = config.scale, config.cell, c, config.tail_channels
+            counts = config.guide_count, config.source_count
+            self.tail: nn.Module = KernelTail(*sizes, *counts)
         else:
             self.tail = PixelTail(config)
+        if config.base:  # the paper pads with zeros, which darkens or tints the rim
+            for layer in self.modules():
+                if isinstance(layer, nn.Conv2d):
+                    layer.padding_mode = "replicate"
 
     def forward(self, radiance: Tensor, guides: Tensor) -> Tensor:
         """Enlarge one batch.
@@ -445,8 +456,9 @@ class XRDS(nn.Module):
         radiance, guides = self.pad(radiance, 1), self.pad(guides, s)
         sources: Sources = []
         if self.config.base:
-            sources = find_sources(radiance, guides, s)
-            radiance = torch.cat([torch.log1p(x.low) for x in sources], dim=1)
+            sources, slopes = find_sources(radiance, guides, s)
+            logs = [torch.log1p(x.low) for x in sources]
+            radiance = torch.cat((*logs, slopes), dim=1)
         features = self.features(radiance, guides)
         return self.tail(features, guides, sources)[..., : s * h, : s * w]
 

@@ -31,6 +31,7 @@ ENLARGEMENTS: dict[str, Enlargement] = {
         low, albedo, s
     ),
     "joint_bilateral": baselines.joint_bilateral,
+    "regressed": front_end.regressed_base,
 }
 
 

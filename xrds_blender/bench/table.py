@@ -13,6 +13,7 @@ COLUMNS = {
     "bicubic": "bicubic",
     "demodulated_bilinear": "demod.",
     "joint_bilateral": "joint b.",
+    "regressed": "regressed",
     "oidn_equal_spp": "OIDN=spp",
     "oidn_equal_time": "OIDN=time",
 }

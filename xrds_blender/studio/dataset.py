@@ -46,7 +46,7 @@ class Recipe:
     """How windows are made. Sizes are pixels, samples are per pixel."""
 
     out: Path
-    scales: tuple[int, ...] = (2, 4)
+    scales: tuple[int, ...] = (2, 4, 8)
     assets: Path | None = None
     window: int = 256
     views: int = 2
@@ -97,7 +97,7 @@ def generate(
     out: str | Path,
     seed: int = 0,
     count: int = 1,
-    scales: Sequence[int] = (2, 4),
+    scales: Sequence[int] = (2, 4, 8),
     assets: str | Path | None = None,
     **options: Any,
 ) -> int:

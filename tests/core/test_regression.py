@@ -1,0 +1,103 @@
+"""The first-order regression under the base of the small presets."""
+
+from __future__ import annotations
+
+import pytest
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from xrds_core.regression import ALBEDO_EPSILON, blur, regress, solve
+
+
+def smooth(*shape: int) -> Tensor:
+    return blur(blur(blur(torch.rand(*shape))))
+
+
+def explained(radiance: Tensor, guides: Tensor, scale: int) -> Tensor:
+    """The radiance over what the guides explain of it, enlarged, times that again."""
+    factor, _ = regress(radiance, guides, scale)
+    rest = radiance / F.avg_pool2d(factor, scale)
+    return F.interpolate(rest, scale_factor=scale, mode="bilinear") * factor
+
+
+def error(picture: Tensor, reference: Tensor) -> float:
+    return float((picture - reference).abs().mean() / reference.mean())
+
+
+@pytest.mark.parametrize("scale", [1, 2, 4])
+def test_texture_under_even_light_comes_back_sharp(scale: int) -> None:
+    torch.manual_seed(0)
+    albedo = torch.rand(2, 3, 32 * scale, 32 * scale).round() * 0.6 + 0.2
+    reference = albedo * (0.5 + smooth(2, 1, 32 * scale, 32 * scale))
+    low = F.avg_pool2d(reference, scale)
+    guides = torch.cat((albedo, torch.zeros_like(albedo)), dim=1)
+    plain = F.interpolate(low, scale_factor=scale, mode="bilinear")
+    result = explained(low, guides, scale)
+    assert error(result, reference) < max(0.3 * error(plain, reference), 0.01)
+
+
+def test_shading_by_the_normal_is_found() -> None:
+    torch.manual_seed(1)
+    tilt = (smooth(1, 1, 64, 64) - 0.5) * 3 + torch.rand(1, 1, 64, 64).round() * 0.6
+    normal = torch.cat((tilt, torch.zeros_like(tilt), (1 - tilt**2).clamp(0).sqrt()), 1)
+    reference = (2 * tilt).exp().expand(-1, 3, -1, -1)
+    guides = torch.cat((torch.full_like(normal, 0.5), normal), dim=1)
+    low = F.avg_pool2d(reference, 2)
+    plain = F.interpolate(low, scale_factor=2, mode="bilinear")
+    result = explained(low, guides, 2)
+    assert error(result, reference) < 0.7 * error(plain, reference)
+
+
+def test_guides_that_say_nothing_are_left_out() -> None:
+    torch.manual_seed(2)
+    low = 0.3 + smooth(1, 3, 24, 24)
+    guides = torch.rand(1, 6, 48, 48)
+    guides[:, 3:] = 0
+    _, slopes = regress(low, guides, 2)
+    lying = F.interpolate(low, scale_factor=2) * (guides[:, :3] + ALBEDO_EPSILON)
+    _, believed = regress(F.avg_pool2d(lying, 2), guides, 2)
+    assert slopes[:, 0].mean() < 0.1
+    assert believed[:, 0].mean() > 0.5
+
+
+def test_grey_stays_grey_and_channels_may_be_exchanged() -> None:
+    torch.manual_seed(3)
+    low, guides = torch.rand(1, 3, 16, 16), torch.rand(1, 6, 32, 32)
+    factor, slopes = regress(low, guides, 2)
+    order = [2, 0, 1]
+    exchanged = torch.cat((guides[:, order], guides[:, 3:]), dim=1)
+    other, other_slopes = regress(low[:, order], exchanged, 2)
+    torch.testing.assert_close(other, factor[:, order])
+    torch.testing.assert_close(other_slopes, slopes)
+    grey = torch.cat((guides[:, :1].expand(-1, 3, -1, -1), guides[:, 3:]), dim=1)
+    factor, _ = regress(low, grey, 2)
+    torch.testing.assert_close(factor, factor[:, :1].expand_as(factor))
+
+
+@pytest.mark.parametrize("scale", [2.0**-40, 1.0, 2.0**40])
+@pytest.mark.parametrize("spread", [0.0, 12.0])
+def test_factors_stay_finite_and_bounded(scale: float, spread: float) -> None:
+    torch.manual_seed(5)
+    low = scale * 10 ** (spread * (torch.rand(1, 3, 16, 16) - 0.5))
+    guides = torch.rand(1, 6, 32, 32) * 2 - 1
+    guides[:, :3] = guides[:, :3].clamp(min=0)
+    factor, slopes = regress(low, guides, 2)
+    assert factor.isfinite().all()
+    assert slopes.isfinite().all()
+    assert factor.min() > 1e-6
+    assert factor.max() < 1e6
+
+
+def test_solver_agrees_with_lapack() -> None:
+    torch.manual_seed(6)
+    roots = torch.rand(2, 3, 5, 4, 4)
+    matrix = roots @ roots.mT + 0.05 * torch.eye(4)
+    right = torch.rand(2, 3, 5, 4)
+    planes = {
+        (i, j): (matrix[..., i, j] if j < 4 else right[..., i])[:, None]
+        for i in range(4)
+        for j in range(i, 5)
+    }
+    ours = torch.stack([x[:, 0] for x in solve(planes, 4)], dim=-1)
+    torch.testing.assert_close(ours, torch.linalg.solve(matrix, right))

@@ -1,0 +1,138 @@
+"""First-order regression of low-resolution radiance on the guides.
+
+How much of the picture the guides explain differs from place to place: nearly all of it
+on textured walls, nothing on car paint. A linear model of the log radiance in the
+guides, fitted around every low-resolution pixel, finds out: He et al., "Guided Image
+Filtering" (2010), and Bitterli et al., "Nonlinearly Weighted First-Order Regression for
+Denoising Monte Carlo Renderings" (2016), in the log domain, where its prediction stays
+positive. Shape letters as in `network`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+# Added to albedo before its logarithm or a division by it: bounds both on black.
+ALBEDO_EPSILON = 0.02
+# Added to radiance, in units of k e x, before its logarithm.
+RADIANCE_FLOOR = 0.02
+# Variance of the log radiance, unexplained by a fit, that doubles its ridge.
+NOISE = 0.01
+
+
+class Feature(NamedTuple):
+    """A guide, or one component of it, that the radiance is regressed on."""
+
+    full: Tensor  # (B, 3 or 1, H, W)
+    low: Tensor  # (B, 3 or 1, h, w), of the area means of the guide
+    ridge: float  # variance below which it explains nothing, without noise
+    slope: tuple[float, float]  # range of its slope
+
+
+FEATURES = 4
+
+
+def find_features(guides: Tensor, scale: int) -> list[Feature]:
+    """Log albedo and the three components of the normal."""
+    albedo, normal = guides[:, :3] + ALBEDO_EPSILON, guides[:, 3:6]
+    low_albedo, low_normal = (F.avg_pool2d(x, scale) for x in (albedo, normal))
+    components = zip(normal.split(1, dim=1), low_normal.split(1, dim=1), strict=True)
+    return [
+        Feature(albedo.log(), low_albedo.log(), 0.005, (0.0, 1.0)),
+        *(Feature(full, low, 0.01, (-3.0, 3.0)) for full, low in components),
+    ]
+
+
+def regress(radiance: Tensor, guides: Tensor, scale: int) -> tuple[Tensor, Tensor]:
+    """What the guides explain of the radiance, as a factor, and the fit's slopes.
+
+    The factor (B, 3, H, W), positive, is albedo^a exp(n . w) with the slopes a and w of
+    a fit (B, 4, h, w) to `radiance` (B, 3, h, w), which is linear, in units of k e x.
+    The slopes are common to the colour channels, so grey stays grey.
+    """
+    features = find_features(guides, scale)
+    slopes = blur(fit(radiance, features))
+    enlarged = F.interpolate(slopes, scale_factor=scale, mode="bilinear")
+    terms = (
+        slope * feature.full
+        for slope, feature in zip(enlarged.split(1, dim=1), features, strict=True)
+    )
+    return sum(terms, torch.zeros_like(enlarged[:, :1])).exp(), slopes
+
+
+def fit(radiance: Tensor, features: list[Feature]) -> Tensor:
+    """Slopes of the log radiance by each feature: (B, features, h, w).
+
+    Where a feature has three channels, they are samples of one variable: each channel
+    of the radiance goes with its own.
+    """
+    count = len(features)
+    x = [feature.low for feature in features]
+    x.append((radiance + RADIANCE_FLOOR).log())
+    pairs = [(i, j) for i in range(count + 1) for j in range(i, count + 1)]
+    moments = [mean(x[i] * x[j]) for i, j in pairs]
+    sums = blur(torch.cat([*moments, *x], dim=1))
+    means = sums[:, len(pairs) :].split([plane.shape[1] for plane in x], dim=1)
+    covariance = {
+        (i, j): sums[:, k : k + 1] - mean(means[i] * means[j])
+        for k, (i, j) in enumerate(pairs)
+    }
+
+    def ridged(unexplained: Tensor | float) -> list[Tensor]:
+        diagonal = {
+            (i, i): covariance[i, i] + feature.ridge * (1 + unexplained / NOISE)
+            for i, feature in enumerate(features)
+        }
+        return solve(covariance | diagonal, count)
+
+    # what is left to chance sets how far chance may have made up the slopes
+    terms = (slope * covariance[i, count] for i, slope in enumerate(ridged(0.0)))
+    variance = covariance[count, count]
+    slopes = ridged((variance - sum(terms, torch.zeros_like(variance))).clamp(min=0))
+    clamped = (
+        slope.clamp(*feature.slope)
+        for slope, feature in zip(slopes, features, strict=True)
+    )
+    return torch.cat(list(clamped), dim=1)
+
+
+def mean(x: Tensor) -> Tensor:
+    """(B, C, h, w) to (B, 1, h, w)."""
+    return x if x.shape[1] == 1 else x.mean(1, keepdim=True)
+
+
+def solve(matrix: dict[tuple[int, int], Tensor], size: int) -> list[Tensor]:
+    """Solve a positive definite system of `size` unknowns at every pixel.
+
+    `matrix` holds the planes [i, j], i <= j, of the system and, as j = `size`, of its
+    right side. Elimination on whole planes: a batched solver would call LAPACK once for
+    each pixel.
+    """
+    rows = dict(matrix)
+    for k in range(size):
+        for i in range(k + 1, size):
+            factor = rows[k, i] / rows[k, k]
+            for j in range(i, size + 1):
+                rows[i, j] = rows[i, j] - factor * rows[k, j]
+    solution: list[Tensor] = []
+    for k in reversed(range(size)):
+        known = zip(range(k + 1, size), reversed(solution), strict=True)
+        rest = sum((rows[k, j] * x for j, x in known), torch.zeros_like(rows[k, k]))
+        solution.append((rows[k, size] - rest) / rows[k, k])
+    return solution[::-1]
+
+
+def blur(x: Tensor) -> Tensor:
+    """Every plane of (B, C, h, w) through a 5 x 5 tent, edge clamped."""
+    for axis in (2, 3):
+        ends = [x.narrow(axis, i, 1) for i in (0, x.shape[axis] - 1)]
+        padded = torch.cat((*2 * ends[:1], x, *2 * ends[1:]), dim=axis)
+        taps = [padded.narrow(axis, k, x.shape[axis]) for k in range(5)]
+        x = taps[0] + taps[4]
+        x = x.add_(taps[1], alpha=2).add_(taps[3], alpha=2).add_(taps[2], alpha=3)
+        x = x.div_(9)
+    return x
