@@ -164,12 +164,20 @@ def _dataset(options: argparse.Namespace) -> dict[str, Any]:
     return {"out": str(options.out), "windows": written}
 
 
-def _train(options: argparse.Namespace) -> dict[str, Any]:
+def _train(options: argparse.Namespace) -> dict[str, Any] | None:
     from xrds_core.training.config import read_config
     from xrds_core.training.train import train
 
     folder = options.out or Path("runs") / options.config.stem
-    return train(read_config(options.config), folder)
+    return train(read_config(options.config, options.changes), folder)
+
+
+def _train_lines(told: dict[str, Any]) -> list[str]:
+    best = told["best"]
+    return [
+        f"{told['out']}: {told['step']} steps, weights of step {best['step']} are "
+        f"{best['gain']:+.2f} dB on the better of bicubic and demodulated"
+    ]
 
 
 def _need_blender(command: str) -> None:
@@ -294,7 +302,15 @@ def _add_train(commands: Any) -> argparse.ArgumentParser:
     command = commands.add_parser("train", help="train or resume a network")
     command.add_argument("config", type=Path, metavar="CONFIG.toml")
     command.add_argument("--out", type=Path, metavar="RUN", help="runs/CONFIG")
-    command.set_defaults(work=_train, lines=lambda _: ())
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="changes",
+        metavar="KEY=VALUE",
+        help="in the place of the file's, as scale=8 or 'start=\"a.safetensors\"'",
+    )
+    command.set_defaults(work=_train, lines=_train_lines)
     return command
 
 

@@ -1,128 +1,81 @@
-"""Training: crops stay aligned, normals turn with the picture, runs resume exactly."""
+"""Training runs: they learn, stop when asked, and go on exactly where they were."""
 
 from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from xrds_core import weights
-from xrds_core.errors import PictureError, UsageError
-from xrds_core.training.config import TrainingConfig, read_config
-from xrds_core.training.data import (
-    Crop,
-    Variation,
-    draw,
-    random_rotation,
-    transpose_and_flip,
-)
+from xrds_core.errors import Cancelled, UsageError, WeightsError
+from xrds_core.training.config import TrainingConfig, read_config, to_toml
+from xrds_core.training.data import Variation
+from xrds_core.training.interruption import Interruption
 from xrds_core.training.losses import LOSSES
-from xrds_core.training.train import CHECKPOINT, Trainer, train
-from xrds_core.training.validation import Scores, validate
-from xrds_core.training.windows import WindowSet, read_window
+from xrds_core.training.train import Run, train
+from xrds_core.training.validation import Score, Validation, in_order, summary
+from xrds_core.training.windows import WindowSet
 
-SIZE = 32
-TINY = {"channels": 8, "guide_channels": 8, "window_size": 4, "tail_channels": 4}
-FULL_VARIATION = Variation(
-    noisy=0.3,
-    exposure_stops=1,
-    tint_stops=0.5,
-    rotated_normals=0.2,
-    black=0.1,
-    shaded=0.3,
-    symmetries=True,
-)
+ROOT = Path(__file__).resolve().parents[2]
 
 
-def write_window(path: Path, seed: int, scale: int = 2) -> None:
-    """A window whose reference is its albedo under one light: exactly demodulable."""
-    random = np.random.default_rng(seed)
-    albedo = random.uniform(0.1, 1, (SIZE, SIZE, 3))
-    normal = random.uniform(-1, 1, (SIZE, SIZE, 3))
-    reference = 2 * albedo
-    half = SIZE // scale
-    low = reference.reshape(half, scale, half, scale, 3).mean((1, 3))
-    guides = np.concatenate((albedo, normal), axis=-1)
-    arrays = {"reference": reference, "guides_a": guides, "guides_b": guides}
-    arrays |= {"guide_radiance_a": reference, "guide_radiance_b": reference}
-    for i in (0, 1):
-        arrays |= {f"low{scale}_{i}": low, f"low{scale}_{i}_noisy": low}
-    meta = {"guide_spp": [1, 4], "blender_series": "4.5"}
-    path.parent.mkdir(parents=True, exist_ok=True)
-    half_floats = {k: v.astype(np.float16) for k, v in arrays.items()}
-    np.savez_compressed(path, meta=json.dumps(meta), **half_floats)
+@pytest.fixture(autouse=True)
+def _one_thread() -> Iterator[None]:
+    """Tiny layers are slower on several threads, by far where others compute too."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
 
 
 @pytest.fixture
-def config(tmp_path: Path) -> TrainingConfig:
-    for seed in range(4):
-        split = "validation" if seed == 3 else "train"
-        write_window(tmp_path / "data" / split / f"{seed}.npz", seed)
-    return TrainingConfig(
-        data=(str(tmp_path / "data"),),
-        network=TINY,
-        steps=6,
-        batch=2,
-        crop=16,
-        validate_every=3,
-        variation=FULL_VARIATION,
-    )
+def _undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Drawing takes longer than all else in a run of six tiny steps."""
+    for name in ("write_curve", "write_samples"):
+        monkeypatch.setattr(f"xrds_core.training.train.{name}", lambda *_: None)
 
 
-@pytest.mark.parametrize("guides", ["fast", "full"])
-def test_crops_stay_aligned(config: TrainingConfig, guides: str) -> None:
-    window = read_window(Path(config.data[0]) / "train" / "0.npz", 2, guides)
-    for seed in range(20):
-        random = np.random.default_rng(seed)
-        variation = replace(FULL_VARIATION, black=0.0, shaded=0.0)
-        batch = draw(window, 2, guides, variation, random, 16)
-        assert batch.guides.shape == (1, 9 if guides == "full" else 6, 16, 16)
-        reference = torch.expm1(batch.reference)
-        low = torch.expm1(batch.radiance)
-        means = torch.nn.functional.avg_pool2d(reference, 2)
-        torch.testing.assert_close(means, low, rtol=2e-2, atol=1e-3)
-        ratio = reference / batch.guides[:, :3]
-        assert ratio.std() / ratio.mean() < 1e-2  # one light, whatever the variation
+undrawn = pytest.mark.usefixtures("_undrawn")
 
 
-def test_normals_turn_with_the_picture() -> None:
-    """A dome stays a dome under every symmetry: its normals point outwards."""
-    axis = np.linspace(-0.7, 0.7, 8, dtype=np.float32)
-    x, y = np.meshgrid(axis, -axis)  # y up, rows downwards
-    dome = np.stack((x, y, np.sqrt(1 - x**2 - y**2)), axis=-1)
-    seen = set()
-    for seed in range(64):
-        random = np.random.default_rng(seed)
-        marked = np.arange(64, dtype=np.float32).reshape(8, 8, 1)
-        whole = Crop(marked, marked, marked, dome, None, 1.0)
-        turned = transpose_and_flip(whole, random)
-        np.testing.assert_allclose(turned.normal, dome, atol=1e-6)
-        seen.add(turned.low.tobytes())
-    assert len(seen) == 8
+def records(folder: Path) -> list[dict[str, Any]]:
+    """The statistics but for the clock."""
+    lines = [json.loads(line) for line in lines_of(folder)]
+    for line in lines:
+        line.pop("seconds_per_step")
+    return lines
 
 
-def test_shaded_crops_are_albedo_under_smooth_light(config: TrainingConfig) -> None:
-    window = read_window(Path(config.data[0]) / "train" / "0.npz", 2, "fast")
-    random = np.random.default_rng(1)
-    batch = draw(window, 2, "fast", Variation(shaded=1.0), random)
-    reference, low = torch.expm1(batch.reference), torch.expm1(batch.radiance)
-    means = torch.nn.functional.avg_pool2d(reference, 2)
-    torch.testing.assert_close(means, low, rtol=1e-3, atol=1e-4)
-    light = reference / batch.guides[:, :3]
-    steps = light.diff(dim=-1).abs().mean() / light.mean()
-    texture = reference.diff(dim=-1).abs().mean() / reference.mean()
-    assert steps < 0.5 * texture
-    assert light.std() / light.mean() > 0.1
+def lines_of(folder: Path) -> list[str]:
+    stats = folder / "stats.jsonl"
+    return stats.read_text().splitlines() if stats.exists() else []
 
 
-def test_rotations_are_rotations() -> None:
-    rotation = random_rotation(np.random.default_rng(3))
-    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)
-    assert np.linalg.det(rotation) == pytest.approx(1, abs=1e-6)
+def stop_at(run: Run, step: int) -> None:
+    """Let Ctrl-C come while a run waits for the crops of a step."""
+    batch = run.loader.batch
+
+    def interrupted(at: int) -> Any:
+        if at == step:
+            signal.raise_signal(signal.SIGINT)
+        return batch(at)
+
+    run.loader.batch = interrupted
+
+
+# --- what is learnt -------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", LOSSES)
@@ -132,145 +85,332 @@ def test_losses_are_zero_only_without_error(name: str) -> None:
     assert LOSSES[name](picture, picture.flip(-1)).item() > 0
 
 
-def test_resumed_run_equals_an_unbroken_one(
+def test_training_lowers_the_loss(config: TrainingConfig, tmp_path: Path) -> None:
+    network = {**config.network, "base": False}  # knows nothing before it is trained
+    config = replace(config, steps=60, warmup=5, variation=Variation(), network=network)
+    run = Run(config, tmp_path / "run")
+    for _ in range(60):
+        run.train_step()
+    assert np.mean(run.losses[-10:]) < 0.8 * np.mean(run.losses[:10])
+
+
+def test_mixed_precision_keeps_weights_whole(
     config: TrainingConfig, tmp_path: Path
 ) -> None:
-    unbroken = Trainer(config, tmp_path / "unbroken")
-    losses = [unbroken.train_step() for _ in range(6)]
-
-    first = Trainer(config, tmp_path / "broken")
-    for _ in range(3):
-        first.train_step()
-    first.save_checkpoint()
-    second = Trainer(config, tmp_path / "broken")
-    second.resume()
-    assert second.step == 3
-    assert [second.train_step() for _ in range(3)] == losses[3:]
-
-
-def test_run_writes_weights_that_load(config: TrainingConfig, tmp_path: Path) -> None:
-    result = train(config, tmp_path / "run")
-    assert result["step"] == 6
-    assert (tmp_path / "run" / CHECKPOINT).exists()
-    lines = (tmp_path / "run" / "stats.jsonl").read_text().splitlines()
-    assert [json.loads(line)["step"] for line in lines] == [3, 6]
-    network, record = weights.load(tmp_path / "run" / "weights.safetensors")
-    assert network.config.scale == 2
-    assert record["blender_series"] == "4.5"
-    assert json.loads(record["training"])["config"]["variation"]["symmetries"]
+    config = replace(config, variation=Variation())
+    losses = {}
+    for precision in ("fp32", "bf16"):
+        run = Run(replace(config, precision=precision), tmp_path / precision)
+        for _ in range(6):
+            run.train_step()
+        losses[precision] = run.losses
+        state = run.learner.network.state_dict().values()
+        assert {x.dtype for x in state} == {torch.float32}
+    assert losses["bf16"] != losses["fp32"]
+    np.testing.assert_allclose(losses["bf16"], losses["fp32"], rtol=0.05)
 
 
-def test_training_lowers_the_loss(config: TrainingConfig, tmp_path: Path) -> None:
-    network = {**TINY, "base": False}  # which knows nothing before it is trained
-    config = replace(config, steps=60, warmup=5, variation=Variation(), network=network)
-    trainer = Trainer(config, tmp_path / "run")
-    losses = [trainer.train_step() for _ in range(60)]
-    assert np.mean(losses[-10:]) < 0.8 * np.mean(losses[:10])
+def test_average_follows_and_is_what_is_validated(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
+    run = Run(replace(config, average=0.5), tmp_path / "run")
+    learner = run.learner
+    before = {k: v.clone() for k, v in learner.average.items()}
+    run.train_step()
+    learnt = {k: v.clone() for k, v in learner.network.state_dict().items()}
+    decay = 1 / 11  # a young average follows closely
+    for name, value in learnt.items():
+        expected = decay * before[name] + (1 - decay) * value
+        torch.testing.assert_close(learner.average[name], expected)
+    with learner.averaged():
+        own = learner.network.state_dict()
+        assert all(torch.equal(own[k], v) for k, v in learner.average.items())
+    own = learner.network.state_dict()
+    assert all(torch.equal(own[k], v) for k, v in learnt.items())
+    exact = Run(replace(config, average=0.0), tmp_path / "exact")
+    exact.train_step()
+    own = exact.learner.network.state_dict()
+    assert all(torch.equal(own[k], v) for k, v in exact.learner.average.items())
 
 
-def test_weights_start_another_scale(config: TrainingConfig, tmp_path: Path) -> None:
+@undrawn
+def test_weights_start_another_scale(
+    config: TrainingConfig, tmp_path: Path, write_window: Any
+) -> None:
     train(config, tmp_path / "x2")
-    write_window(tmp_path / "data4" / "train" / "0.npz", 9, scale=4)
-    write_window(tmp_path / "data4" / "validation" / "1.npz", 8, scale=4)
+    for split in ("train", "validation"):
+        write_window(tmp_path / "data4" / split / "0.npz", 9, scale=4)
     source = tmp_path / "x2" / "weights.safetensors"
     data = (str(tmp_path / "data4"),)
-    other = Trainer(
-        replace(config, data=data, scale=4, start=str(source)), tmp_path / "x4"
-    )
-    ours, theirs = other.network.state_dict(), weights.load(source)[0].state_dict()
+    other = Run(replace(config, data=data, scale=4, start=str(source)), tmp_path / "x4")
+    ours = other.learner.network.state_dict()
+    theirs = weights.load(source)[0].state_dict()
     assert torch.equal(ours["fuse.weight"], theirs["fuse.weight"])
     assert (
         ours["radiance_head.1.weight"].shape != theirs["radiance_head.1.weight"].shape
     )
 
 
-def test_folders_are_read_together_and_windows_without_the_scale_left_out(
+def test_divergence_is_said_and_not_kept(
     config: TrainingConfig, tmp_path: Path
 ) -> None:
-    for split in ("train", "validation"):
-        write_window(tmp_path / "more" / split / "0.npz", 7)
-        write_window(tmp_path / "more" / split / "1.npz", 7, scale=4)
-    data = (*config.data, str(tmp_path / "more"))
-    first = Trainer(replace(config, data=data), tmp_path / "run").windows
-    assert [path.stem for path in first["train"].paths] == ["0", "1", "2", "0"]
-    assert first["train"].paths[-1].is_relative_to(tmp_path / "more")
-    write_window(tmp_path / "more" / "train" / "9.npz", 9)
-    again = Trainer(replace(config, data=data), tmp_path / "run").windows
-    assert again["train"].paths == first["train"].paths  # a run keeps its windows
+    run = Run(config, tmp_path / "run")
+    with torch.no_grad():
+        next(run.learner.network.parameters()).fill_(torch.inf)
+    with pytest.raises(WeightsError, match=r"step 0 .* lower learning_rate"):
+        run.train_step()
 
 
-def test_windows_beyond_the_memory_are_read_again(config: TrainingConfig) -> None:
-    paths = sorted((Path(config.data[0]) / "train").glob("*.npz"))
-    size = read_window(paths[0], 2, "fast", noisy=False).size
-    windows = WindowSet(paths, 2, "fast", noisy=False, memory=2.5 * size)
-    kept = [windows[i] is windows[i] for i in range(len(paths))]
-    assert kept == [True, True, False]
-    again = windows[2]
-    np.testing.assert_array_equal(
-        again.array("reference"), windows[2].array("reference")
+# --- what is written ------------------------------------------------------------------
+
+
+def test_run_writes_its_folder(config: TrainingConfig, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    told = train(config, folder)
+    assert {path.name for path in folder.iterdir()} == {
+        "config.toml",
+        "windows.json",
+        "stats.jsonl",
+        "curve.png",
+        "samples.png",
+        "checkpoint.pt",
+        "weights.safetensors",
+    }
+    assert read_config(folder / "config.toml") == config
+    lines = records(folder)
+    assert [line["step"] for line in lines] == [0, 3, 6]
+    assert lines[0]["loss"] is None
+    assert told["gain"] == lines[-1]["gain"]
+    assert told["best"]["gain"] == max(line["gain"] for line in lines)
+    with Image.open(folder / "samples.png") as samples:
+        assert samples.size == (5 * 256, 2 * (256 + 24))  # one window, both sets
+    with Image.open(folder / "curve.png") as curve:
+        assert len(curve.getcolors(1 << 20)) > 100
+    network, record = weights.load(folder / "weights.safetensors")
+    assert network.config.scale == 2
+    assert record["blender_series"] == "4.5"
+    training = json.loads(record["training"])
+    assert training["step"] == told["best"]["step"]
+    assert training["windows"] == {"train": 3, "validation": 1}
+    assert training["config"]["variation"]["symmetries"]
+
+
+@undrawn
+def test_folder_of_another_run_is_refused(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    train(config, folder)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with pytest.raises(UsageError, match=r"learning_rate = 0\.0005, not 0\.1"):
+        train(replace(config, learning_rate=0.1), folder)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@undrawn
+def test_finished_run_is_left_alone_and_can_be_made_longer(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
+    folder = tmp_path / "run"
+    told = train(config, folder)
+    assert train(config, folder) == told
+    longer = train(replace(config, steps=8), folder)
+    assert longer["step"] == 8
+    assert [line["step"] for line in records(folder)] == [0, 3, 6, 8]
+
+
+def test_run_keeps_its_windows(
+    config: TrainingConfig, tmp_path: Path, write_window: Any
+) -> None:
+    before = Run(config, tmp_path / "run").windows["train"].paths
+    write_window(Path(config.data[0]) / "train" / "9.npz", 9)
+    assert Run(config, tmp_path / "run").windows["train"].paths == before
+
+
+def test_no_windows_is_said(config: TrainingConfig, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no windows in the train folder"):
+        Run(replace(config, data=(str(tmp_path),)), tmp_path / "run")
+
+
+# --- stopping and going on ------------------------------------------------------------
+
+
+def assert_same_run(folder: Path, other: Path) -> None:
+    assert records(folder) == records(other)
+    ours, theirs = (
+        torch.load(path / "checkpoint.pt", weights_only=True)
+        for path in (folder, other)
     )
+    for part in ("network", "average"):
+        for name, value in theirs[part].items():
+            assert torch.equal(ours[part][name], value), name
+    first, second = (
+        weights.load(path / "weights.safetensors") for path in (folder, other)
+    )
+    assert first[1] == second[1]
+    for name, value in second[0].state_dict().items():
+        assert torch.equal(first[0].state_dict()[name], value), name
+
+
+@undrawn
+def test_run_stopped_at_any_step_goes_on_as_if_unbroken(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
+    train(config, tmp_path / "unbroken")
+    handler = signal.getsignal(signal.SIGINT)
+    for step in (0, 1, 2, 4, 5):  # one after the other, in the same folder
+        run = Run(config, tmp_path / "broken")
+        stop_at(run, step)
+        with pytest.raises(Cancelled, match=f"step {step + 1}; the same command"):
+            run.go()
+        assert signal.getsignal(signal.SIGINT) is handler
+    train(config, tmp_path / "broken")
+    assert_same_run(tmp_path / "broken", tmp_path / "unbroken")
+
+
+@undrawn
+@pytest.mark.parametrize("step", [0, 3])
+def test_run_killed_while_it_validates_goes_on_as_if_unbroken(
+    config: TrainingConfig, tmp_path: Path, step: int
+) -> None:
+    train(config, tmp_path / "unbroken")
+    for when in ("score", "samples"):
+        run = Run(config, tmp_path / "broken")
+        before = getattr(run.validation, when)
+
+        def killed(*given: Any, run: Run = run, before: Any = before) -> Any:
+            if run.step == step:
+                raise KeyboardInterrupt
+            return before(*given)
+
+        setattr(run.validation, when, killed)
+        with pytest.raises(KeyboardInterrupt):
+            run.go()
+    train(config, tmp_path / "broken")
+    assert_same_run(tmp_path / "broken", tmp_path / "unbroken")
+
+
+@undrawn
+def test_statistics_beyond_the_checkpoint_are_written_anew(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
+    train(config, tmp_path / "unbroken")
+    run = Run(replace(config), tmp_path / "broken")
+    saved = run.folder.save
+
+    def killed(state: dict[str, Any]) -> None:
+        if state["validated"] == 3:
+            raise KeyboardInterrupt
+        saved(state)
+
+    run.folder.save = killed
+    with pytest.raises(KeyboardInterrupt):
+        run.go()
+    assert records(tmp_path / "broken")[-1]["step"] == 3
+    train(config, tmp_path / "broken")
+    assert_same_run(tmp_path / "broken", tmp_path / "unbroken")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send")
+def test_command_stops_on_ctrl_c_and_keeps_its_steps(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
+    (tmp_path / "run.toml").write_text(to_toml(replace(config, steps=10_000)))
+    command = ["-c", "from xrds_blender import cli; cli.program()"]
+    with subprocess.Popen(
+        [sys.executable, *command, "train", "run.toml"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as child:
+        folder = tmp_path / "runs" / "run"
+        while child.poll() is None and len(lines_of(folder)) < 2:
+            time.sleep(0.1)
+        child.send_signal(signal.SIGINT)
+        _, errors = child.communicate(timeout=60)
+    assert child.returncode == 130
+    assert errors.endswith("xrds: interrupted\n")
+    state = torch.load(folder / "checkpoint.pt", weights_only=True)
+    assert state["step"] >= 3
+    assert "the same command goes on" in errors
+
+
+def test_second_signal_acts_as_before() -> None:
+    with Interruption() as stop:
+        signal.raise_signal(signal.SIGINT)
+        assert stop.wished
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+
+
+@undrawn
+@pytest.mark.skipif(os.name == "nt", reason="gloo over localhost is tested on POSIX")
+def test_two_processes_learn_what_one_does(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
+    config = replace(config, batch=4, precision="fp32", learning_rate=1e-2)
+    train(config, tmp_path / "one")
+    (tmp_path / "run.toml").write_text(to_toml(config))
+    launcher = ["torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
+    command = ["-m", "xrds_blender.cli", "train", "run.toml", "--out", "two"]
+    subprocess.run(
+        [sys.executable, "-m", *launcher, *command],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+        check=True,
+        timeout=100,
+    )
+    ours, theirs = records(tmp_path / "two"), records(tmp_path / "one")
+    assert [line["step"] for line in ours] == [line["step"] for line in theirs]
+    for line, expected in zip(ours[1:], theirs[1:], strict=True):
+        assert line["loss"] == pytest.approx(expected["loss"], rel=1e-5)
+        assert line["gain"] == pytest.approx(expected["gain"], abs=1e-3)
+
+
+def test_batch_that_processes_cannot_share_is_said() -> None:
+    from xrds_core.training.processes import Processes
+
+    second = Processes(1, 2, torch.device("cpu"))
+    assert list(second.places(6)) == [1, 3, 5]
+    with pytest.raises(UsageError, match="batch 5 cannot be shared by 2"):
+        second.places(5)
+
+
+# --- validation -----------------------------------------------------------------------
 
 
 def test_validation_knows_where_demodulation_is_exact(config: TrainingConfig) -> None:
     paths = sorted((Path(config.data[0]) / "train").glob("*.npz"))
     windows = WindowSet(paths, 2, "fast", noisy=False, memory=0)
-    scores = validate(lambda batch: batch.reference, windows, 2, 2, "fast")
-    for name, means in scores.means().items():
-        assert means["xrds"] == np.inf
-        assert means["demodulated"] > means["bicubic"] + 10, name
-    again = validate(lambda batch: batch.reference, windows, 2, 2, "fast")
-    assert again.psnr == scores.psnr  # the same crops, the same light
+    validation = Validation(windows, 2, 2, "fast")
+
+    def scores() -> list[Score]:
+        places = reversed(validation.places)
+        return in_order(validation.score(lambda b: b.reference, *p) for p in places)
+
+    first = scores()
+    assert [(s.set_name, s.index) for s in first] == validation.places
+    for score in first:
+        assert score.psnr["xrds"] == np.inf
+        assert score.psnr["demodulated"] > score.psnr["bicubic"] + 10
+    assert scores() == first  # the same renders, the same light
 
 
 def test_gain_is_over_the_better_enlargement_of_each_window() -> None:
-    rows = {"xrds": [30.0, 31.0], "bicubic": [29.0, 20.0], "demodulated": [10.0, 33.0]}
-    shaded = {
-        "xrds": [40.0, 40.0],
-        "bicubic": [30.0, 30.0],
-        "demodulated": [43.0, 43.0],
-    }
-    scores = Scores({"rendered": rows, "shaded": shaded})
-    assert scores.gain() == pytest.approx((1 - 2 - 3 - 3) / 4)
+    def score(name: str, index: int, *psnr: float) -> Score:
+        methods = ("xrds", "bicubic", "demodulated")
+        return Score(name, index, dict(zip(methods, psnr, strict=True)))
 
-
-def test_damaged_window_is_named(config: TrainingConfig) -> None:
-    path = Path(config.data[0]) / "train" / "0.npz"
-    path.write_bytes(path.read_bytes()[:500])
-    with pytest.raises(PictureError, match=r"0\.npz"):
-        read_window(path, 2, "fast")
-
-
-def test_missing_scale_is_named(config: TrainingConfig) -> None:
-    with pytest.raises(PictureError, match="scale 4"):
-        read_window(Path(config.data[0]) / "train" / "0.npz", 4, "fast")
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("steps = ", "cannot read"),
-        ("preset = 'fast'", "data"),
-        ("data = '.'\nstpes = 3", "stpes"),
-        ("data = '.'\n[loss]\nl3 = 1.0", "l3"),
-        ("data = '.'\n[variation]\nnoise = 1.0", "noise"),
-        ("data = '.'\ncrop = 33", "crop 33"),
-    ],
-)
-def test_wrong_configuration_is_named(tmp_path: Path, text: str, message: str) -> None:
-    path = tmp_path / "run.toml"
-    path.write_text(text)
-    with pytest.raises(UsageError, match=message):
-        read_config(path)
-
-
-def test_configuration_paths_are_relative_to_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "run.toml"
-    path.write_text("data = 'windows'\nscale = 4\n[loss]\nl1 = 2.0\n")
-    config = read_config(path)
-    assert config.data == (str(tmp_path / "windows"),)
-    assert config.loss == {"l1": 2.0}
-
-
-def test_no_windows_is_said(config: TrainingConfig, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no windows"):
-        Trainer(replace(config, data=(str(tmp_path),)), tmp_path / "run")
+    told = summary(
+        [
+            score("rendered", 0, 30.0, 29.0, 10.0),
+            score("rendered", 1, 31.0, 20.0, 33.0),
+            score("shaded", 0, 40.0, 30.0, 43.0),
+            score("shaded", 1, 41.0, 30.0, 42.0),
+        ]
+    )
+    assert told["gain"] == pytest.approx((1 - 2 - 3 - 1) / 4)
+    assert told["gains"] == {"rendered": -0.5, "shaded": -2.0}
+    assert told["worst"] == {"rendered": -2.0, "shaded": -3.0}
+    assert told["psnr"]["rendered"]["demodulated"] == 21.5

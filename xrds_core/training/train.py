@@ -1,7 +1,8 @@
-"""The training loop: crops in, averaged weights, statistics and checkpoints out.
+"""A training run: crops in, statistics, checkpoints and weights out.
 
-Every random choice of a step follows from (seed, step) alone and a checkpoint holds all
-the rest, so a resumed run gives the same losses as one that was never interrupted.
+Every random choice follows from (seed, step, place in the batch) alone and a checkpoint
+holds all the rest, so a resumed run gives the same losses as one that was never
+interrupted, and several processes give those of one.
 """
 
 from __future__ import annotations
@@ -10,222 +11,217 @@ import json
 import math
 import time
 from dataclasses import asdict, replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 from tqdm import tqdm
 
-from .. import weights
-from ..atomic import replacing
-from ..network import XRDS, preset_config
+from ..errors import Cancelled, WeightsError
 from .config import TrainingConfig
-from .data import Batch, draw
-from .losses import weighted
-from .validation import Scores, validate
-from .windows import WindowSet, array_names, find_windows, paths_of
+from .crop import Batch
+from .data import draw
+from .figures import write_curve, write_samples
+from .interruption import Interruption
+from .learner import Learner
+from .loader import CropLoader
+from .processes import Processes
+from .run_folder import RunFolder
+from .validation import Validation, in_order, summary
 
-CHECKPOINT = "checkpoint.pt"
-WINDOWS = "windows.json"
-SPLITS = ("train", "validation")
+MOST_PADDED = 0.25  # of a crop's side
 
 
-class Trainer:
-    """One run in its folder; `run` goes on from the last checkpoint there."""
+class Run:
+    """One run in its folder; `go` goes on from the last checkpoint there."""
 
     def __init__(self, config: TrainingConfig, folder: Path) -> None:
-        self.config, self.folder = config, folder
-        folder.mkdir(parents=True, exist_ok=True)
-        self.device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-        torch.manual_seed(config.seed)
-        shape = preset_config(config.preset, config.scale, config.guides)
-        self.network = XRDS(replace(shape, **config.network)).to(self.device)
-        if config.start:
-            start_from(self.network, Path(config.start))
-        self.average = {k: v.clone() for k, v in self.network.state_dict().items()}
-        self.optimizer = torch.optim.Adam(
-            self.network.parameters(), config.learning_rate, config.betas
-        )
-        self.step = 0
-        self.best = -math.inf
-        self.windows = self.find_windows()
-
-    # --- data -------------------------------------------------------------------------
-
-    def find_windows(self) -> dict[str, WindowSet]:
-        """The windows of this run: those that lay there when it began."""
-        c = self.config
-        kept, folders = self.folder / WINDOWS, [Path(folder) for folder in c.data]
-        noisy = c.variation.noisy > 0
-        if not kept.exists():
-            low, high = array_names(c.scale, c.guides, noisy)
-            found = {s: find_windows(folders, s, low + high) for s in SPLITS}
-            with replacing(kept) as part:
-                part.write_text(json.dumps(found))
-        files = json.loads(kept.read_text())
-        memory = c.cache_gigabytes * 1e9
-        return {
-            split: WindowSet(
-                paths_of(folders, split, files[split]), c.scale, c.guides, noisy, memory
-            )
-            for split in SPLITS
-        }
-
-    def training_batch(self) -> Batch:
-        """The crops of this step; each follows from (seed, step, place) alone."""
-        c = self.config
-        return Batch.stack([self.training_crop(place) for place in range(c.batch)])
-
-    def training_crop(self, place: int) -> Batch:
-        c, windows = self.config, self.windows["train"]
-        random = np.random.default_rng((c.seed, self.step, place))
-        window = windows[int(random.integers(len(windows)))]
-        return draw(window, c.scale, c.guides, c.variation, random, c.crop)
+        self.config, self.folder = config, RunFolder(folder)
+        self.processes = Processes.join()
+        places = self.processes.places(config.batch)
+        if self.processes.lead:
+            self.folder.begin(config)
+        self.processes.gather(None)  # the others wait for the files
+        self.windows = self.folder.open_windows(config)
+        self.learner = Learner(config, self.processes)
+        self.loader = CropLoader(self.crop, places)
+        shown = config.validation_windows, config.scale, config.guides
+        self.validation = Validation(self.windows["validation"], *shown)
+        self.step, self.validated = 0, -1
+        self.best, self.best_step = -math.inf, 0
+        self.losses: list[float] = []  # since the last validation
+        self.seconds = 0.0  # of these steps
+        self.records: list[dict[str, Any]] = []
+        if not self.resume() and config.start:
+            self.learner.start_from(Path(config.start))
 
     # --- steps ------------------------------------------------------------------------
 
-    def learning_rate(self) -> float:
-        c = self.config
-        if self.step < c.warmup:
-            return c.learning_rate * (self.step + 1) / c.warmup
-        done = (self.step - c.warmup) / max(1, c.steps - c.warmup)
-        span = c.learning_rate - c.final_learning_rate
-        return c.final_learning_rate + span * (1 + math.cos(math.pi * done)) / 2
+    def crop(self, step: int, place: int) -> Batch:
+        """One crop of a batch."""
+        c, windows = self.config, self.windows["train"]
+        random = np.random.default_rng((c.seed, step, place))
+        window = windows[int(random.integers(len(windows)))]
+        size = crop_size(c, step)
+        return draw(window, c.scale, c.guides, c.variation, random, size)
 
-    def forward(self, batch: Batch) -> Tensor:
-        bf16 = self.config.precision == "bf16"
-        with torch.autocast(self.device.type, torch.bfloat16, enabled=bf16):
-            inputs = batch.radiance.to(self.device), batch.guides.to(self.device)
-            return self.network(*inputs).float()
-
-    def train_step(self) -> float:
-        """One step of Adam; returns the loss."""
-        for group in self.optimizer.param_groups:
-            group["lr"] = self.learning_rate()
-        batch = self.training_batch()
-        output = self.forward(batch)
-        loss = weighted(self.config.loss, output, batch.reference.to(self.device))
-        self.optimizer.zero_grad(set_to_none=True)
-        loss.backward()
-        torch.nn.utils.clip_grad_norm_(
-            self.network.parameters(), self.config.clip_gradient
-        )
-        self.optimizer.step()
+    def train_step(self, stop: Interruption | None = None) -> bool:
+        """Learn from one batch; returns whether any process wishes to stop."""
+        began = time.perf_counter()
+        loss = self.learner.learn(self.loader.batch(self.step), self.step)
+        wish = stop is not None and stop.wished
+        loss, wished = self.processes.mean([loss, float(wish)])
+        if not math.isfinite(loss):
+            raise WeightsError(
+                f"the loss of step {self.step} is {loss}: training has diverged; "
+                "start anew with a lower learning_rate"
+            )
         self.step += 1
-        decay = min(self.config.average, self.step / (self.step + 10))
-        for name, value in self.network.state_dict().items():
-            self.average[name].lerp_(value, 1 - decay)
-        return loss.item()
+        self.losses.append(loss)
+        self.seconds += time.perf_counter() - began
+        return wished > 0
 
-    def validate(self) -> Scores:
-        """Score the averaged weights."""
-        trained = {k: v.clone() for k, v in self.network.state_dict().items()}
-        self.network.load_state_dict(self.average)
-        c, windows = self.config, self.windows["validation"]
-        scores = validate(
-            self.forward, windows, c.validation_windows, c.scale, c.guides
-        )
-        self.network.load_state_dict(trained)
-        return scores
+    # --- validation -------------------------------------------------------------------
+
+    def due(self) -> bool:
+        """Whether validation is: at the start, from time to time, at the end."""
+        c = self.config
+        now = self.step % c.validate_every == 0 or self.step == c.steps
+        return now and self.validated != self.step
+
+    def validate(self, stop: Interruption) -> None:
+        """Score the averaged weights; write the statistics, and weights if best.
+
+        Raises:
+            Cancelled: the user wishes to stop; the checkpoint is of before.
+        """
+        self.save()
+        validation, processes = self.validation, self.processes
+        forward, scores = self.learner.forward, []
+        with self.learner.averaged():
+            mine = validation.places[processes.rank :: processes.count]
+            for place in self.bar(mine, desc="validation", leave=False):
+                if stop.wished:
+                    raise self.cancelled()
+                scores.append(validation.score(forward, *place))
+            shown = validation.samples(forward) if processes.lead else []
+        everyones = chain.from_iterable(processes.gather(scores))
+        self.record(summary(in_order(everyones)))
+        if processes.lead:
+            write_curve(self.records, self.folder.curve)
+            write_samples(shown, self.folder.samples)
+        self.save()
+
+    def record(self, told: dict[str, Any]) -> None:
+        """Add a line to the statistics; keep the weights if they are the best."""
+        steps = len(self.losses)
+        line = {
+            "step": self.step,
+            "loss": float(np.mean(self.losses)) if steps else None,
+            "learning_rate": self.config.learning_rate_at(self.step),
+            "seconds_per_step": self.seconds / steps if steps else None,
+            **told,
+        }
+        self.records.append(line)
+        self.losses, self.seconds, self.validated = [], 0.0, self.step
+        better = line["gain"] > self.best
+        if better:
+            self.best, self.best_step = line["gain"], self.step
+        if self.processes.lead:
+            self.folder.write_records(self.records)
+            if better:
+                self.save_weights(told)
+
+    def save_weights(self, told: dict[str, Any]) -> None:
+        """Write the averaged weights with what they were trained on."""
+        training = {
+            "step": self.step,
+            "windows": {split: len(some) for split, some in self.windows.items()},
+            "validation": told,
+            "config": asdict(replace(self.config, data=(), start="")),
+        }
+        record = {
+            "preset": self.config.preset,
+            "blender_series": self.windows["train"][0].meta["blender_series"],
+            "training": json.dumps(training),
+        }
+        self.learner.save_average(self.folder.weights, record)
 
     # --- the run ----------------------------------------------------------------------
 
-    def run(self) -> dict[str, Any]:
-        """Train to the last step and return the last validation."""
-        self.resume()
-        progress = tqdm(total=self.config.steps, initial=self.step, unit="step")
-        losses: list[float] = []
-        began = time.perf_counter()
-        told: dict[str, Any] = {}
+    def go(self) -> dict[str, Any] | None:
+        """Train to the last step; the lead returns the last statistics and the best.
+
+        Raises:
+            Cancelled: Ctrl-C; the same call goes on from there.
+            WeightsError: the loss is no longer finite.
+        """
+        bar = self.bar(total=self.config.steps, initial=self.step, unit="step")
         try:
-            while self.step < self.config.steps:
-                losses.append(self.train_step())
-                progress.update()
-                last = self.step == self.config.steps
-                if self.step % self.config.validate_every == 0 or last:
-                    scores = self.validate()
-                    seconds = (time.perf_counter() - began) / len(losses)
-                    self.record(float(np.mean(losses)), seconds, scores)
-                    told = {"gain": scores.gain(), "psnr": scores.means()}
-                    progress.set_postfix(gain=told["gain"], **told["psnr"]["rendered"])
-                    losses, began = [], time.perf_counter()
-        except KeyboardInterrupt:
-            self.save_checkpoint()
-            raise
+            with bar, Interruption() as stop:
+                self.go_on(bar, stop)
         finally:
-            progress.close()
-        return {"step": self.step, **told}
+            self.loader.close()
+            self.processes.leave()
+        if not self.processes.lead:
+            return None
+        best = {"step": self.best_step, "gain": self.best}
+        return {"out": str(self.folder.path), **self.records[-1], "best": best}
 
-    def record(self, loss: float, seconds: float, scores: Scores) -> None:
-        """Write the statistics line, the checkpoint and, where it is best, weights."""
-        line = {
-            "step": self.step,
-            "loss": loss,
-            "learning_rate": self.learning_rate(),
-            "seconds_per_step": seconds,
-            "gain": scores.gain(),
-            "psnr": scores.means(),
-        }
-        with (self.folder / "stats.jsonl").open("a") as stats:
-            stats.write(json.dumps(line) + "\n")
-        if scores.gain() > self.best:
-            self.best = scores.gain()
-            self.save_weights(scores)
-        self.save_checkpoint()
+    def go_on(self, bar: tqdm, stop: Interruption) -> None:
+        """The loop."""
+        if self.due():
+            self.validate(stop)
+        while self.step < self.config.steps:
+            wished = self.train_step(stop)
+            bar.update()
+            if self.due() and not wished:
+                self.validate(stop)
+                bar.set_postfix(gain=f"{self.records[-1]['gain']:.2f} dB")
+            if wished:
+                self.save()
+                raise self.cancelled()
 
-    def save_weights(self, scores: Scores) -> None:
-        """Write the averaged weights with what they were trained on."""
-        network = XRDS(self.network.config)
-        network.load_state_dict({k: v.cpu() for k, v in self.average.items()})
-        series = self.windows["train"][0].meta["blender_series"]
-        record = {
-            "preset": self.config.preset,
-            "blender_series": series,
-            "training": json.dumps(
-                {
-                    "step": self.step,
-                    "windows": len(self.windows["train"]),
-                    "validation_gain": scores.gain(),
-                    "validation_psnr": scores.means(),
-                    "config": asdict(replace(self.config, data=(), start="")),
-                }
-            ),
-        }
-        weights.save(network, self.folder / "weights.safetensors", record)
+    def bar(self, *things: Any, **settings: Any) -> tqdm:
+        """A progress bar, of the lead alone."""
+        return tqdm(*things, **settings, disable=not self.processes.lead)
 
-    def save_checkpoint(self) -> None:
-        state = {
-            "step": self.step,
-            "best": self.best,
-            "network": self.network.state_dict(),
-            "average": self.average,
-            "optimizer": self.optimizer.state_dict(),
-        }
-        with replacing(self.folder / CHECKPOINT) as part:
-            torch.save(state, part)
+    def cancelled(self) -> Cancelled:
+        return Cancelled(f"interrupted at step {self.step}; the same command goes on")
 
-    def resume(self) -> None:
-        """Go back to the checkpoint in the folder, if there is one."""
-        path = self.folder / CHECKPOINT
-        if not path.exists():
-            return
-        state = torch.load(path, map_location=self.device, weights_only=True)
-        self.step, self.best = state["step"], state["best"]
-        self.network.load_state_dict(state["network"])
-        self.average = state["average"]
-        self.optimizer.load_state_dict(state["optimizer"])
+    def save(self) -> None:
+        """Write the checkpoint."""
+        state = {name: getattr(self, name) for name in KEPT}
+        if self.processes.lead:
+            self.folder.save({**state, **self.learner.state()})
+
+    def resume(self) -> bool:
+        """Go back to the checkpoint in the folder; False if there is none."""
+        state = self.folder.load(self.learner.device)
+        if state is None:
+            return False
+        self.learner.restore(state)
+        for name in KEPT:
+            setattr(self, name, state[name])
+        lines = self.folder.records()
+        self.records = [line for line in lines if line["step"] <= self.validated]
+        return True
 
 
-def start_from(network: XRDS, path: Path) -> None:
-    """Copy every tensor whose name and shape agree from a weights file."""
-    source = weights.load(path)[0].state_dict()
-    own = network.state_dict()
-    own |= {k: v for k, v in source.items() if k in own and v.shape == own[k].shape}
-    network.load_state_dict(own)
+KEPT = ("step", "validated", "best", "best_step", "losses", "seconds")
+"""What a checkpoint holds beside the learner's state."""
 
 
-def train(config: TrainingConfig, folder: Path) -> dict[str, Any]:
+def crop_size(config: TrainingConfig, step: int) -> int:
+    """Side of the crops of a step, in output pixels: the same for the whole batch."""
+    random = np.random.default_rng((config.seed, step))
+    if random.random() >= config.variation.padded:
+        return config.crop
+    most = int(MOST_PADDED * config.crop) // config.scale
+    return config.crop - config.scale * int(random.integers(1, most, endpoint=True))
+
+
+def train(config: TrainingConfig, folder: Path) -> dict[str, Any] | None:
     """Run or resume the training of `config` in `folder`."""
-    return Trainer(config, folder).run()
+    return Run(config, folder).go()

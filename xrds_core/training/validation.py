@@ -6,8 +6,9 @@ there is texture that it blurs. Both sets are the same at every validation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
@@ -16,75 +17,97 @@ from torch import Tensor
 from ..baselines import bicubic
 from ..front_end import demodulated_base, inverse_transfer
 from ..metrics import psnr
-from .data import Batch, Variation, draw
+from .crop import Batch
+from .data import Variation, draw
 from .windows import WindowSet
 
 SETS = {"rendered": Variation(), "shaded": Variation(shaded=1.0)}
+SHOWN = (0.0, 0.5, 1.0)  # of the windows of a set, first to last
 METHODS = ("xrds", "bicubic", "demodulated")
 
+Pictures = dict[str, np.ndarray]
 
-@dataclass
-class Scores:
-    """PSNR in dB of every window, at the exposure of its low-resolution picture."""
 
-    psnr: dict[str, dict[str, list[float]]] = field(
-        default_factory=lambda: {s: {m: [] for m in METHODS} for s in SETS}
-    )
-    """By set and method."""
+@dataclass(frozen=True)
+class Score:
+    """PSNR in dB of each method on one window, at its low-resolution exposure."""
 
-    def means(self) -> dict[str, dict[str, float]]:
-        """Mean PSNR by set and method."""
-        return {
-            name: {method: float(np.mean(values)) for method, values in rows.items()}
-            for name, rows in self.psnr.items()
-        }
+    set_name: str
+    index: int
+    psnr: dict[str, float]
 
-    def gains(self, name: str) -> np.ndarray:
-        """dB over the better of bicubic and demodulated, for each window of a set."""
-        xrds, *others = (np.array(self.psnr[name][method]) for method in METHODS)
-        return xrds - np.maximum(*others)
-
+    @property
     def gain(self) -> float:
-        """The mean gain over all windows of both sets: what weights are chosen by."""
-        return float(np.mean([self.gains(name) for name in SETS]))
+        """dB over the better of bicubic and demodulated."""
+        return self.psnr["xrds"] - max(self.psnr["bicubic"], self.psnr["demodulated"])
 
 
-def validate(
-    forward: Callable[[Batch], Tensor],
-    windows: WindowSet,
-    count: int,
-    scale: int,
-    guides: str,
-) -> Scores:
-    """Score `forward` on `count` windows spread over the split."""
-    scores = Scores()
-    with torch.inference_mode():
-        for name, variation in SETS.items():
-            for batch in batches(windows, count, scale, guides, variation):
-                reference = to_picture(batch.reference)
-                for method, picture in pictures(forward, batch).items():
-                    scores.psnr[name][method].append(psnr(picture, reference))
-    return scores
+def summary(scores: Sequence[Score]) -> dict[str, Any]:
+    """What the statistics keep: weights are chosen by `gain`, the mean over all."""
+    by_set = {name: [s for s in scores if s.set_name == name] for name in SETS}
+    return {
+        "gain": mean([s.gain for s in scores]),
+        "gains": {name: mean([s.gain for s in some]) for name, some in by_set.items()},
+        "worst": {name: min(s.gain for s in some) for name, some in by_set.items()},
+        "psnr": {
+            name: {method: mean([s.psnr[method] for s in some]) for method in METHODS}
+            for name, some in by_set.items()
+        },
+    }
 
 
-def batches(
-    windows: WindowSet, count: int, scale: int, guides: str, variation: Variation
-) -> Iterator[Batch]:
-    """Whole windows, the same ones and the same renders of them each time."""
-    count = min(count, len(windows))
-    for i in range(count):
-        window = windows[i * len(windows) // count]
-        yield draw(window, scale, guides, variation, np.random.default_rng(i))
+def mean(values: Sequence[float]) -> float:
+    """As a plain float."""
+    return float(np.mean(values))
 
 
-def pictures(forward: Callable[[Batch], Tensor], batch: Batch) -> dict[str, np.ndarray]:
-    """The picture of every method, linear at the exposure of the batch."""
+def in_order(scores: Iterable[Score]) -> list[Score]:
+    """Sorted by set and window, whichever process scored them."""
+    return sorted(scores, key=lambda s: (s.set_name, s.index))
+
+
+class Validation:
+    """The windows to score: `count` spread over the split, the same ones each time."""
+
+    def __init__(self, windows: WindowSet, count: int, scale: int, guides: str) -> None:
+        count = min(count, len(windows))
+        self._windows = windows
+        self._chosen = [i * len(windows) // count for i in range(count)]
+        self._what = (scale, guides)
+        self.places = [(name, i) for name in SETS for i in range(count)]
+
+    def batch(self, set_name: str, index: int) -> Batch:
+        """One whole window; which renders and which light follows from the index."""
+        window = self._windows[self._chosen[index]]
+        random = np.random.default_rng(index)
+        return draw(window, *self._what, SETS[set_name], random)
+
+    def score(self, forward: Callable[[Batch], Tensor], name: str, index: int) -> Score:
+        """Enlarge one window by every method."""
+        row = pictures(forward, self.batch(name, index))
+        psnrs = {method: psnr(row[method], row["reference"]) for method in METHODS}
+        return Score(name, index, psnrs)
+
+    def samples(self, forward: Callable[[Batch], Tensor]) -> list[Pictures]:
+        """All pictures of some windows of each set, to look at."""
+        last = len(self._chosen) - 1
+        shown = sorted({round(last * part) for part in SHOWN})
+        places = [(name, index) for name in SETS for index in shown]
+        return [pictures(forward, self.batch(*place)) for place in places]
+
+
+def pictures(forward: Callable[[Batch], Tensor], batch: Batch) -> Pictures:
+    """All pictures of a window, linear at the exposure of the batch."""
     low, albedo = to_picture(batch.radiance), batch.guides[0, :3].permute(1, 2, 0)
     scale = batch.reference.shape[-1] // batch.radiance.shape[-1]
+    with torch.inference_mode():
+        output = forward(batch).cpu()
     return {
-        "xrds": to_picture(forward(batch).cpu()),
+        "low-resolution": low,
         "bicubic": bicubic(low, scale),
         "demodulated": demodulated_base(low, albedo.numpy(), scale),
+        "xrds": to_picture(output),
+        "reference": to_picture(batch.reference),
     }
 
 
