@@ -227,9 +227,14 @@ def test_run_keeps_its_windows(
     assert Run(config, tmp_path / "run").windows["train"].paths == before
 
 
-def test_no_windows_is_said(config: TrainingConfig, tmp_path: Path) -> None:
+def test_run_that_cannot_begin_writes_nothing(
+    config: TrainingConfig, tmp_path: Path
+) -> None:
     with pytest.raises(UsageError, match="no windows in the train folder"):
         Run(replace(config, data=(str(tmp_path),)), tmp_path / "run")
+    with pytest.raises(WeightsError, match="no weights file"):
+        Run(replace(config, start=str(tmp_path / "w")), tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 # --- stopping and going on ------------------------------------------------------------

@@ -16,7 +16,7 @@ import torch
 from ..atomic import replacing
 from ..errors import UsageError
 from .config import TrainingConfig, read_config, to_toml
-from .windows import WindowSet, array_names, find_windows, paths_of
+from .windows import Files, WindowSet, array_names, find_windows, paths_of
 
 SPLITS = ("train", "validation")
 # What may change while a run goes on: its losses stay what they would have been, but
@@ -29,6 +29,13 @@ FREE = {
     "validation_windows",
     "cache_gigabytes",
 }
+
+
+def find_files(config: TrainingConfig) -> dict[str, Files]:
+    """The window files that a run can use, by split and folder."""
+    low, high = array_names(config.scale, config.guides, config.noisy)
+    folders = [Path(folder) for folder in config.data]
+    return {split: find_windows(folders, split, low + high) for split in SPLITS}
 
 
 class RunFolder:
@@ -45,17 +52,21 @@ class RunFolder:
         self.checkpoint = path / "checkpoint.pt"
 
     def begin(self, config: TrainingConfig) -> None:
-        """Make the folder and write the configuration.
+        """Make the folder; write the configuration and which windows there are.
 
         Raises:
-            UsageError: the folder holds a run of another configuration.
+            UsageError: it holds a run of another configuration, or there are no
+                windows; nothing is written then.
         """
         if self.config.exists():
             self._compare(read_config(self.config), config)
+        files = None if self.files.exists() else find_files(config)
         self.path.mkdir(parents=True, exist_ok=True)
         with replacing(self.config) as part:
             part.write_text(to_toml(config))
-        self.choose_windows(config)
+        if files:
+            with replacing(self.files) as part:
+                part.write_text(json.dumps(files))
 
     def _compare(self, kept: TrainingConfig, given: TrainingConfig) -> None:
         for name, value in vars(kept).items():
@@ -65,16 +76,6 @@ class RunFolder:
                     f"{getattr(given, name)!r}: give another folder with --out, and "
                     f"start = {str(self.weights)!r} to go on from its weights"
                 )
-
-    def choose_windows(self, config: TrainingConfig) -> None:
-        """Write the list of the run's windows: those that lie there when it begins."""
-        if self.files.exists():
-            return
-        low, high = array_names(config.scale, config.guides, config.noisy)
-        folders = [Path(folder) for folder in config.data]
-        found = {split: find_windows(folders, split, low + high) for split in SPLITS}
-        with replacing(self.files) as part:
-            part.write_text(json.dumps(found))
 
     def open_windows(self, config: TrainingConfig) -> dict[str, WindowSet]:
         """The run's windows, by split."""

@@ -40,11 +40,14 @@ class Run:
         self.config, self.folder = config, RunFolder(folder)
         self.processes = Processes.join()
         places = self.processes.places(config.batch)
+        self.learner = Learner(config, self.processes)
+        state = self.folder.load(self.learner.device)
+        if config.start and not state:
+            self.learner.start_from(Path(config.start))
         if self.processes.lead:
             self.folder.begin(config)
         self.processes.gather(None)  # the others wait for the files
         self.windows = self.folder.open_windows(config)
-        self.learner = Learner(config, self.processes)
         self.loader = CropLoader(self.crop, places)
         shown = config.validation_windows, config.scale, config.guides
         self.validation = Validation(self.windows["validation"], *shown)
@@ -53,8 +56,8 @@ class Run:
         self.losses: list[float] = []  # since the last validation
         self.seconds = 0.0  # of these steps
         self.records: list[dict[str, Any]] = []
-        if not self.resume() and config.start:
-            self.learner.start_from(Path(config.start))
+        if state:
+            self.resume(state)
 
     # --- steps ------------------------------------------------------------------------
 
@@ -196,17 +199,13 @@ class Run:
         if self.processes.lead:
             self.folder.save({**state, **self.learner.state()})
 
-    def resume(self) -> bool:
-        """Go back to the checkpoint in the folder; False if there is none."""
-        state = self.folder.load(self.learner.device)
-        if state is None:
-            return False
+    def resume(self, state: dict[str, Any]) -> None:
+        """Go back to a checkpoint."""
         self.learner.restore(state)
         for name in KEPT:
             setattr(self, name, state[name])
         lines = self.folder.records()
         self.records = [line for line in lines if line["step"] <= self.validated]
-        return True
 
 
 KEPT = ("step", "validated", "best", "best_step", "losses", "seconds")
