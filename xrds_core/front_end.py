@@ -28,7 +28,10 @@ EXPOSURE_RANGE = (1e-36, 1e36)  # times the gain, still a normal float32
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec.709
 
 _MOST_BINS = 16  # along each axis
-_DARKEST_BIN = 1e-4  # of the brightest; darker bins say nothing of the exposure
+# A sun or fireflies in a few bins must not make night of all others, so it is not the
+# brightest bin that the others are held against.
+_TYPICAL_BRIGHT = 0.95  # quantile of the bins with light
+_FARTHEST_BIN = 1e4  # times brighter or darker: such bins say nothing of the exposure
 _LARGEST = np.float32(3.4e38)  # blended tiles may round up and stay finite
 # Of k e x: its square, over the epsilons that networks divide by, is a float32 still.
 _LARGEST_EXPOSED = 1e18
@@ -110,15 +113,17 @@ def auto_exposure(radiance: Picture) -> float:
 
     ``radiance`` (h, w, 3 or more) is clean and low-resolution. Its bins are at
     most 16 x 16, whatever its size, so that a tiny render of a frame gives the
-    frame's own exposure. After OIDN's auto-exposure (Afra, 2019).
+    frame's own exposure. Bins far from the bright ones, in either direction, are left
+    out. After OIDN's auto-exposure (Afra, 2019).
     """
     luminance = radiance[..., :3].astype(np.float64) @ np.asarray(LUMINANCE)
     for axis in (0, 1):
         luminance = _bin_means(luminance, axis)
-    brightest = float(luminance.max(initial=0.0))
-    if brightest <= 0.0:
+    lit = luminance[luminance > 0.0]
+    if not lit.size:
         return 1.0
-    seen = luminance[luminance >= brightest * _DARKEST_BIN]
+    bright = float(np.quantile(lit, _TYPICAL_BRIGHT, method="nearest"))
+    seen = lit[(lit >= bright / _FARTHEST_BIN) & (lit <= bright * _FARTHEST_BIN)]
     exposure = EXPOSURE_KEY / math.exp(float(np.log(seen).mean()))
     return min(max(exposure, EXPOSURE_RANGE[0]), EXPOSURE_RANGE[1])
 

@@ -114,6 +114,14 @@ def test_exposure_leaves_out_bins_that_are_next_to_black() -> None:
     assert auto_exposure(x) == pytest.approx(0.18 / np.sqrt(1.1e-4))
 
 
+@pytest.mark.parametrize("value", [1e5, 1e8, 1e30])
+def test_a_few_fireflies_leave_the_exposure_nearly_alone(value: float) -> None:
+    x = random_picture(64, 64)
+    expected = auto_exposure(x)
+    x[[5, 20, 40, 60], [7, 50, 33, 10]] = value
+    assert auto_exposure(x) == pytest.approx(expected, rel=0.2)
+
+
 @pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e6])
 def test_exposure_is_inverse_to_brightness(factor: float) -> None:
     x = random_picture(21, 50)

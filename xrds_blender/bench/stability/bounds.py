@@ -1,0 +1,145 @@
+"""The bounds: one table, which the report prints and the document repeats.
+
+A measured value is at most its limit, or fails; where it fails, an exception may say
+how far it was found off at the most, and why. Without a limit it is only reported.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+PIXELS = "low-resolution pixels"
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The most that a value may be, and what the value is."""
+
+    limit: float | None
+    says: str
+
+
+@dataclass(frozen=True)
+class Exemption:
+    """A bound that some weights do not hold: how far off at most, and the reason."""
+
+    subject: str
+    """As ``fast x2 fp32``; * stands for anything."""
+    limit: float
+    reason: str
+
+
+BOUNDS: dict[str, Bound] = {
+    "range.scaling": Bound(
+        1e-3, "largest relative difference after scaling light by 2^±7, 2^±20"
+    ),
+    "range.scaling_far": Bound(None, "the same by 2^±30, 2^±40"),
+    "range.spread_faults": Bound(0, "values below 0 or not finite, light over 1e12"),
+    "range.spread_error": Bound(
+        1.5, "error of the dark half beside light 1e12 brighter, of its error alone"
+    ),
+    "range.denormal_faults": Bound(0, "faults with light of 1e-45 to 1e-38"),
+    "constant.value": Bound(5e-3, "largest relative error of a constant picture"),
+    "black.all": Bound(0, "light in a picture of none under textured albedo"),
+    "black.half": Bound(0, "light in the black half beyond one low pixel, of the mean"),
+    "lit_pixel.away": Bound(0, "share of one lit pixel's light beyond its neighbours"),
+    "lit_pixel.gain": Bound(None, "light of one lit pixel, of what was given"),
+    "energy.smooth": Bound(1e-2, "relative error of the mean, smooth input"),
+    "energy.textured": Bound(None, "relative error of the mean, textured albedo"),
+    "invalid.faults": Bound(
+        0, "faults after NaN, ±Inf, negative and extreme values in pixels, rows, passes"
+    ),
+    "invalid.reach": Bound(0, f"changed values beyond 160 {PIXELS}, exposure given"),
+    "invalid.distance": Bound(16, f"{PIXELS} until a spoilt one changes less than 1 %"),
+    "firefly.far_change": Bound(
+        1e-2, "relative change beyond 3 low pixels from fireflies of 1e2 to 1e8"
+    ),
+    "firefly.light_beyond_two_pixels": Bound(
+        1e-2, "share of what fireflies add that lies beyond two low pixels"
+    ),
+    "grey.chroma": Bound(1e-3, "largest chroma of a grey scene"),
+    "colour.permutation": Bound(1e-2, "SMAPE after permuting the colour channels"),
+    "guides.zero_normals": Bound(1, "dB below bicubic, normals 0"),
+    "guides.long_normals": Bound(1, "dB below bicubic, normals of length 5"),
+    "guides.noisy_normals": Bound(1, "dB below bicubic, random normals"),
+    "guides.albedo_0": Bound(1, "dB below bicubic, albedo 0"),
+    "guides.albedo_50": Bound(1, "dB below bicubic, albedo 50"),
+    "guides.emitter_1e6": Bound(1, "dB below bicubic, albedo 1e6 in a ninth of it"),
+    "guides.constant": Bound(1, "dB below bicubic, constant guides"),
+    "guides.shifted": Bound(1, "dB below bicubic, guides off by one pixel"),
+    "guides.another_frame": Bound(1, "dB below bicubic, guides of another frame"),
+    "guides.faults": Bound(0, "faults under all of these"),
+    "guides.ring": Bound(0.05, "deviation of an even wall around an emitter's albedo"),
+    "shapes.faults": Bound(0, "faults over all sizes"),
+    "shapes.memory": Bound(2.0, "GiB on top of the arrays, 8192 x 8192"),
+    "shapes.large_faults": Bound(0, "faults in the picture of 8192 x 8192"),
+    "tiles.difference": Bound(1e-5, "largest difference to the whole, log domain"),
+    "tiles.seam": Bound(1.02, "gradient across seams, of the whole picture's there"),
+    "tiles.border": Bound(1e-5, "largest difference of a border, log domain"),
+    "same.runs": Bound(0, "values that differ between two runs"),
+    "same.threads": Bound(1e-6, "one thread against several, of the brightest"),
+    "precision.smape": Bound(3e-3, "mean SMAPE against fp32"),
+    "precision.outliers": Bound(0, "values off by more than 0.02 and 5 % from fp32"),
+}
+
+EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
+    "constant.value": (
+        Exemption(
+            "fast *",
+            5e-2,
+            "the network's convolutions see zeros beyond the picture's edges and "
+            "answer to them; at most 1 % farther than 24 pixels from an edge",
+        ),
+    ),
+    "tiles.difference": (
+        Exemption(
+            "* x4 *",
+            1e-3,
+            "attention sees farther than the tiles' overlap, ever more weakly; "
+            "no seam is measurable",
+        ),
+        Exemption("* bf16", 2e-2, "the eight bits of bf16 round near values apart"),
+    ),
+    "tiles.border": (
+        Exemption("* bf16", 2e-2, "the eight bits of bf16 round near values apart"),
+    ),
+    "same.threads": (
+        Exemption("* bf16", 1e-3, "threads add up in another order, rounded to 8 bits"),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Check:
+    """One value beside its bound: an entry of `results.json`."""
+
+    name: str
+    preset: str
+    scale: int
+    precision: str
+    value: float
+    bound: float | None
+    passed: bool
+    exception: str | None
+
+    @property
+    def holds(self) -> bool:
+        """Whether it passes, or has a measured exception."""
+        return self.passed or self.exception is not None
+
+
+def judge(name: str, value: float, preset: str, scale: int, precision: str) -> Check:
+    """Return a value with its verdict; raises KeyError without such a bound."""
+    limit = BOUNDS[name].limit
+    known = math.isfinite(value)
+    passed = known and (limit is None or value <= limit)
+    subject = f"{preset} x{scale} {precision}"
+    reasons = [
+        x.reason
+        for x in EXEMPTIONS.get(name, ())
+        if fnmatchcase(subject, x.subject) and value <= x.limit
+    ]
+    exception = reasons[0] if reasons and not passed else None
+    return Check(name, preset, scale, precision, value, limit, passed, exception)

@@ -1,0 +1,104 @@
+"""What is put to the test: shipped weights at one precision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_core import weights
+from xrds_core.upscaler import Upscaler
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from .pictures import Array, Inputs
+
+PRECISIONS = ("fp32", "bf16")
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A preset at a scale and precision, ready to enlarge pictures."""
+
+    preset: str
+    scale: int
+    precision: str
+    upscaler: Upscaler
+    side: int = 96
+    """Output pixels along one side of the pictures that checks make."""
+    thorough: bool = False
+    """Try every case, rather than one of each kind."""
+
+    @property
+    def low_side(self) -> int:
+        """Low-resolution pixels along one side."""
+        return self.side // self.scale
+
+    @property
+    def name(self) -> str:
+        """As ``fast x2 fp32``."""
+        return f"{self.preset} x{self.scale} {self.precision}"
+
+    def __call__(self, inputs: Inputs, **options: Any) -> Array:
+        """Return the picture (H, W, 3 or 4) of ``inputs``."""
+        if self.upscaler.network.config.guides == "full":
+            options["guide_radiance"] = _enlarged(inputs, self.scale)
+        return self.upscaler(*inputs, **options).radiance
+
+    def at(self, precision: str) -> Subject:
+        """Return the same weights at another precision."""
+        kind = self.upscaler.network.config.guides
+        made = Upscaler(
+            self.preset,
+            self.scale,
+            "full" if kind == "full" else "fast",
+            str(self.upscaler.device),
+            precision,
+            self.upscaler.network,
+        )
+        return Subject(
+            self.preset, self.scale, precision, made, self.side, self.thorough
+        )
+
+
+def _enlarged(inputs: Inputs, scale: int) -> Array:
+    """Stand in for the radiance of full guides: pixels repeated."""
+    height, width = inputs.albedo.shape[:2]
+    large = inputs.radiance[..., :3].repeat(scale, 0).repeat(scale, 1)
+    return np.ascontiguousarray(large[:height, :width])
+
+
+def shipped(
+    precisions: Sequence[str] = PRECISIONS,
+    *,
+    directory: Path | None = None,
+    device: str = "auto",
+    side: int = 96,
+    thorough: bool = False,
+) -> list[Subject]:
+    """Return every shipped preset and scale at every precision.
+
+    Raises WeightsError if a file is damaged, UsageError for an unknown precision.
+    """
+    return [
+        Subject(
+            record["preset"] + ("_full" if record["guides"] == "full" else ""),
+            record["scale"],
+            precision,
+            Upscaler(
+                record["preset"],
+                record["scale"],
+                "full" if record["guides"] == "full" else "fast",
+                device,
+                precision,
+                directory,
+            ),
+            side,
+            thorough,
+        )
+        for record in weights.available(directory)
+        for precision in precisions
+    ]
