@@ -43,11 +43,12 @@ def clean_radiance(x: Picture) -> tuple[Picture, int]:
 
     ``x`` itself is returned where nothing is wrong with it; else a copy.
     """
-    x, holes = fill_holes(x)
-    if not x.size or x.min() >= 0.0:
-        return x, holes
-    negative = int((x < 0.0).any(axis=-1).sum())
-    return np.maximum(x, np.float32(0.0)), holes + negative
+    if not x.size or (x.min() >= 0.0 and np.isfinite(x.max())):
+        return x, 0
+    finite = np.isfinite(x)
+    bad = int((~finite | (x < 0.0)).any(axis=-1).sum())
+    # before the holes are filled, so that none is filled with darkness below black
+    return fill_holes(np.where(finite & (x < 0.0), np.float32(0.0), x))[0], bad
 
 
 def clean_albedo(x: Picture) -> tuple[Picture, int]:

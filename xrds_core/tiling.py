@@ -87,7 +87,7 @@ def tiles(
 
 def _spans(length: int, tile: int, overlap: int, multiple: int) -> list[Span]:
     overlap = _up(overlap, multiple)
-    tile = max(tile // multiple * multiple, 2 * overlap)  # ramps must not meet
+    tile = max(tile // multiple * multiple, 2 * overlap, multiple)  # ramps stay apart
     if length <= tile:
         return [Span(0, length, 0, 0)]
     count = math.ceil((length - overlap) / (tile - overlap))

@@ -145,7 +145,7 @@ def from_values(values: dict[str, Any], path: Path) -> TrainingConfig:
         values["variation"] = Variation(**values.get("variation", {}))
         values["betas"] = tuple(values.get("betas", TrainingConfig.betas))
         return TrainingConfig(**values)
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, UsageError) as error:
         raise UsageError(f"{path}: {error}") from error
 
 

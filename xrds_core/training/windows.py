@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,19 @@ from ..front_end import auto_exposure, clean_radiance
 
 Array = NDArray[np.float32]
 Box = tuple[slice, slice]
+
+# What numpy and zipfile raise for files that are not whole or claim the impossible.
+DAMAGED = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    NotImplementedError,
+    RuntimeError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 LOW_RENDERS = 2  # of each scale, with different numbers of samples
 WHOLE: Box = (slice(None), slice(None))
@@ -72,9 +86,10 @@ def read_window(path: Path, scale: int, guides: str, noisy: bool = True) -> Wind
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in low + high}
             meta = json.loads(str(file["meta"]))
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except DAMAGED as error:
         raise PictureError(
-            f"{path} is no training window for scale {scale}, {guides} guides: {error}"
+            f"{path} is no training window for scale {scale}, {guides} guides: "
+            f"{str(error)[:200]}"
         ) from error
     clean = {name: clean_radiance(arrays[name].astype(np.float32))[0] for name in low}
     exposures = {name: auto_exposure(picture) for name, picture in clean.items()}
