@@ -13,12 +13,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from xrds_core.errors import UsageError
+from xrds_core.errors import UsageError, XRDSError
 
 from . import console
 
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
+STABILITY = ("arrays", "large", "scenes", "shots")
 Work = Callable[[argparse.Namespace], dict[str, Any] | None]
 
 
@@ -150,6 +151,24 @@ def _progress(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
+def _stability(options: argparse.Namespace) -> dict[str, Any]:
+    if {"scenes", "shots"} & set(options.parts):
+        _need_blender("stability")
+    from .bench.stability.suite import stability
+
+    told = stability(
+        options.out,
+        parts=options.parts,
+        cache=options.cache,
+        device=options.device,
+        weights=options.weights,
+        progress=_progress,
+    )
+    if not told["passed"]:
+        raise XRDSError(f"some bounds are not held: see {options.out / 'report.md'}")
+    return told
+
+
 def _dataset(options: argparse.Namespace) -> dict[str, Any]:
     _need_blender("dataset")
     from .studio.dataset import generate
@@ -209,6 +228,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_render,
         _add_upscale,
         _add_evaluate,
+        _add_stability,
         _add_dataset,
         _add_train,
     ):
@@ -283,6 +303,18 @@ def _add_evaluate(commands: Any) -> argparse.ArgumentParser:
     add("--weights", type=Path, help="folder of weights files")
     add("--out", type=Path, help="folder for results.json")
     command.set_defaults(work=_evaluate, lines=lambda _: ())
+    return command
+
+
+def _add_stability(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("stability", help="measure stiff and extreme cases")
+    add = command.add_argument
+    add("--out", type=Path, required=True, help="folder for results.json and report")
+    add("--parts", type=_names(STABILITY), default=STABILITY, help="as arrays,large")
+    add("--cache", type=Path, help="folder that keeps rendered pictures")
+    add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
+    add("--weights", type=Path, help="folder of weights files")
+    command.set_defaults(work=_stability, lines=lambda _: ())
     return command
 
 

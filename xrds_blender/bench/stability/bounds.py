@@ -84,6 +84,38 @@ BOUNDS: dict[str, Bound] = {
     "precision.outliers": Bound(0, "values off by more than 0.02 and 5 % from fp32"),
 }
 
+STIFF = (
+    "pinhole",
+    "caustics",
+    "bright_sky",
+    "emitter",
+    "glass_in_glass",
+    "one_sample",
+    "fog",
+    "hair",
+    "horizon",
+    "blurred",
+    "soft_alpha",
+)
+# For every scene, in place of the star.
+BOUNDS |= {
+    "stiff.*.faults": Bound(0, "values below 0 or not finite in a rendered scene"),
+    "stiff.*.below_bicubic": Bound(1, "dB below bicubic"),
+    "stiff.*.below_oidn": Bound(None, "dB below Cycles + OIDN of as many samples"),
+    "stiff.*.seconds": Bound(None, "seconds of render, guides and network, of its own"),
+    "stiff.*.brightest": Bound(8, "brightest value, of the low-resolution one's"),
+    "shot.*.flicker": Bound(
+        None, "flicker of still pixels, of OIDN's with as many samples"
+    ),
+    "shot.turntable.exposure": Bound(
+        0.1, "range of the automatic exposure in stops, steady light"
+    ),
+    "shot.flickering.exposure": Bound(None, "the same, flickering light"),
+    "samples.falling_psnr": Bound(
+        0, "dB lost from 1 to 4, 16 and 64 samples, at the worst step"
+    ),
+}
+
 EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
     "constant.value": (
         Exemption(
@@ -130,9 +162,15 @@ class Check:
         return self.passed or self.exception is not None
 
 
+def bound(name: str) -> Bound:
+    """Return the bound of a value; raises KeyError without one."""
+    first, _, rest = name.partition(".")
+    return BOUNDS.get(name) or BOUNDS[f"{first}.*.{rest.partition('.')[2]}"]
+
+
 def judge(name: str, value: float, preset: str, scale: int, precision: str) -> Check:
     """Return a value with its verdict; raises KeyError without such a bound."""
-    limit = BOUNDS[name].limit
+    limit = bound(name).limit
     known = math.isfinite(value)
     passed = known and (limit is None or value <= limit)
     subject = f"{preset} x{scale} {precision}"

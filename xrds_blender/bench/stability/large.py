@@ -1,0 +1,70 @@
+"""A picture of 8192 x 8192 in a process of its own: memory beyond the arrays."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xrds_core.errors import XRDSError
+
+from .measured import Measured
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from .subject import Subject
+
+SIDE = 8192
+LIMIT = 2 << 30
+
+_PROGRAM = """
+import json, sys
+import numpy as np
+from xrds_core.upscaler import Upscaler
+
+preset, scale, precision, side, limit = sys.argv[1], *sys.argv[2:6]
+scale, side, limit = int(scale), int(side), int(limit)
+
+def status(key):
+    lines = open("/proc/self/status").read().splitlines()
+    return 1024 * int(next(x for x in lines if x.startswith(key)).split()[1])
+
+made = Upscaler(preset, scale, precision=precision, device="cpu")
+random = np.random.default_rng(0)
+low = random.random((side // scale, side // scale, 3), np.float32)
+albedo = random.random((side, side, 3), np.float32)
+normal = random.random((side, side, 3), np.float32)
+made(low[:8, :8], albedo[: 8 * scale, : 8 * scale], normal[: 8 * scale, : 8 * scale])
+open("/proc/self/clear_refs", "w").write("5")
+before = status("VmRSS")
+result = made(low, albedo, normal, memory_limit=limit)
+peak = status("VmHWM") - before - result.radiance.nbytes
+bad = sum(
+    int((~np.isfinite(rows) | (rows < 0)).sum()) for rows in np.array_split(
+        result.radiance, 64)
+)
+print("REPORT" + json.dumps({"peak": peak, "bad": bad, "tiles": result.tiles}))
+"""
+
+
+def large(subject: Subject, side: int = SIDE) -> Iterator[Measured]:
+    """Bytes beside the arrays given and returned, with a limit of 2 GiB."""
+    words = [subject.preset, subject.scale, subject.precision, side, LIMIT]
+    done = subprocess.run(
+        [sys.executable, "-c", _PROGRAM, *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=Path(__file__).parents[3],
+    )
+    if done.returncode:
+        raise XRDSError(
+            f"{subject.name} ended with {done.returncode} on {side}x{side} pixels: "
+            f"{done.stderr.strip().rpartition(chr(10))[2]}"
+        )
+    told = json.loads(done.stdout.rpartition("REPORT")[2])
+    yield Measured("shapes.memory", told["peak"] / 2**30)
+    yield Measured("shapes.large_faults", told["bad"])
