@@ -84,6 +84,7 @@ def stability(
     say = progress or (lambda _: None)
     works = list(_works(parts, cache or out / "rendered", side, say))
     found: list[tuple[Check, Measured]] = []
+    told: dict[str, Any] = {}
     subjects = shipped(directory=weights, device=device, side=ARRAY_SIDE, thorough=True)
     for subject in subjects:
         for name, work in works:
@@ -92,16 +93,22 @@ def stability(
                 if not check.passed:
                     say(f"{subject.name}: {check.name} is {check.value:.3g}")
             say(f"{subject.name}: {name} done")
-    verdicts = [check for check, _ in found]
-    told = {
-        "checks": [vars(check) for check in verdicts],
-        "curves": [_curve(*pair) for pair in found if pair[1].curve],
-        "machine": _machine(subjects),
-        "weights": available(weights),
-        "passed": all(check.holds for check in verdicts),
-    }
-    report.write(out, told, verdicts)
+        # after each of them: what an interrupt leaves is a report of those before
+        told = _told(found, subject.upscaler.device, available(weights))
+        report.write(out, told, [check for check, _ in found])
     return told
+
+
+def _told(
+    found: list[tuple[Check, Measured]], device: object, weights: list[dict[str, Any]]
+) -> dict[str, Any]:
+    return {
+        "checks": [vars(check) for check, _ in found],
+        "curves": [_curve(*pair) for pair in found if pair[1].curve],
+        "machine": _machine(device),
+        "weights": weights,
+        "passed": all(check.holds for check, _ in found),
+    }
 
 
 def _works(
@@ -150,12 +157,12 @@ def _curve(check: Check, measured: Measured) -> dict[str, Any]:
     return {"name": check.name, "subject": subject, "points": points}
 
 
-def _machine(subjects: Sequence[Subject]) -> dict[str, Any]:
+def _machine(device: object) -> dict[str, Any]:
     import torch
 
     blender = sys.modules.get("bpy")
     return {
         "torch": torch.__version__,
         "blender": blender.app.version_string if blender else None,
-        "device": str(subjects[0].upscaler.device) if subjects else None,
+        "device": str(device),
     }
