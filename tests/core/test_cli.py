@@ -59,6 +59,8 @@ def run(code: str, *words: str) -> subprocess.CompletedProcess[str]:
         ["render", "a.blend", "-o", "b.exr", "--memory-limit", "much"],
         ["evaluate", "a.blend", "--windows", "w", "--references", "r", "--scale", "x"],
         ["evaluate", "a.blend", "--windows", "w", "--references", "r", "--guides", "x"],
+        ["stability"],
+        ["stability", "--out", "o", "--parts", "everything"],
     ],
     ids=" ".join,
 )

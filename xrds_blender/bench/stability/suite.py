@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
 
     Work = Callable[[Subject], Iterator[Measured]]
     Say = Callable[[str], object]
+    Key = tuple[str, str]  # of a value and a subject
 
 GROUPS: dict[str, tuple[Work, ...]] = {
     "light": light.CHECKS,
@@ -70,7 +72,9 @@ def stability(
         weights: a folder of presets in place of the shipped.
         progress: given one line of text after every check.
 
-    Raises UsageError for unknown parts, WeightsError for damaged weights.
+    Values of the same weights that ``out`` holds from an earlier run, as of other
+    parts, stay in the report. Raises UsageError for unknown parts, WeightsError for
+    damaged weights.
     """
     from xrds_core.weights import available
 
@@ -83,32 +87,53 @@ def stability(
     out.mkdir(parents=True, exist_ok=True)
     say = progress or (lambda _: None)
     works = list(_works(parts, cache or out / "rendered", side, say))
-    found: list[tuple[Check, Measured]] = []
+    there = available(weights)
+    found, curves = _earlier(out / "results.json", there)
     told: dict[str, Any] = {}
-    subjects = shipped(directory=weights, device=device, side=ARRAY_SIDE, thorough=True)
-    for subject in subjects:
+    for subject in shipped(
+        directory=weights, device=device, side=ARRAY_SIDE, thorough=True
+    ):
         for name, work in works:
             for check, measured in checks(subject, work):
-                found.append((check, measured))
+                found[check.name, subject.name] = check
+                if measured.curve:
+                    curves[check.name, subject.name] = measured.curve
                 if not check.passed:
                     say(f"{subject.name}: {check.name} is {check.value:.3g}")
             say(f"{subject.name}: {name} done")
         # after each of them: what an interrupt leaves is a report of those before
-        told = _told(found, subject.upscaler.device, available(weights))
-        report.write(out, told, [check for check, _ in found])
+        told = {
+            "checks": [vars(check) for check in found.values()],
+            "curves": [
+                {"name": name, "subject": who, "points": [*map(list, curve.items())]}
+                for (name, who), curve in curves.items()
+            ],
+            "machine": _machine(subject.upscaler.device),
+            "weights": there,
+            "passed": all(check.holds for check in found.values()),
+        }
+        report.write(out, told, list(found.values()))
     return told
 
 
-def _told(
-    found: list[tuple[Check, Measured]], device: object, weights: list[dict[str, Any]]
-) -> dict[str, Any]:
+def _earlier(
+    path: Path, weights: list[dict[str, Any]]
+) -> tuple[dict[Key, Check], dict[Key, dict[float, float]]]:
+    """Return what an earlier run measured of the same weights, to be added to."""
+    try:
+        told = json.loads(path.read_text())
+        if told["weights"] != weights:
+            return {}, {}
+        verdicts = [
+            judge(*(x[k] for k in ("name", "value", "preset", "scale", "precision")))
+            for x in told["checks"]
+        ]
+        curves = {(x["name"], x["subject"]): dict(x["points"]) for x in told["curves"]}
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}, {}
     return {
-        "checks": [vars(check) for check, _ in found],
-        "curves": [_curve(*pair) for pair in found if pair[1].curve],
-        "machine": _machine(device),
-        "weights": weights,
-        "passed": all(check.holds for check, _ in found),
-    }
+        (c.name, f"{c.preset} x{c.scale} {c.precision}"): c for c in verdicts
+    }, curves
 
 
 def _works(
@@ -149,12 +174,6 @@ def _shots(folder: Path, side: int, say: Say) -> Iterator[tuple[str, Work]]:
             lambda subject, name=name: shots.shot(subject, name, load(name=name)),
         )
     yield "held", lambda subject: shots.held(subject, load(name="flickering"))
-
-
-def _curve(check: Check, measured: Measured) -> dict[str, Any]:
-    subject = f"{check.preset} x{check.scale} {check.precision}"
-    points = [[x, y] for x, y in (measured.curve or {}).items()]
-    return {"name": check.name, "subject": subject, "points": points}
 
 
 def _machine(device: object) -> dict[str, Any]:
