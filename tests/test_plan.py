@@ -18,19 +18,26 @@ FACTS = plan.Facts(
 
 
 def values(facts: plan.Facts) -> dict[str, str]:
-    return {decision.decision: decision.value for decision in plan.decide(facts)}
+    return {d.decision: d.value for d in plan.decide(facts).decisions}
 
 
 def test_decisions_of_an_ordinary_render() -> None:
     assert values(FACTS) == {
         "denoise": "low resolution",
+        "guides": "rendered",
+        "guide samples": "4",
         "guide bounces": "4, none diffuse",
+        "guide lights": "lamps alone",
+        "motion blur": "on",
+        "network": "without empty parts",
         "low frame": "342x192",
     }
 
 
 def test_every_decision_has_a_reason() -> None:
-    for decision in plan.decide(FACTS) + plan.after(0.5, 0.0) + plan.plain("asked for"):
+    for decision in (
+        plan.decide(FACTS).decisions + plan.after(0.5, 0.0) + plan.plain("asked for")
+    ):
         assert decision.reason
         assert "\n" not in decision.reason
 
@@ -47,7 +54,7 @@ def test_guides_never_bounce_more_than_the_scene() -> None:
 def test_a_panorama_says_that_it_is_resampled() -> None:
     (low,) = (
         d
-        for d in plan.decide(replace(FACTS, exact_camera=False))
+        for d in plan.decide(replace(FACTS, exact_camera=False)).decisions
         if d.decision == "low frame"
     )
     assert "resampled" in low.reason

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from .borrowed import Borrowed
-from .plan import guide_bounces
 
 
 def set_sampling(
@@ -50,17 +49,4 @@ def set_box_filter(borrowed: Borrowed, scene: Any, scale: int) -> None:
         pixel_filter_type="BOX",
         filter_width=1.0,
         dicing_rate=scene.cycles.dicing_rate / scale,
-    )
-
-
-def set_guide_bounces(borrowed: Borrowed, scene: Any) -> None:
-    """Follow light only as far as albedo and normal need it."""
-    borrowed.set(
-        scene.cycles,
-        max_bounces=guide_bounces(scene.cycles.max_bounces),
-        diffuse_bounces=0,
-        volume_bounces=0,
-        use_fast_gi=False,
-        use_guiding=False,
-        light_sampling_threshold=1.0,
     )

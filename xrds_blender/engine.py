@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from . import cycles_session
-from .passes import GUIDE_PASSES
+from .pass_names import GUIDE_PASSES
 from .render import render_in
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import UsageError
 
-from .plan import Decision
+from .plan import OMISSIONS, Decision
 
 if TYPE_CHECKING:
     from .cycles_session import Array
@@ -23,7 +23,10 @@ class RenderJob:
 
     `samples` and `seed` None leave Cycles' own; `exposure` None is found in the
     picture; `weights` is a folder of presets or a file in place of the shipped;
-    `memory_limit` in bytes is the network's. Raises UsageError on values out of range.
+    `memory_limit` in bytes is the network's; `keep` names omissions of the plan that
+    are not to be made. `guide_cache` is a folder for guides beside those in memory;
+    each render of the same view adds its samples to them until they are `guide_limit`.
+    Raises UsageError on values out of range.
     """
 
     scale: int = 2
@@ -37,6 +40,9 @@ class RenderJob:
     plain: bool = False
     memory_limit: int | None = None
     weights: str | Path | None = None
+    keep: tuple[str, ...] = ()
+    guide_cache: str | Path | None = None
+    guide_limit: int = 0
 
     def __post_init__(self) -> None:
         if self.scale not in SCALES:
@@ -46,6 +52,10 @@ class RenderJob:
             value = getattr(self, name)
             if value is not None and value < 1:
                 raise UsageError(f"{name} {value} is below 1")
+        unknown = set(self.keep) - set(OMISSIONS)
+        if unknown:
+            known = ", ".join(OMISSIONS)
+            raise UsageError(f"cannot keep {sorted(unknown)}; there are {known}")
 
     @property
     def is_plain(self) -> bool:

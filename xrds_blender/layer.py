@@ -14,8 +14,11 @@ from . import cycles_session, low_camera, plan
 from .borrowed import Borrowed
 from .colour import converted, to_rec709, working_space
 from .cycles_settings import set_sampling
+from .guides import GuideSource
 from .job import STAGES, Picture, RenderJob
-from .passes import COMBINED, Beauty, CyclesPasses, Guides
+from .pass_names import COMBINED
+from .passes import Beauty, CyclesPasses, Guides
+from .scene_facts import scene_facts
 
 if TYPE_CHECKING:
     from xrds_core import Upscaled, Upscaler
@@ -83,14 +86,18 @@ def _enlarged(
 ) -> Picture:
     name = depsgraph.view_layer_eval.name
     with CyclesPasses(engine, depsgraph) as passes:
-        decisions = plan.decide(_facts(depsgraph, job, passes))
-        beauties, guides, exposure = _passes(engine, job, passes)
+        facts = find_facts(depsgraph, job, passes)
+        chosen = plan.decide(facts, job.keep)
+        source = GuideSource(passes, depsgraph, job, chosen, facts)
+        beauties, guides, exposure = _passes(engine, job, chosen, passes, source)
     first = passes.views[0]
     stages = beauties[first].seconds, guides[first].seconds
     for key, value in [item for stage in stages for item in stage.items()]:
         seconds[key] += value
+    decisions = (*chosen.decisions, source.decision)
     syncs = sorted(stage["sync"] for stage in stages)
-    decisions += plan.after(syncs[1], syncs[0])
+    if syncs[0]:
+        decisions += plan.after(syncs[1], syncs[0])
     started = time.perf_counter()
     pictures = {
         view: _upscale(engine, upscaler, job, exposure, beauties[view], guides[view])
@@ -115,22 +122,26 @@ def _enlarged(
 
 
 def _passes(
-    engine: Any, job: RenderJob, passes: CyclesPasses
+    engine: Any,
+    job: RenderJob,
+    chosen: plan.Plan,
+    passes: CyclesPasses,
+    source: GuideSource,
 ) -> tuple[dict[str, Beauty], dict[str, Guides], float | None]:
     """Render both; the result then holds the guides' data passes at full size."""
-    full = job.guides == "full"
-    seed = None if job.seed is None else job.seed + 1
 
     def guide() -> dict[str, Guides]:
         engine.update_stats("XRDS", "Rendering guides")
-        return passes.guides_by_view(job.guide_samples, full=full, seed=seed)
+        return source.guides()
 
     def beauty() -> tuple[dict[str, Beauty], float | None]:
         engine.update_stats("XRDS", "Rendering low resolution")
-        low = passes.beauties(job.scale, job.samples, seed=job.seed)
+        low = passes.beauties(
+            job.scale, job.samples, denoise=chosen.denoise, seed=job.seed
+        )
         return low, job.exposure or passes.border_exposure()
 
-    if not full:
+    if job.guides != "full":
         low, exposure = beauty()
         return low, guide(), exposure
     # Fewer samples first: noise that matters, and one sync all the same.
@@ -140,7 +151,8 @@ def _passes(
     return low, guides, exposure
 
 
-def _facts(depsgraph: Any, job: RenderJob, passes: CyclesPasses) -> plan.Facts:
+def find_facts(depsgraph: Any, job: RenderJob, passes: CyclesPasses) -> plan.Facts:
+    """What the plan of a frame rests on."""
     scene = depsgraph.scene_eval
     return plan.Facts(
         scale=job.scale,
@@ -150,6 +162,8 @@ def _facts(depsgraph: Any, job: RenderJob, passes: CyclesPasses) -> plan.Facts:
         max_bounces=scene.cycles.max_bounces,
         has_denoiser=cycles_session.has_denoiser(),
         exact_camera=low_camera.is_exact(scene.camera.data),
+        guide_samples=job.guide_samples,
+        scene=scene_facts(depsgraph),
     )
 
 

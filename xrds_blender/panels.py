@@ -67,7 +67,7 @@ def summary(scene: bpy.types.Scene) -> list[str]:
     settings = scene.xrds
     if settings.plain:
         return ["Plain: one full-resolution Cycles render, no network"]
-    decisions = plan.decide(_facts(scene))
+    decisions = plan.decide(_facts(scene)).decisions
     return [f"{d.decision.capitalize()}: {d.value}" for d in decisions]
 
 

@@ -9,6 +9,7 @@ of the render settings, and all of it is given back.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any
@@ -23,29 +24,23 @@ from .cycles_session import Array
 from .cycles_settings import (
     set_box_filter,
     set_denoising,
-    set_guide_bounces,
     set_sampling,
 )
+from .guide_settings import guide_settings
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
+from .pass_names import (
+    ALBEDO,
+    COMBINED,
+    DEPTH,
+    GUIDE_PASSES,
+    NOISY,
+    NORMAL,
+    is_light,
+)
+from .plan import GuideRender
 
-ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth"
-GUIDE_PASSES = ((ALBEDO, "RGB", "COLOR"), (NORMAL, "XYZ", "VECTOR"))
-COMBINED, NOISY = "Combined", "Noisy Image"
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
-# Light that guides are rendered without, and what was made of it: these passes come
-# from the low-resolution render. Names of Blender up to 4.5 and from 5.0.
-_LIGHTS = ("Diffuse", "Glossy", "Transmission", "Volume")
-LIGHT_PASSES = frozenset(
-    [f"{light} {way}" for light in _LIGHTS for way in ("Direct", "Indirect")]
-    + [f"{kind}{way}" for kind in ("Diff", "Gloss", "Trans") for way in ("Dir", "Ind")]
-    + ["VolumeDir", "VolumeInd", "AO", "Ambient Occlusion"]
-    + ["Shadow Catcher", "Noisy Shadow Catcher", "Noisy Image"]
-)
-
-
-def _is_light(name: str) -> bool:
-    return name in LIGHT_PASSES or name.startswith("Combined_")
 
 
 @dataclass(frozen=True)
@@ -215,10 +210,13 @@ class CyclesPasses:
         picture = self._read_corner(self._radiance(self.views[0], False), whole)
         return auto_exposure(np.ascontiguousarray(picture[..., :3]))
 
+    def pass_names(self) -> list[str]:
+        """All passes of the result, each once whatever its views."""
+        return list(dict.fromkeys(item.name for item in self._layer().passes))
+
     def data_passes(self) -> dict[tuple[str, str], Array]:
         """All passes by (view, name) but the picture and its light, as they are now."""
-        names = dict.fromkeys(item.name for item in self._layer().passes)
-        kept = [n for n in names if n != COMBINED and not _is_light(n)]
+        kept = [n for n in self.pass_names() if n != COMBINED and not is_light(n)]
         found = {(view, n): self._read(n, view) for view in self.views for n in kept}
         return {key: pixels for key, pixels in found.items() if pixels is not None}
 
@@ -252,14 +250,15 @@ class CyclesPasses:
         full: bool = False,
         denoise: bool = False,
         seed: int | None = None,
+        how: GuideRender | None = None,
     ) -> dict[str, Guides]:
-        """As `guides`, for every view by name."""
+        """As `guides`, for every view by name; `how` tells what may be left out."""
         denoise = denoise and full and cycles_session.has_denoiser()
-        with Borrowed() as borrowed:
+        how = how or GuideRender(shadows=False)
+        settings = nullcontext() if full else guide_settings(self._depsgraph, how)
+        with Borrowed() as borrowed, settings:
             set_sampling(borrowed, self._scene, samples, seed)
             set_denoising(borrowed, self._scene, self._layer_eval, denoise, None)
-            if not full:
-                set_guide_bounces(borrowed, self._scene)
             clock = self._run((self.width, self.height), self.region, exact=full)
         seconds = {"sync": clock.sync, "guides": clock.render}
         return {
@@ -351,9 +350,8 @@ class CyclesPasses:
         )
 
     def _light_passes(self, view: str) -> Iterator[tuple[str, Array]]:
-        names = dict.fromkeys(item.name for item in self._layer().passes)
-        for name in names:
-            if _is_light(name):
+        for name in self.pass_names():
+            if is_light(name):
                 pixels = self._read(name, view)
                 if pixels is not None:
                     yield name, pixels

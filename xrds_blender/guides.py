@@ -1,0 +1,129 @@
+"""Where the guides of a picture come from: rendered, kept from before, or both."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import guide_cache
+from .guide_cache import CachedGuides
+from .guide_key import NotFollowed, guide_key
+from .pass_names import ALBEDO, NORMAL, is_lasting
+from .passes import Guides
+from .plan import Decision
+
+if TYPE_CHECKING:
+    from .facts import Facts
+    from .job import RenderJob
+    from .passes import CyclesPasses
+    from .plan import Plan
+
+_NAME = "guide cache"
+
+
+class GuideSource:
+    """Guides of one frame; `decision` tells afterwards where they came from."""
+
+    def __init__(
+        self,
+        passes: CyclesPasses,
+        depsgraph: Any,
+        job: RenderJob,
+        chosen: Plan,
+        facts: Facts,
+    ) -> None:
+        self._passes, self._graph, self._job = passes, depsgraph, job
+        self._chosen, self._facts = chosen, facts
+        self._folder = None if job.guide_cache is None else Path(job.guide_cache)
+        self.decision = Decision(_NAME, "off", "as asked for")
+
+    def guides(self) -> dict[str, Guides]:
+        """Guides by view; the render result then holds their passes."""
+        if self._job.guides == "full" or _NAME in self._job.keep:
+            return self._render(self._chosen.guide_samples)
+        started = time.perf_counter()
+        try:
+            key = self._key()
+        except NotFollowed as reason:
+            self.decision = Decision(_NAME, "not used", f"no key tells of {reason}")
+            return self._render(self._chosen.guide_samples)
+        kept = guide_cache.CACHE.get(key, self._folder)
+        looked = time.perf_counter() - started
+        missing = self._missing(0 if kept is None else kept.samples)
+        if not missing:
+            assert kept is not None
+            self._passes.put_back(kept.passes)
+            self._tell_hit(kept.samples, looked)
+            return _guides(kept, {"sync": 0.0, "guides": looked})
+        return self._add(key, kept, missing, looked)
+
+    def _key(self) -> str:
+        names = sorted(self._passes.pass_names())
+        light = [name for name in names if not is_lasting(name)]
+        if light:
+            raise NotFollowed(f"the pass {', '.join(light)}")
+        passes, scene = self._passes, self._facts.scene
+        how = sorted(asdict(self._chosen.guides).items())
+        frame = passes.frame, passes.region, passes.views, names, how
+        return guide_key(self._graph, scene, frame)
+
+    def _missing(self, kept: int) -> int:
+        """Samples to render beside those that are there."""
+        asked = self._chosen.guide_samples
+        if kept < asked:
+            return asked - kept
+        return max(0, min(asked, self._job.guide_limit - kept))
+
+    def _render(self, samples: int, kept: int = 0) -> dict[str, Guides]:
+        seed = None if self._job.seed is None else self._job.seed + 1
+        if kept:  # samples of the same seed would be the same samples
+            first = self._graph.scene_eval.cycles.seed if seed is None else seed
+            seed = first + kept
+        return self._passes.guides_by_view(
+            samples,
+            full=self._job.guides == "full",
+            seed=seed,
+            how=self._chosen.guides,
+        )
+
+    def _add(
+        self, key: str, kept: CachedGuides | None, samples: int, looked: float
+    ) -> dict[str, Guides]:
+        """Render samples, join them with those kept, and keep the result."""
+        rendered = self._render(samples, 0 if kept is None else kept.samples)
+        seconds = dict(next(iter(rendered.values())).seconds)
+        seconds["guides"] += looked
+        alphas = {view: guides.alpha for view, guides in rendered.items()}
+        guides = CachedGuides(samples, self._passes.data_passes(), alphas)
+        reason = "nothing kept yet has this camera, geometry and materials"
+        value = f"kept {samples} samples"
+        if kept is not None:
+            guides = kept.merged(guides)
+            self._passes.put_back(guides.passes)
+            reason = f"{samples} samples more for the same view"
+            value = f"added up to {guides.samples} samples"
+        self.decision = Decision(_NAME, value, reason)
+        guide_cache.CACHE.put(key, guides, self._folder)
+        return _guides(guides, seconds)
+
+    def _tell_hit(self, samples: int, looked: float) -> None:
+        reason = "camera, geometry, materials and textures are as they were"
+        expected = self._facts.guide_seconds
+        saving = None if expected is None else max(0.0, expected - looked)
+        self.decision = Decision(_NAME, f"used {samples} samples", reason, saving)
+
+
+def _guides(kept: CachedGuides, seconds: dict[str, float]) -> dict[str, Guides]:
+    return {
+        view: Guides(
+            kept.passes[view, ALBEDO],
+            kept.passes[view, NORMAL],
+            alpha,
+            None,
+            None,
+            seconds,
+        )
+        for view, alpha in kept.alphas.items()
+    }

@@ -1,0 +1,31 @@
+"""Names of Cycles' passes, up to Blender 4.5 and from 5.0 on, and what they hold."""
+
+from __future__ import annotations
+
+ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth"
+GUIDE_PASSES = ((ALBEDO, "RGB", "COLOR"), (NORMAL, "XYZ", "VECTOR"))
+COMBINED, NOISY = "Combined", "Noisy Image"
+# Light that guides are rendered without, and what was made of it: these passes come
+# from the low-resolution render.
+_LIGHTS = ("Diffuse", "Glossy", "Transmission", "Volume")
+LIGHT_PASSES = frozenset(
+    [f"{light} {way}" for light in _LIGHTS for way in ("Direct", "Indirect")]
+    + [f"{kind}{way}" for kind in ("Diff", "Gloss", "Trans") for way in ("Dir", "Ind")]
+    + ["VolumeDir", "VolumeInd", "AO", "Ambient Occlusion"]
+    + ["Shadow Catcher", "Noisy Shadow Catcher", "Noisy Image"]
+)
+# What the same things decide that decide albedo and normal.
+_KEPT = {ALBEDO, NORMAL, DEPTH, COMBINED, "Depth", "Position", "Normal", "UV"}
+_KEPT |= {"IndexOB", "IndexMA", "Object Index", "Material Index"}
+_KEPT |= {"DiffCol", "GlossCol", "TransCol"}
+_KEPT |= {"Diffuse Color", "Glossy Color", "Transmission Color"}
+
+
+def is_light(name: str) -> bool:
+    """Whether a pass holds light, which guides are rendered without."""
+    return name in LIGHT_PASSES or name.startswith("Combined_")
+
+
+def is_lasting(name: str) -> bool:
+    """Whether a pass changes only when guides do, or is made anew with the picture."""
+    return name in _KEPT or is_light(name) or name.startswith("Crypto")
