@@ -123,7 +123,7 @@ class _SceneHash:
         self._add("layer", layer.name)
         if layer.material_override:
             self._add("override", layer.material_override.name_full)
-        self._collections(layer.layer_collection)
+        self._collections(self._graph.view_layer.layer_collection)
 
     def _collections(self, layer: Any) -> None:
         flags = layer.exclude, layer.holdout, layer.indirect_only

@@ -69,7 +69,7 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
         motion_blur=scene.render.use_motion_blur,
         moving=tuple(islice(_moving(ids, objects), _NAMED)),
         film_transparent=scene.render.film_transparent,
-        shadow_catchers=any(item.is_shadow_catcher for item in objects),
+        shadow_catchers=any(item.is_shadow_catcher for item in solid),
         passes=requested_passes(depsgraph.view_layer_eval),
         materials=len(materials),
         unknown_nodes=surface.unknown,
