@@ -36,7 +36,9 @@ def test_decisions_of_an_ordinary_render() -> None:
 
 def test_every_decision_has_a_reason() -> None:
     for decision in (
-        plan.decide(FACTS).decisions + plan.after(0.5, 0.0) + plan.plain("asked for")
+        plan.decide(FACTS).decisions
+        + plan.after(0.5, 0.0)
+        + plan.plain("asked for").decisions
     ):
         assert decision.reason
         assert "\n" not in decision.reason

@@ -72,11 +72,27 @@ def _blender_version() -> str | None:
 
 
 def _render(options: argparse.Namespace) -> dict[str, Any]:
+    if options.explain:
+        return _plan(options)
     _need_blender("render")
-    from .job import RenderJob
+    if options.output is None:
+        raise UsageError("name the output with -o, or ask for the plan with --explain")
     from .render_file import render_file
 
-    job = RenderJob(
+    return render_file(
+        options.scene,
+        options.output,
+        _job(options),
+        frames=options.frames,
+        resolution=options.resolution,
+    )
+
+
+def _job(options: argparse.Namespace) -> Any:
+    from .job import RenderJob
+    from .plan import OMISSIONS
+
+    return RenderJob(
         scale=options.scale,
         samples=options.samples,
         guide_samples=options.guide_samples,
@@ -88,22 +104,37 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
         plain=options.plain,
         memory_limit=options.memory_limit,
         weights=options.weights,
+        keep=OMISSIONS if options.keep_all else (),
+        guide_cache=options.guide_cache,
+        guide_limit=options.guide_limit,
     )
-    return render_file(
-        options.scene,
-        options.output,
-        job,
-        frames=options.frames,
-        resolution=options.resolution,
-    )
+
+
+def _plan(options: argparse.Namespace) -> dict[str, Any]:
+    _need_blender("plan")
+    from .explain import explain_file
+
+    return explain_file(options.scene, _job(options), resolution=options.resolution)
+
+
+def _plan_lines(told: dict[str, Any]) -> list[str]:
+    return [f"{_decision_line(each)}: {each['reason']}" for each in told["decisions"]]
+
+
+def _decision_line(told: dict[str, Any]) -> str:
+    saved = told["saving_seconds"]
+    estimate = f" (saves about {saved:.1f} s)" if saved else ""
+    return f"{told['decision']}: {told['value']}{estimate}"
 
 
 def _render_lines(told: dict[str, Any]) -> list[str]:
+    if "decisions" in told:
+        return _plan_lines(told)
     lines = [
         f"{frame['output']}: {frame['seconds']['total']:.1f} s"
         for frame in told["frames"]
     ]
-    return lines + [f"  {d['decision']}: {d['reason']}" for d in told["plan"]]
+    return lines + [f"  {_decision_line(each)}" for each in told["plan"]]
 
 
 def _upscale(options: argparse.Namespace) -> dict[str, Any]:
@@ -226,6 +257,7 @@ def _parser() -> argparse.ArgumentParser:
     for add in (
         _add_info,
         _add_render,
+        _add_plan,
         _add_upscale,
         _add_evaluate,
         _add_stability,
@@ -249,21 +281,38 @@ def _add_info(commands: Any) -> argparse.ArgumentParser:
 def _add_render(commands: Any) -> argparse.ArgumentParser:
     command = commands.add_parser("render", help="render a .blend file")
     add = command.add_argument
+    _add_job(command)
+    add("-o", "--output", help=".exr or .png; # for frame numbers")
+    add("--explain", action="store_true", help="tell the plan and render nothing")
+    which = command.add_mutually_exclusive_group()
+    which.add_argument("--frame", type=_frame, dest="frames", metavar="F")
+    which.add_argument("--frames", type=_frames, help="first-last", metavar="A-B")
+    command.set_defaults(work=_render, lines=_render_lines)
+    return command
+
+
+def _add_plan(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("plan", help="what a render would do and leave out")
+    _add_job(command)
+    command.set_defaults(work=_plan, lines=_plan_lines)
+    return command
+
+
+def _add_job(command: argparse.ArgumentParser) -> None:
+    """What `RenderJob` holds."""
+    add = command.add_argument
     add("scene", type=Path, metavar="SCENE.blend")
-    add("-o", "--output", required=True, help=".exr or .png; # for frame numbers")
     size = command.add_mutually_exclusive_group()
     size.add_argument("--scale", type=int, choices=(1, 2, 4, 8), default=2)
     size.add_argument("--plain", action="store_true", help="Cycles as the file has it")
     add("--samples", type=_positive, help="of the low-resolution render")
     add("--guide-samples", type=_positive, default=4)
-    which = command.add_mutually_exclusive_group()
-    which.add_argument("--frame", type=_frame, dest="frames", metavar="F")
-    which.add_argument("--frames", type=_frames, help="first-last", metavar="A-B")
+    add("--guide-cache", type=Path, metavar="DIR", help="folder that keeps guides")
+    add("--guide-limit", type=int, default=0, help="samples that kept guides gather")
+    add("--keep-all", action="store_true", help="leave nothing out")
     add("--resolution", type=_size, metavar="WxH")
     add("--seed", type=int)
     _add_network(command)
-    command.set_defaults(work=_render, lines=_render_lines)
-    return command
 
 
 def _add_upscale(commands: Any) -> argparse.ArgumentParser:

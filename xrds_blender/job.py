@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import UsageError
 
-from .plan import OMISSIONS, Decision
+from .plan import OMISSIONS, Decision, Facts, Plan, decide, plain
 
 if TYPE_CHECKING:
     from .cycles_session import Array
@@ -61,6 +61,14 @@ class RenderJob:
     def is_plain(self) -> bool:
         """Whether Cycles renders alone."""
         return self.plain or self.scale == 1
+
+    def plan(self, facts: Facts | None = None) -> Plan:
+        """What is decided for this job; plain ones rest on no facts."""
+        if self.is_plain:
+            reason = "asked for" if self.plain else "scale 1 leaves nothing to enlarge"
+            return plain(reason)
+        assert facts is not None
+        return decide(facts, self.keep)
 
     @classmethod
     def of(cls, settings: Any) -> RenderJob:

@@ -14,11 +14,11 @@ from . import cycles_session, low_camera, plan
 from .borrowed import Borrowed
 from .colour import converted, to_rec709, working_space
 from .cycles_settings import set_sampling
+from .explain import find_facts
 from .guides import GuideSource
 from .job import STAGES, Picture, RenderJob
 from .pass_names import COMBINED
 from .passes import Beauty, CyclesPasses, Guides
-from .scene_facts import scene_facts
 
 if TYPE_CHECKING:
     from xrds_core import Upscaled, Upscaler
@@ -64,7 +64,6 @@ def _plain(
     view = next((view.name for view in result.views), "")
     pixels = cycles_session.read_pass(layer, COMBINED, view, size)
     assert pixels is not None
-    reason = "asked for" if job.plain else "scale 1 leaves nothing to enlarge"
     return Picture(
         np.ascontiguousarray(pixels[..., :3]),
         np.ascontiguousarray(pixels[..., 3]),
@@ -72,7 +71,7 @@ def _plain(
         None,
         None,
         seconds,
-        plan.plain(reason),
+        job.plan().decisions,
         peak_memory(),
     )
 
@@ -86,8 +85,8 @@ def _enlarged(
 ) -> Picture:
     name = depsgraph.view_layer_eval.name
     with CyclesPasses(engine, depsgraph) as passes:
-        facts = find_facts(depsgraph, job, passes)
-        chosen = plan.decide(facts, job.keep)
+        facts = find_facts(depsgraph, job)
+        chosen = job.plan(facts)
         source = GuideSource(passes, depsgraph, job, chosen, facts)
         beauties, guides, exposure = _passes(engine, job, chosen, passes, source)
     first = passes.views[0]
@@ -149,22 +148,6 @@ def _passes(
     low, exposure = beauty()
     passes.put_back(data)
     return low, guides, exposure
-
-
-def find_facts(depsgraph: Any, job: RenderJob, passes: CyclesPasses) -> plan.Facts:
-    """What the plan of a frame rests on."""
-    scene = depsgraph.scene_eval
-    return plan.Facts(
-        scale=job.scale,
-        width=passes.width,
-        height=passes.height,
-        guides=job.guides,
-        max_bounces=scene.cycles.max_bounces,
-        has_denoiser=cycles_session.has_denoiser(),
-        exact_camera=low_camera.is_exact(scene.camera.data),
-        guide_samples=job.guide_samples,
-        scene=scene_facts(depsgraph),
-    )
 
 
 def _upscaler(job: RenderJob) -> Upscaler:

@@ -6,8 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 
-from . import cycles_session, low_camera, plan
+from .explain import Glance
+from .job import RenderJob
 from .operators import ENGINE, XRDS_OT_render
 
 
@@ -62,30 +64,16 @@ class XRDS_PT_advanced(bpy.types.Panel):
         row.prop(settings, "exposure")
 
 
+_glance = Glance()
+
+
 def summary(scene: bpy.types.Scene) -> list[str]:
     """What the render will do and leave out, one line each."""
-    settings = scene.xrds
-    if settings.plain:
+    job = RenderJob.of(scene.xrds)
+    if job.is_plain:
         return ["Plain: one full-resolution Cycles render, no network"]
-    decisions = plan.decide(_facts(scene)).decisions
-    return [f"{d.decision.capitalize()}: {d.value}" for d in decisions]
-
-
-def _facts(scene: bpy.types.Scene) -> plan.Facts:
-    """What can be told before a render, from the scene as it stands."""
-    width, height = (
-        size * scene.render.resolution_percentage // 100
-        for size in (scene.render.resolution_x, scene.render.resolution_y)
-    )
-    return plan.Facts(
-        scale=int(scene.xrds.scale),
-        width=width,
-        height=height,
-        guides=scene.xrds.guides,
-        max_bounces=scene.cycles.max_bounces,
-        has_denoiser=cycles_session.has_denoiser(),
-        exact_camera=scene.camera is None or low_camera.is_exact(scene.camera.data),
-    )
+    facts = _glance.facts(scene, bpy.context.view_layer, job)
+    return [f"{d.decision.capitalize()}: {d.value}" for d in job.plan(facts).decisions]
 
 
 def _cycles_classes(base: Any = None) -> Iterator[Any]:
@@ -100,16 +88,30 @@ def _cycles_classes(base: Any = None) -> Iterator[Any]:
 CLASSES = (XRDS_PT_settings, XRDS_PT_advanced)
 
 
+@persistent
+def _forget(*_: object) -> None:
+    _glance.forget()
+
+
+def _changes() -> tuple[Any, ...]:
+    handlers = bpy.app.handlers
+    return handlers.depsgraph_update_post, handlers.load_post
+
+
 def register() -> None:
     """Register the panels and show Cycles' own under XRDS, too."""
     for panel in CLASSES:
         bpy.utils.register_class(panel)
     for found in _cycles_classes():
         found.COMPAT_ENGINES.add(ENGINE)
+    for changes in _changes():
+        changes.append(_forget)
 
 
 def unregister() -> None:
     """Take all of it back."""
+    for changes in _changes():
+        changes.remove(_forget)
     for found in _cycles_classes():
         found.COMPAT_ENGINES.discard(ENGINE)
     for panel in reversed(CLASSES):

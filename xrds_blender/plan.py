@@ -83,9 +83,10 @@ class Plan:
     decisions: tuple[Decision, ...]
 
 
-def plain(reason: str) -> tuple[Decision, ...]:
-    """The only decision where Cycles renders alone."""
-    return (Decision("method", "plain", reason),)
+def plain(reason: str) -> Plan:
+    """The plan where Cycles renders alone, as the file has it."""
+    told = (Decision("method", "plain", reason),)
+    return Plan(False, GuideRender(), 0, True, True, False, told)
 
 
 def decide(facts: Facts, keep: Collection[str] = ()) -> Plan:

@@ -65,6 +65,14 @@ def run_job(
     return _run(scene, work, layer)
 
 
+def evaluate(scene: Any, look: Callable[[Any], T]) -> T:
+    """Return what `look` finds in the dependency graph of a render of `scene`.
+
+    Nothing is rendered. Raises SceneError without a camera.
+    """
+    return _run(scene, lambda _, depsgraph: look(depsgraph), None)
+
+
 def render_in(engine: Any, depsgraph: Any) -> None:
     """Do what Blender asks of the engine, or the work that waits for it."""
     if _task is not None:

@@ -11,9 +11,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import ensure_registered, plan  # noqa: E402
+from xrds_blender.explain import find_facts  # noqa: E402
 from xrds_blender.job import RenderJob  # noqa: E402
-from xrds_blender.layer import find_facts  # noqa: E402
-from xrds_blender.render import run_job  # noqa: E402
+from xrds_blender.render import evaluate, run_job  # noqa: E402
 from xrds_blender.studio import traps  # noqa: E402
 
 SAMPLES = 32
@@ -48,7 +48,7 @@ def test_the_plan_leaves_guides_as_they_are(name: str) -> None:
     scene = small(name)
 
     def job(passes: Any) -> Any:
-        facts = find_facts(passes._depsgraph, RenderJob(), passes)
+        facts = find_facts(passes._depsgraph, RenderJob())
         how = plan.decide(facts).guides
         whole = [guides(passes, plan.GuideRender(), seed) for seed in (1, 2)]
         return how, whole, guides(passes, how)
@@ -76,7 +76,7 @@ def test_the_traps_are_traps(name: str, omission: str) -> None:
     scene = small(name)
 
     def job(passes: Any) -> Any:
-        facts = find_facts(passes._depsgraph, RenderJob(), passes)
+        facts = find_facts(passes._depsgraph, RenderJob())
         whole = [guides(passes, plan.GuideRender(), seed) for seed in (1, 2)]
         return plan.decide(facts).guides, whole, guides(passes, LESS[omission])
 
@@ -101,10 +101,8 @@ def test_a_pass_after_the_guides_has_its_lights_again() -> None:
 
 
 def decided(scene: Any) -> plan.Plan:
-    def job(passes: Any) -> Any:
-        return find_facts(passes._depsgraph, RenderJob(), passes)
-
-    return plan.decide(replace(run_job(scene, job), has_denoiser=True))
+    facts = evaluate(scene, lambda graph: find_facts(graph, RenderJob()))
+    return plan.decide(replace(facts, has_denoiser=True))
 
 
 def remove_shapes(scene: Any, *but: str) -> None:

@@ -65,6 +65,7 @@ class Contest:
             guide_samples=GUIDE_SAMPLES,
             preset=self.preset,
             weights=self.weights,
+            keep=("guide cache",),  # every entry is to pay for its own
         )
         return self._run(f"xrds_x{scale}", f"XRDS x{scale}", job)
 
