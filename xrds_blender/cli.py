@@ -7,6 +7,7 @@ holds the JSON alone.
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -200,6 +201,18 @@ def _stability(options: argparse.Namespace) -> dict[str, Any]:
     return told
 
 
+def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
+    _need_blender("plan-report")
+    from .bench.plan_report import Setting, report
+
+    width, height = options.resolution
+    setting = Setting(
+        options.scale, options.samples, options.guide_samples, width, height
+    )
+    setting = dataclasses.replace(setting, rounds=options.rounds)
+    return report(options.scenes, options.kind, setting, options.out, _progress)
+
+
 def _dataset(options: argparse.Namespace) -> dict[str, Any]:
     _need_blender("dataset")
     from .studio.dataset import generate
@@ -261,6 +274,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_upscale,
         _add_evaluate,
         _add_stability,
+        _add_plan_report,
         _add_dataset,
         _add_train,
     ):
@@ -364,6 +378,22 @@ def _add_stability(commands: Any) -> argparse.ArgumentParser:
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
     add("--weights", type=Path, help="folder of weights files")
     command.set_defaults(work=_stability, lines=lambda _: ())
+    return command
+
+
+def _add_plan_report(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("plan-report", help="measure what the plan saves")
+    add = command.add_argument
+    add("scenes", nargs="+", help="SCENE.blend, or a scene of studio/traps.py")
+    kinds = ("still", "animation", "look-dev")
+    add("--kind", type=_names(kinds), default=("still",), help="as still,look-dev")
+    add("--scale", type=int, choices=(2, 4, 8), default=2)
+    add("--samples", type=_positive, default=16)
+    add("--guide-samples", type=_positive, default=4)
+    add("--resolution", type=_size, metavar="WxH", default=(960, 540))
+    add("--rounds", type=_positive, default=1, help="pairs of runs")
+    add("--out", type=Path, required=True, help="path of the .json and .md")
+    command.set_defaults(work=_plan_report, lines=lambda _: ())
     return command
 
 

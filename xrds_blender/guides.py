@@ -7,14 +7,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from . import guide_cache
 from .guide_cache import CachedGuides
 from .guide_key import NotFollowed, guide_key
 from .pass_names import ALBEDO, NORMAL, is_lasting
-from .passes import Guides
+from .passes import Beauty, Guides
 from .plan import Decision
 
 if TYPE_CHECKING:
+    from .cycles_session import Array
     from .facts import Facts
     from .job import RenderJob
     from .passes import CyclesPasses
@@ -39,8 +42,14 @@ class GuideSource:
         self._folder = None if job.guide_cache is None else Path(job.guide_cache)
         self.decision = Decision(_NAME, "off", "as asked for")
 
-    def guides(self) -> dict[str, Guides]:
-        """Guides by view; the render result then holds their passes."""
+    def guides(self, low: dict[str, Beauty] | None = None) -> dict[str, Guides]:
+        """Guides by view; the render result then holds their passes.
+
+        `low` is the picture by view, which an empty scene's guides are made of.
+        """
+        if low is not None and not self._chosen.render_guides:
+            self.decision = Decision(_NAME, "off", "there is nothing to keep")
+            return self._of_background(low)
         if self._job.guides == "full" or _NAME in self._job.keep:
             return self._render(self._chosen.guide_samples)
         started = time.perf_counter()
@@ -58,6 +67,27 @@ class GuideSource:
             self._tell_hit(kept.samples, looked)
             return _guides(kept, {"sync": 0.0, "guides": looked})
         return self._add(key, kept, missing, looked)
+
+    def _of_background(self, low: dict[str, Beauty]) -> dict[str, Guides]:
+        """What Cycles writes where it sees nothing: its light as albedo, no normal."""
+        scale, region = self._job.scale, self._passes.region
+        found = {}
+        for view, beauty in low.items():
+            rows, columns = beauty.offset
+            rows, columns = (
+                slice(rows, rows + region.height),
+                slice(columns, columns + region.width),
+            )
+
+            def large(x: Array, rows: slice = rows, columns: slice = columns) -> Array:
+                return x.repeat(scale, 0).repeat(scale, 1)[rows, columns]
+
+            albedo, alpha = large(beauty.radiance), large(beauty.alpha)
+            normal = np.zeros_like(albedo)
+            seconds = {"sync": 0.0, "guides": 0.0}
+            found[view] = Guides(albedo, normal, alpha, None, None, seconds)
+            self._passes.put_back({(view, ALBEDO): albedo, (view, NORMAL): normal})
+        return found
 
     def _key(self) -> str:
         names = sorted(self._passes.pass_names())

@@ -87,6 +87,8 @@ def _enlarged(
     with CyclesPasses(engine, depsgraph) as passes:
         facts = find_facts(depsgraph, job)
         chosen = job.plan(facts)
+        if not chosen.motion_blur:
+            passes.hold_still()
         source = GuideSource(passes, depsgraph, job, chosen, facts)
         beauties, guides, exposure = _passes(engine, job, chosen, passes, source)
     first = passes.views[0]
@@ -99,7 +101,9 @@ def _enlarged(
         decisions += plan.after(syncs[1], syncs[0])
     started = time.perf_counter()
     pictures = {
-        view: _upscale(engine, upscaler, job, exposure, beauties[view], guides[view])
+        view: _upscale(
+            engine, upscaler, job, chosen, exposure, beauties[view], guides[view]
+        )
         for view in passes.views
     }
     _stop_if_cancelled(engine)
@@ -129,9 +133,9 @@ def _passes(
 ) -> tuple[dict[str, Beauty], dict[str, Guides], float | None]:
     """Render both; the result then holds the guides' data passes at full size."""
 
-    def guide() -> dict[str, Guides]:
+    def guide(low: dict[str, Beauty] | None = None) -> dict[str, Guides]:
         engine.update_stats("XRDS", "Rendering guides")
-        return source.guides()
+        return source.guides(low)
 
     def beauty() -> tuple[dict[str, Beauty], float | None]:
         engine.update_stats("XRDS", "Rendering low resolution")
@@ -142,7 +146,7 @@ def _passes(
 
     if job.guides != "full":
         low, exposure = beauty()
-        return low, guide(), exposure
+        return low, guide(low), exposure
     # Fewer samples first: noise that matters, and one sync all the same.
     guides, data = guide(), passes.data_passes()
     low, exposure = beauty()
@@ -174,6 +178,7 @@ def _upscale(
     engine: Any,
     upscaler: Upscaler,
     job: RenderJob,
+    chosen: plan.Plan,
     exposure: float | None,
     beauty: Beauty,
     guides: Guides,
@@ -209,6 +214,7 @@ def _upscale(
         exposure=exposure,
         memory_limit=job.memory_limit,
         progress=tell,
+        skip_idle=chosen.skip_idle,
     )
     region = picture.radiance[rows:, columns:]
     return region if matrix is None else converted(region, np.linalg.inv(matrix))

@@ -210,6 +210,10 @@ class CyclesPasses:
         picture = self._read_corner(self._radiance(self.views[0], False), whole)
         return auto_exposure(np.ascontiguousarray(picture[..., :3]))
 
+    def hold_still(self) -> None:
+        """Render without motion blur, to be called before the first pass."""
+        self._pipeline.set(use_motion_blur=False)
+
     def pass_names(self) -> list[str]:
         """All passes of the result, each once whatever its views."""
         return list(dict.fromkeys(item.name for item in self._layer().passes))

@@ -143,6 +143,7 @@ def _denoise(facts: Facts, keep: bool) -> tuple[bool, Decision]:
 def _render_guides(facts: Facts, keep: bool) -> tuple[bool, Decision]:
     scene, name = facts.scene, "guides"
     seen = scene.surfaces or scene.volumes or scene.world == "varies"
+    seen = seen or bool(scene.passes)  # they come with the guides
     if facts.guides == "full":
         reason = "albedo, normal and radiance are asked for"
         return True, Decision(name, "rendered", reason)

@@ -6,7 +6,7 @@ All lengths are low-resolution pixels unless a name says otherwise.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,6 +32,10 @@ class Span:
     @property
     def size(self) -> int:
         return self.stop - self.start
+
+    def moved(self, offset: int) -> Span:
+        """Return the span ``offset`` pixels further on."""
+        return replace(self, start=self.start + offset, stop=self.stop + offset)
 
     def output(self, scale: int, limit: int) -> slice:
         """Return the full-resolution pixels it covers of a picture of ``limit``."""
@@ -65,6 +69,10 @@ class Tile:
 
     rows: Span
     columns: Span
+
+    def moved(self, rows: int, columns: int) -> Tile:
+        """Return the tile that lies so many pixels further down and right."""
+        return Tile(self.rows.moved(rows), self.columns.moved(columns))
 
     def weights(self, scale: int) -> NDArray[np.float32]:
         """Return blend weights (scale height, scale width)."""

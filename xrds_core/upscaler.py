@@ -17,6 +17,7 @@ from .cost import Cost, measure
 from .devices import choose_device, choose_precision
 from .errors import PictureError, UsageError, WeightsError, XRDSError
 from .front_end import EXPOSURE_RANGE, auto_exposure, inverse_transfer
+from .idle import base_picture, busy_area
 from .inputs import Inputs, check
 from .network import XRDS
 from .progress import Callback, Progress, watched
@@ -24,6 +25,7 @@ from .weights import load, load_preset
 
 if TYPE_CHECKING:
     from .front_end import Picture
+    from .idle import Area
 
 DEFAULT_MEMORY = 4 << 30
 """Bytes that an upscale may take on the CPU where no limit is given."""
@@ -105,6 +107,7 @@ class Upscaler:
         memory_limit: int | None = None,
         tile: int | None = None,
         progress: Callback | None = None,
+        skip_idle: bool = True,
     ) -> Upscaled:
         """Enlarge one picture.
 
@@ -130,8 +133,9 @@ class Upscaler:
         )
         self._check_guides(inputs)
         exposure = _exposure(exposure, inputs)
-        plan = self._tiles(inputs, memory_limit, tile)
-        picture = self._picture(inputs, exposure, plan, progress)
+        area = self._area(inputs, skip_idle)
+        plan = self._tiles(inputs, area, memory_limit, tile)
+        picture = self._picture(inputs, area, exposure, plan, progress)
         return Upscaled(picture, exposure, inputs.bad_pixels, len(plan))
 
     def _check_guides(self, inputs: Inputs) -> None:
@@ -143,18 +147,29 @@ class Upscaler:
                 "these weights take no guide_radiance; leave it out or use full guides"
             )
 
+    def _area(self, inputs: Inputs, skip_idle: bool) -> Area | None:
+        """Return the low-resolution rows and columns that the network is to see."""
+        window = self.network.config.low_multiple
+        if skip_idle and self.network.config.base:
+            return busy_area(inputs, 2 * window, _OVERLAP_WINDOWS * window)
+        height, width = inputs.low.shape[:2]
+        return slice(0, height), slice(0, width)
+
     def _tiles(
-        self, inputs: Inputs, limit: int | None, side: int | None
+        self, inputs: Inputs, area: Area | None, limit: int | None, side: int | None
     ) -> list[tiling.Tile]:
+        if area is None:
+            return []
         window = self.network.config.low_multiple
         overlap, multiple = _OVERLAP_WINDOWS * window, 2 * window
-        height, width = inputs.low.shape[:2]
+        height, width = (span.stop - span.start for span in area)
         if side is None:
             pixels = self._memory(limit) / (self.bytes_per_pixel() * self.scale**2)
         else:
             pixels = side**2
         size = tiling.fit(height, width, pixels, overlap, multiple)
-        return tiling.tiles(height, width, size, overlap, multiple)
+        found = tiling.tiles(height, width, size, overlap, multiple)
+        return [tile.moved(area[0].start, area[1].start) for tile in found]
 
     def _memory(self, limit: int | None) -> float:
         if limit is not None:
@@ -171,11 +186,13 @@ class Upscaler:
     def _picture(
         self,
         inputs: Inputs,
+        area: Area | None,
         exposure: float,
         plan: list[tiling.Tile],
         callback: Callback | None,
     ) -> Picture:
         picture = np.zeros((*inputs.shape, inputs.low.shape[2]), np.float32)
+        self._fill_idle(picture, inputs, area)
         progress = Progress(callback, self._work(plan))
         progress.tell(0.0)
         if not inputs.is_black():
@@ -186,6 +203,17 @@ class Upscaler:
             finish(picture, inputs.low, inputs.guide_alpha, self.scale)
         progress.tell(1.0)
         return picture
+
+    def _fill_idle(self, picture: Picture, inputs: Inputs, area: Area | None) -> None:
+        """Write the base outside of ``area``, which stays 0."""
+        if area is not None and _size(area) == inputs.low.shape[:2]:
+            return
+        picture[..., :3] = base_picture(inputs)
+        if area is not None:
+            rows, columns = (
+                slice(s.start * self.scale, s.stop * self.scale) for s in area
+            )
+            picture[rows, columns, :3] = 0.0
 
     def _work(self, plan: list[tiling.Tile]) -> float:
         """Return the number of values that the layers will have returned."""
@@ -228,6 +256,10 @@ class Upscaler:
             ) from error
         array: Picture = result[0].permute(1, 2, 0).cpu().numpy()
         return array
+
+
+def _size(area: Area) -> tuple[int, ...]:
+    return tuple(span.stop - span.start for span in area)
 
 
 def _network(

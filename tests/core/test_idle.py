@@ -1,0 +1,121 @@
+"""Where the network is left out, and that nothing is missed there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import torch
+from numpy.typing import NDArray
+
+from xrds_core.front_end import demodulated_base
+from xrds_core.network import XRDS, preset_config
+from xrds_core.upscaler import Upscaler
+
+Array = NDArray[np.float32]
+SIDE, SCALE = 320, 2
+THING = slice(128, 176)  # low-resolution rows and columns that are not background
+
+
+def make(preset: str = "fast", guides: str = "fast") -> Upscaler:
+    torch.manual_seed(3)
+    network = XRDS(preset_config(preset, SCALE, guides))
+    torch.nn.init.normal_(network.tail.predict.weight, std=0.1)
+    return Upscaler(preset, SCALE, guides, device="cpu", weights=network)
+
+
+@pytest.fixture(scope="module")
+def fast() -> Upscaler:
+    return make()
+
+
+def enlarged(x: Array) -> Array:
+    return x.repeat(SCALE, 0).repeat(SCALE, 1)
+
+
+def shot(background: Array) -> tuple[Array, Array, Array]:
+    """Radiance, albedo and normal of a textured thing before a background."""
+    rng = np.random.default_rng(0)
+    low = background.copy()
+    low[THING, THING] = rng.random((48, 48, 3), np.float32)
+    albedo = enlarged(background)
+    normal = np.zeros_like(albedo)
+    inside = slice(THING.start * SCALE, THING.stop * SCALE)
+    albedo[inside, inside] = rng.random((96, 96, 3), np.float32)
+    normal[inside, inside] = (0.0, 0.0, 1.0)
+    return low, albedo, normal
+
+
+def gradient() -> Array:
+    rise = np.linspace(0.1, 0.9, SIDE, dtype=np.float32)
+    return np.broadcast_to(rise[:, None, None], (SIDE, SIDE, 3)).copy()
+
+
+@pytest.mark.parametrize("background", [np.zeros((SIDE, SIDE, 3), "f4"), gradient()])
+def test_a_background_is_the_base_and_the_thing_is_as_before(
+    fast: Upscaler, background: Array
+) -> None:
+    low, albedo, normal = shot(background)
+    seen: list[float] = []
+    short = fast(low, albedo, normal, progress=seen.append).radiance
+    whole = fast(low, albedo, normal, skip_idle=False).radiance
+    inside = slice(THING.start * SCALE, THING.stop * SCALE)
+    difference = np.abs(short - whole)[inside, inside]
+    assert difference.max() < 0.01 * whole.max()
+    base = demodulated_base(low, albedo, SCALE)
+    np.testing.assert_array_equal(short[:32], base[:32])
+    assert seen[-1] == 1.0
+
+
+def test_what_fills_the_picture_is_all_computed(fast: Upscaler) -> None:
+    rng = np.random.default_rng(1)
+    low = rng.random((64, 64, 3), np.float32)
+    albedo, normal = rng.random((2, 128, 128, 3), np.float32)
+    short = fast(low, albedo, normal).radiance
+    np.testing.assert_array_equal(
+        short, fast(low, albedo, normal, skip_idle=False).radiance
+    )
+
+
+def test_an_even_picture_needs_no_network(fast: Upscaler) -> None:
+    low = np.full((64, 64, 3), 0.4, np.float32)
+    albedo = np.full((128, 128, 3), 0.5, np.float32)
+    told = fast(low, albedo, np.full_like(albedo, 0.6))
+    assert told.tiles == 0
+    np.testing.assert_allclose(told.radiance, 0.4, rtol=1e-5)
+
+
+@pytest.mark.parametrize("wrong", ["no normals", "bright sky", "light on nothing"])
+def test_doubts_are_computed(fast: Upscaler, wrong: str) -> None:
+    """Guides without normals, a sky that albedo cannot hold, fog over black."""
+    low, albedo, normal = shot(gradient())
+    if wrong == "no normals":
+        low *= np.random.default_rng(2).random((SIDE, SIDE, 1), np.float32)
+        normal[:] = 0.0
+    elif wrong == "bright sky":
+        low, albedo = 5 * low, 5 * albedo
+    else:
+        albedo[:128] = 0.0
+    short, whole = (
+        fast(low, albedo, normal, skip_idle=skip).radiance for skip in (True, False)
+    )
+    np.testing.assert_array_equal(short[:64], whole[:64])
+
+
+def test_full_guides_are_all_computed() -> None:
+    low, albedo, normal = shot(np.zeros((SIDE, SIDE, 3), "f4"))
+    full = make(guides="full")
+    radiance = enlarged(low)
+    short, whole = (
+        full(low, albedo, normal, guide_radiance=radiance, skip_idle=skip).radiance
+        for skip in (True, False)
+    )
+    np.testing.assert_array_equal(short, whole)
+
+
+def test_odd_sizes_and_tiles(fast: Upscaler) -> None:
+    low, albedo, normal = shot(np.zeros((SIDE, SIDE, 3), "f4"))
+    low, albedo, normal = low[:201, :203], albedo[:401, :405], normal[:401, :405]
+    whole = fast(low, albedo, normal, skip_idle=False).radiance
+    tiled = fast(low, albedo, normal, tile=96)
+    assert tiled.radiance.shape == whole.shape
+    assert np.abs(tiled.radiance - whole).max() < 0.02 * whole.max()

@@ -1,0 +1,122 @@
+"""Where a network has nothing to add, so that the base is the picture.
+
+Arrays are those of `Inputs`; areas are low-resolution rows and columns.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .front_end import demodulated_base
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .front_end import Picture
+    from .inputs import Inputs
+
+    Area = tuple[slice, slice]
+
+# Of its largest value, what a constant may vary by: OIDN leaves about so much.
+_EVEN = 2e-3
+# Of its radiance, what a background's albedo may differ from it by.
+_ALIKE = 0.05
+# Below this share of idle pixels, finding the base costs what it saves.
+_WORTH = 0.1
+
+
+def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
+    """Return the rectangle outside which the base is the picture.
+
+    Blocks of ``block`` low-resolution pixels are idle where nothing but background is
+    seen (normal 0, albedo that holds its radiance), or where every input is even. The
+    rectangle lies on blocks and keeps at least ``margin`` pixels around what is busy.
+    None where nothing is busy; the whole picture where too little is idle.
+    """
+    height, width = inputs.low.shape[:2]
+    whole = slice(0, height), slice(0, width)
+    if inputs.guide_radiance is not None:
+        return whole
+    busy = ~_idle(inputs, block)
+    if not busy.any():
+        return None
+    spans = (_span(busy.any(1), block, margin), _span(busy.any(0), block, margin))
+    rows, columns = (
+        slice(start, min(stop, size))
+        for (start, stop), size in zip(spans, (height, width), strict=True)
+    )
+    kept = (rows.stop - rows.start) * (columns.stop - columns.start)
+    return (rows, columns) if kept < (1 - _WORTH) * height * width else whole
+
+
+def base_picture(inputs: Inputs) -> Picture:
+    """Return the demodulated base at full size, (H, W, 3)."""
+    height, width = inputs.shape
+    low = inputs.low[..., :3]
+    missing = [
+        (0, size * inputs.scale - have)
+        for size, have in zip(low.shape[:2], inputs.shape, strict=True)
+    ]
+    albedo = np.pad(inputs.albedo.clip(0.0, 1.0), (*missing, (0, 0)), "edge")
+    return demodulated_base(low, albedo, inputs.scale)[:height, :width]
+
+
+def _idle(inputs: Inputs, block: int) -> NDArray[np.bool_]:
+    """Return which blocks are idle, (rows, columns) of blocks."""
+    full = block * inputs.scale
+    low = _extremes(inputs.low, block)
+    albedo = _extremes(inputs.albedo, full)
+    normal = _extremes(inputs.normal, full)
+    background = (normal[0] == 0).all(-1) & (normal[1] == 0).all(-1)
+    background &= (albedo[1] <= 1.0).all(-1) & _shines_by_itself(inputs, block)
+    even = _is_even(low) & _is_even(albedo) & _is_even(normal)
+    return background | even
+
+
+def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
+    """Return the blocks whose radiance is their albedo, as of a background."""
+    low, scale = inputs.low[..., :3], inputs.scale
+    albedo = inputs.albedo
+    for axis in (0, 1):
+        starts = range(0, albedo.shape[axis], scale)
+        ends = np.append(starts[1:], albedo.shape[axis])
+        counts = (ends - np.array(starts)).astype(np.float32)
+        albedo = np.add.reduceat(albedo, starts, axis=axis)
+        albedo /= counts.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
+    apart, bright = (_sums(x, block) for x in (np.abs(low - albedo), low))
+    shines: NDArray[np.bool_] = apart <= _ALIKE * bright
+    return shines
+
+
+def _sums(x: Picture, block: int) -> Picture:
+    """Return the sum over each block and its channels."""
+    for axis in (0, 1):
+        x = np.add.reduceat(x, range(0, x.shape[axis], block), axis=axis)
+    return np.asarray(x.sum(-1))
+
+
+def _is_even(extremes: tuple[Picture, Picture]) -> NDArray[np.bool_]:
+    least, most = extremes
+    largest = np.maximum(np.abs(least), np.abs(most)).max(-1)
+    spread: NDArray[np.bool_] = (most - least).max(-1) <= _EVEN * largest
+    return spread
+
+
+def _extremes(x: Picture, block: int) -> tuple[Picture, Picture]:
+    """Return the least and the largest value of each block, (rows, columns, C)."""
+    starts = [range(0, size, block) for size in x.shape[:2]]
+    least = np.minimum.reduceat(x, starts[0], axis=0)
+    most = np.maximum.reduceat(x, starts[0], axis=0)
+    return (
+        np.minimum.reduceat(least, starts[1], axis=1),
+        np.maximum.reduceat(most, starts[1], axis=1),
+    )
+
+
+def _span(busy: NDArray[np.bool_], block: int, margin: int) -> tuple[int, int]:
+    """Return first and last pixel of the busy blocks with whole blocks around them."""
+    found = np.flatnonzero(busy)
+    around = -(-margin // block)
+    return max(0, int(found[0]) - around) * block, int(found[-1] + 1 + around) * block
