@@ -60,8 +60,8 @@ class PipelineSettings:
     back through Blender; anything unexpected is a SceneError and nothing is rendered.
     """
 
-    NAMES = ("use_persistent_data", "use_motion_blur", "resolution_x", "resolution_y")
-    _SPAN = 2048  # bytes of the struct that are compared; they lie well inside
+    NAMES = ("use_persistent_data", "resolution_x", "resolution_y")
+    _SPAN = 2048  # bytes of the struct that are compared; the three lie well inside
     _places: dict[str, tuple[int, int]] | None = None
 
     def __init__(self, render: Any, evaluated: Any) -> None:

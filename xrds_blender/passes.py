@@ -212,7 +212,7 @@ class CyclesPasses:
 
     def hold_still(self) -> None:
         """Render without motion blur, to be called before the first pass."""
-        self._pipeline.set(use_motion_blur=False)
+        self._borrowed.set(self._scene.render, use_motion_blur=False)
 
     def pass_names(self) -> list[str]:
         """All passes of the result, each once whatever its views."""

@@ -147,3 +147,27 @@ def test_motion_blur_needs_motion() -> None:
     lamp = bpy.data.objects["Lamp"]
     lamp.keyframe_insert("location", frame=1)
     assert decided(scene).motion_blur
+
+
+def test_holding_still_is_no_motion_blur() -> None:
+    scene = small("texture")
+    red = bpy.data.objects["Red"]
+    for frame, x in ((1, -3.0), (3, 3.0)):
+        red.location.x = x
+        red.keyframe_insert("location", frame=frame)
+    scene.frame_set(2)
+
+    def picture(blurred: bool, still: bool) -> np.ndarray:
+        scene.render.use_motion_blur = blurred
+
+        def job(passes: Any) -> np.ndarray:
+            if still:
+                passes.hold_still()
+            return passes.beauty(2, 4, denoise=False, seed=1).radiance
+
+        return run_job(scene, job)
+
+    sharp = picture(False, False)
+    np.testing.assert_array_equal(picture(True, True), sharp)
+    assert np.abs(picture(True, False) - sharp).mean() > 0.01
+    assert scene.render.use_motion_blur
