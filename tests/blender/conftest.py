@@ -67,6 +67,14 @@ def new_scene(width: int, height: int, samples: int) -> Any:
     return scene
 
 
+@pytest.fixture(autouse=True)
+def no_guides_of_before() -> None:
+    """What one test rendered is not to serve another."""
+    from xrds_blender import guide_cache
+
+    guide_cache.CACHE.clear()
+
+
 @pytest.fixture
 def empty_scene() -> Callable[..., Any]:
     """A camera in a grey world: (width, height, samples) -> scene."""

@@ -60,7 +60,15 @@ def test_text_shows_every_window_and_what_is_missing() -> None:
     blocks = table.text(report).split("\n\n")
     assert [b.split(",")[0] for b in blocks] == ["x2 fast", "x2 fast_full"]
     room = next(row for row in blocks[0].splitlines() if row.startswith("room"))
-    assert room.split() == ["room", "30.50", "24.00", "31.00", *"----", "-0.50", "40.00"]
+    assert room.split() == [
+        "room",
+        "30.50",
+        "24.00",
+        "31.00",
+        *"----",
+        "-0.50",
+        "40.00",
+    ]
     assert "worst gain -0.50 dB: room" in blocks[0]
     assert "worst" not in blocks[1]
 

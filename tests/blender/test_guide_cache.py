@@ -19,9 +19,8 @@ from xrds_blender.studio import traps  # noqa: E402
 
 
 @pytest.fixture(autouse=True)
-def empty_cache(network: Any) -> None:
+def registered(network: Any) -> None:
     ensure_registered()
-    guide_cache.CACHE.clear()
 
 
 def shot(scene: Any, **choices: Any) -> Picture:

@@ -161,12 +161,12 @@ def text(records: Sequence[dict[str, Any]]) -> str:
         "# What the plan saves",
         "",
         "Written by `xrds plan-report`. Every run is a process of its own; runs with",
-        "all kept and with the plan take turns. *Wall* is the whole process as its caller",
-        "sees it, with a tiny render first that loads Cycles, OIDN and torch.",
+        "all kept and with the plan take turns. *Wall* is the whole process as its",
+        "caller sees it, with a tiny render first that loads Cycles, OIDN and torch.",
         "*Overhead* is what the stages take but for the low-resolution picture (its",
         "samples and denoiser): sync, guides, network, write. Plan against all, with",
-        "the same seed, is to differ by less than two seeds with all kept do: PSNR above",
-        "the noise's, FLIP below. 99 dB: not one bit differs.",
+        "the same seed, is to differ by less than two seeds with all kept do: PSNR",
+        "above the noise's, FLIP below. 99 dB: not one bit differs.",
         "",
     ]
     for kind in dict.fromkeys(record["kind"] for record in records):
