@@ -14,8 +14,7 @@ from .scene_facts import scene_facts
 if TYPE_CHECKING:
     from .job import RenderJob
 
-# Core-seconds of a million guide samples with nothing left out; measured on scenes of
-# 20 to 50 materials, docs/results/plan.md.
+# Core-seconds of a million guide samples with nothing left out: docs/performance.md.
 CORE_SECONDS = 4.8
 
 

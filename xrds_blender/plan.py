@@ -38,7 +38,7 @@ OMISSIONS = (
     "motion blur",
     "network",
 )
-# Shares of a guide render's seconds that an omission saved: docs/results/plan.md.
+# Shares of a guide render's seconds that an omission saved: docs/performance.md.
 LIGHT_SHARE = 0.45
 BOUNCE_SHARE = 0.12
 # Guide samples where nothing is finer than an edge.
