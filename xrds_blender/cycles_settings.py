@@ -26,9 +26,14 @@ def set_sampling(
 
 
 def set_denoising(
-    borrowed: Borrowed, scene: Any, layer: Any, denoise: bool, prefilter: str | None
+    borrowed: Borrowed,
+    scene: Any,
+    layer: Any,
+    denoise: bool,
+    prefilter: str | None,
+    quality: str | None = None,
 ) -> None:
-    """Switch the denoiser; `prefilter` None keeps the scene's own."""
+    """Switch the denoiser; `prefilter` and `quality` None keep the scene's own."""
     borrowed.set(scene.cycles, use_denoising=denoise)
     if denoise:
         # The same denoiser as in the training set, whatever the scene uses.
@@ -38,6 +43,8 @@ def set_denoising(
             denoising_input_passes="RGB_ALBEDO_NORMAL",
             denoising_prefilter=prefilter or scene.cycles.denoising_prefilter,
         )
+        if quality is not None:
+            borrowed.set(scene.cycles, denoising_quality=quality)
         borrowed.set(layer.cycles, use_denoising=True)
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import UsageError
 
+from .budget import DENOISERS
 from .plan import OMISSIONS, Decision, Facts, Plan, decide, plain
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ class RenderJob:
     `memory_limit` in bytes is the network's; `keep` names omissions of the plan that
     are not to be made. `guide_cache` is a folder for guides beside those in memory;
     each render of the same view adds its samples to them until they are `guide_limit`.
+    `denoiser` is one of budget.DENOISERS, None the scene's own. With `time_budget`
+    (seconds a frame) or `quality` (PSNR in dB) scale, samples, guides, network and
+    denoiser are chosen anew for the scene.
     Raises UsageError on values out of range.
     """
 
@@ -43,6 +47,9 @@ class RenderJob:
     keep: tuple[str, ...] = ()
     guide_cache: str | Path | None = None
     guide_limit: int = 0
+    denoiser: str | None = None
+    time_budget: float | None = None
+    quality: float | None = None
 
     def __post_init__(self) -> None:
         if self.scale not in SCALES:
@@ -56,6 +63,24 @@ class RenderJob:
         if unknown:
             known = ", ".join(OMISSIONS)
             raise UsageError(f"cannot keep {sorted(unknown)}; there are {known}")
+        if self.denoiser not in {None, *DENOISERS}:
+            known = ", ".join(DENOISERS)
+            raise UsageError(f"denoiser {self.denoiser!r} is not one of {known}")
+        if self.time_budget is not None and not self.time_budget > 0:
+            raise UsageError(f"time budget {self.time_budget} s is not above 0")
+        if self.time_budget is not None and self.quality is not None:
+            raise UsageError("give a time budget or a quality, not both")
+
+    @property
+    def is_picked(self) -> bool:
+        """Whether what is rendered is still to be chosen."""
+        return self.time_budget is not None or self.quality is not None
+
+    @property
+    def denoising(self) -> dict[str, str | None]:
+        """Quality and prefilter of the denoiser, None for the scene's own."""
+        quality, _, prefilter = (self.denoiser or "").partition("-")
+        return {"quality": quality or None, "prefilter": prefilter or None}
 
     @property
     def is_plain(self) -> bool:
@@ -84,6 +109,7 @@ class RenderJob:
             device=here.device if settings.device == "auto" else settings.device,
             exposure=settings.exposure if settings.use_exposure else None,
             plain=settings.plain,
+            time_budget=settings.time_budget if settings.use_time_budget else None,
             memory_limit=here.memory_limit,
             weights=here.weights,
         )
@@ -97,7 +123,8 @@ class Picture:
     (H, W, 3) and `low_resolution` (h, w, 3) are None for a plain render. `seconds` by
     stage: total, sync, beauty, denoise, guides, network, write; Cycles does not tell
     denoising from sampling, so `beauty` holds both and `denoise` is 0. `peak_memory`
-    is the largest in bytes that the process has taken so far.
+    is the largest in bytes that the process has taken so far; `job` what was rendered,
+    as a time budget chose it.
     """
 
     radiance: Array
@@ -108,3 +135,4 @@ class Picture:
     seconds: dict[str, float] = field(default_factory=dict)
     plan: tuple[Decision, ...] = ()
     peak_memory: int = 0
+    job: RenderJob | None = None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +14,13 @@ from xrds_core.errors import Cancelled, XRDSError
 from . import cycles_session, low_camera, plan
 from .borrowed import Borrowed
 from .colour import converted, to_rec709, working_space
-from .cycles_settings import set_sampling
+from .cycles_settings import set_denoising, set_sampling
 from .explain import find_facts
 from .guides import GuideSource
 from .job import STAGES, Picture, RenderJob
 from .pass_names import COMBINED
 from .passes import Beauty, CyclesPasses, Guides
+from .picking import pick
 
 if TYPE_CHECKING:
     from xrds_core import Upscaled, Upscaler
@@ -26,18 +28,29 @@ if TYPE_CHECKING:
     from .cycles_session import Array
 
 
-def render_layer(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
+def render_layer(
+    engine: Any, depsgraph: Any, job: RenderJob, start: float | None = None
+) -> Picture:
     """Render the layer into the engine's result; the picture is of its first view.
 
+    `start`, a reading of perf_counter, is where a time budget and the total begin.
     Raises Cancelled when the user stops it and XRDSError where it cannot be done, then
     with nothing written.
     """
-    start = time.perf_counter()
+    start = time.perf_counter() if start is None else start
+    if job.is_picked:
+        with CyclesPasses(engine, depsgraph) as passes:
+            picked, decision = pick(passes, job, start)
+            engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
+            picture = render_layer(engine, depsgraph, picked)
+        seconds = picture.seconds | {"total": time.perf_counter() - start}
+        rest = () if picked.is_plain else picture.plan  # its reason stands above
+        return replace(picture, seconds=seconds, plan=(decision, *rest), job=picked)
     seconds = dict.fromkeys(STAGES, 0.0)
     if job.is_plain:
         picture = _plain(engine, depsgraph, job, seconds)
     else:
-        upscaler = _upscaler(job)  # first: missing weights are to cost no render
+        upscaler = load_upscaler(job)  # first: missing weights are to cost no render
         picture = _enlarged(engine, depsgraph, job, upscaler, seconds)
     seconds["total"] = time.perf_counter() - start
     return picture
@@ -51,6 +64,9 @@ def _plain(
     name = depsgraph.view_layer_eval.name
     with Borrowed() as borrowed:
         set_sampling(borrowed, depsgraph.scene_eval, job.samples, job.seed)
+        if job.denoiser is not None and cycles_session.has_denoiser():
+            scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
+            set_denoising(borrowed, scene, layer, True, **job.denoising)
         try:
             clock = cycles_session.run(engine, depsgraph)
         finally:
@@ -140,7 +156,11 @@ def _passes(
     def beauty() -> tuple[dict[str, Beauty], float | None]:
         engine.update_stats("XRDS", "Rendering low resolution")
         low = passes.beauties(
-            job.scale, job.samples, denoise=chosen.denoise, seed=job.seed
+            job.scale,
+            job.samples,
+            denoise=chosen.denoise,
+            seed=job.seed,
+            **job.denoising,
         )
         return low, job.exposure or passes.border_exposure()
 
@@ -154,7 +174,7 @@ def _passes(
     return low, guides, exposure
 
 
-def _upscaler(job: RenderJob) -> Upscaler:
+def load_upscaler(job: RenderJob) -> Upscaler:
     """The network of a job; the last one stays loaded for the next frame."""
     weights = None if job.weights is None else str(job.weights)
     return _load(job.preset, job.scale, job.guides, job.device, weights)

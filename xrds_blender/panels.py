@@ -33,8 +33,12 @@ class XRDS_PT_settings(bpy.types.Panel):
         layout.use_property_decorate = False
         layout.operator(XRDS_OT_render.bl_idname, icon="RENDER_STILL")
         layout.prop(settings, "plain")
+        layout.prop(settings, "use_time_budget")
+        row = layout.row()
+        row.active = settings.use_time_budget
+        row.prop(settings, "time_budget")
         column = layout.column()
-        column.active = not settings.plain
+        column.active = not (settings.plain or settings.use_time_budget)
         column.prop(settings, "scale")
         column.prop(settings, "preset")
         column.prop(settings, "guides")
@@ -70,6 +74,8 @@ _glance = Glance()
 def summary(scene: bpy.types.Scene) -> list[str]:
     """What the render will do and leave out, one line each."""
     job = RenderJob.of(scene.xrds)
+    if job.is_picked:
+        return ["Scale, samples, guides, network and denoiser: chosen when rendering"]
     if job.is_plain:
         return ["Plain: one full-resolution Cycles render, no network"]
     facts = _glance.facts(scene, bpy.context.view_layer, job)

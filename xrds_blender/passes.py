@@ -155,15 +155,22 @@ class CyclesPasses:
         denoise: bool = True,
         seed: int | None = None,
         prefilter: str | None = None,
+        quality: str | None = None,
     ) -> Beauty:
         """Render the beauty at 1/scale of the size, filtered by a box of one pixel.
 
         Scale 1 keeps the scene's own filter: plain Cycles. `samples` None takes the
-        scene's sampling, adaptive or not. `prefilter` NONE, FAST or ACCURATE is the
-        denoiser's. Without a denoiser in this Blender the picture stays noisy.
+        scene's sampling, adaptive or not. `prefilter` NONE, FAST or ACCURATE and
+        `quality` FAST, BALANCED or HIGH are the denoiser's, None the scene's own.
+        Without a denoiser in this Blender the picture stays noisy.
         """
         return self.beauties(
-            scale, samples, denoise=denoise, seed=seed, prefilter=prefilter
+            scale,
+            samples,
+            denoise=denoise,
+            seed=seed,
+            prefilter=prefilter,
+            quality=quality,
         )[self.views[0]]
 
     def beauties(
@@ -174,13 +181,16 @@ class CyclesPasses:
         denoise: bool = True,
         seed: int | None = None,
         prefilter: str | None = None,
+        quality: str | None = None,
     ) -> dict[str, Beauty]:
         """As `beauty`, for every view by name (one without stereo)."""
         denoise = denoise and cycles_session.has_denoiser()
         grid = self._grid(scale)
         with Borrowed() as borrowed:
             set_sampling(borrowed, self._scene, samples, seed)
-            set_denoising(borrowed, self._scene, self._layer_eval, denoise, prefilter)
+            set_denoising(
+                borrowed, self._scene, self._layer_eval, denoise, prefilter, quality
+            )
             clock = self._run_low(borrowed, grid)
         seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
         return {
@@ -268,6 +278,15 @@ class CyclesPasses:
         return {
             view: self._read_guides(view, full, denoise, seconds) for view in self.views
         }
+
+    def probe_guides(self, scale: int, samples: int) -> dict[str, float]:
+        """Seconds (sync, guides) of guides at 1/scale of the size; no pixels."""
+        with Borrowed() as borrowed:
+            set_sampling(borrowed, self._scene, samples, None)
+            set_denoising(borrowed, self._scene, self._layer_eval, False, None)
+            set_guide_bounces(borrowed, self._scene)
+            clock = self._run_low(borrowed, self._grid(scale), exact=False)
+        return {"sync": clock.sync, "guides": clock.render}
 
     def _cameras(self) -> list[Any]:
         import bpy

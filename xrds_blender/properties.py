@@ -73,3 +73,15 @@ class XRDSSettings(bpy.types.PropertyGroup):
         description="Render with Cycles alone, as if the engine were Cycles",
         update=_ask_for_passes,
     )
+    use_time_budget: BoolProperty(
+        name="Time Budget",
+        description="Let XRDS choose scale, samples, guides, network and denoiser",
+    )
+    time_budget: FloatProperty(
+        name="Time Budget",
+        default=60.0,
+        min=0.1,
+        soft_max=3600.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds that a frame may take; least error expected within them",
+    )

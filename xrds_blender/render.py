@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -44,8 +45,12 @@ def render(
     Raises SceneError without a camera, WeightsError without the weights, UsageError
     for values out of range, Cancelled when the user stops the render.
     """
-    job = RenderJob(scale=scale, **choices)
-    return _run(scene, lambda engine, graph: render_layer(engine, graph, job), layer)
+    job, start = RenderJob(scale=scale, **choices), time.perf_counter()
+
+    def work(engine: Any, depsgraph: Any) -> Picture:
+        return render_layer(engine, depsgraph, job, start)
+
+    return _run(scene, work, layer)
 
 
 def run_job(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from xrds_core.errors import SceneError
 
 from . import picture_file
+from .picking import known_networks
 
 if TYPE_CHECKING:
     from .job import Picture, RenderJob
@@ -46,6 +47,7 @@ def render_file(
     numbers = list(frames or [scene.frame_current])
     told = [_frame(scene, job, output, number) for number in numbers]
     last = told[-1][1]
+    job = last.job or job
     height, width = last.alpha.shape
     return {
         "output": output,
@@ -81,7 +83,9 @@ def open_scene(path: Path) -> Any:
 
 def _check_weights(job: RenderJob) -> None:
     """Raise WeightsError now rather than after the Cycles renders."""
-    if not job.is_plain:
+    if job.is_picked:
+        known_networks(job)  # and PyTorch is loaded before the budget begins
+    elif not job.is_plain:
         from xrds_core import Upscaler
 
         Upscaler(job.preset, job.scale, job.guides, job.device, weights=job.weights)

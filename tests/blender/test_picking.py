@@ -1,0 +1,147 @@
+"""Time budgets on a scene of a few pixels, with the shipped weights."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from xrds_blender import budget, picking
+from xrds_blender.job import RenderJob
+from xrds_blender.render import render, run_job
+from xrds_core.errors import UsageError
+
+XRDS = budget.Choice("HIGH-FAST", 0, 4, "fast", "fast", 1)
+PLAIN = budget.Choice("FAST-FAST", 0)
+
+
+# So dear that four samples are many: no test depends on how busy the machine is.
+COSTS = budget.Costs(
+    fixed=1.0,
+    beauty=100.0,
+    guide=50.0,
+    denoise=dict.fromkeys(budget.DENOISERS, 10.0),
+    network={XRDS.network: 1.0},
+)
+
+
+@pytest.fixture
+def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
+    """Leave the picker nothing but these families, each as good as it is told."""
+
+    def leave(**psnr: float) -> None:
+        families = {"xrds": XRDS, "plain": PLAIN}
+        curves = {
+            families[name]: budget.Curve((1, 16), (best - 4, best))
+            for name, best in psnr.items()
+        }
+        errors = budget.ErrorModel(curves)
+        model = replace(budget.shipped(), errors=errors)
+        monkeypatch.setattr(budget, "shipped", lambda: model)
+        monkeypatch.setattr(picking, "probe", lambda *_: COSTS)
+
+    return leave
+
+
+def test_probes_measure_the_scene(still_life: Callable[..., Any]) -> None:
+    networks = [XRDS.network]
+    start = time.perf_counter()
+
+    def probe(passes: Any) -> budget.Costs:
+        return picking.probe(passes, budget.shipped(), networks, start)
+
+    costs = run_job(still_life(400, 300), probe)
+    assert min(costs.fixed, costs.beauty, costs.guide) > 0
+    assert costs.fixed < time.perf_counter() - start + 1
+    assert set(costs.denoise) == set(budget.DENOISERS)
+    assert set(costs.network) == set(networks)
+
+
+def test_plan_tells_what_was_chosen_and_why(
+    still_life: Callable[..., Any], only: Callable[..., None]
+) -> None:
+    only(xrds=40.0, plain=20.0)
+    picture = render(still_life(160, 96), time_budget=500.0)
+    told = picture.plan[0]
+    assert told.decision == "time budget"
+    assert told.value.startswith("fast x4")
+    assert "dB expected in" in told.reason
+    assert "best plain for 500 s" in told.reason
+    assert not picture.job.is_picked
+    assert (picture.job.scale, picture.job.guide_samples) == (4, 1)
+    assert picture.radiance.shape == (96, 160, 3)
+    assert picture.low_resolution.shape == (24, 40, 3)
+    assert picture.seconds["network"] > 0
+
+
+def test_plain_is_rendered_where_it_is_better(
+    still_life: Callable[..., Any], only: Callable[..., None]
+) -> None:
+    only(xrds=20.0, plain=40.0)
+    picture = render(still_life(160, 96), time_budget=500.0)
+    assert picture.job.is_plain
+    assert picture.job.samples == 4
+    assert picture.low_resolution is None
+    assert picture.plan[0].value.startswith("plain")
+    assert "best XRDS" in picture.plan[0].reason
+
+
+def test_too_little_time_renders_the_fastest(
+    still_life: Callable[..., Any], only: Callable[..., None]
+) -> None:
+    only(plain=40.0)
+    picture = render(still_life(160, 96), time_budget=0.001)
+    assert picture.job.samples == 1
+    assert "too little for this scene" in picture.plan[0].reason
+
+
+def test_quality_asks_for_no_more_than_it_needs(
+    still_life: Callable[..., Any], only: Callable[..., None]
+) -> None:
+    only(plain=40.0)
+    picture = render(still_life(160, 96), quality=38.0)
+    assert picture.job.samples == 4  # 36 dB at one sample, 40 at 16
+    assert picture.plan[0].decision == "quality"
+
+
+def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(
+    still_life: Callable[..., Any], only: Callable[..., None]
+) -> None:
+    only(plain=40.0)
+    scene = still_life(64, 48, 7)
+    noisy = render(scene, plain=True, samples=4, seed=3)
+    quick = render(scene, plain=True, samples=4, seed=3, denoiser="FAST-FAST")
+    best = render(scene, plain=True, samples=4, seed=3, denoiser="HIGH-ACCURATE")
+    spread = [abs(noisy.radiance - p.radiance).max() for p in (quick, best)]
+    assert min(spread) > 0
+    assert abs(quick.radiance - best.radiance).max() > 0
+    render(scene, time_budget=300.0)
+    cycles = scene.cycles
+    assert (cycles.samples, cycles.use_denoising) == (7, False)
+
+
+def test_panel_setting_reaches_the_job(still_life: Callable[..., Any]) -> None:
+    scene = still_life()
+    from xrds_blender import ensure_registered
+
+    ensure_registered()
+    scene.xrds.time_budget = 12.5
+    assert RenderJob.of(scene.xrds).time_budget is None
+    scene.xrds.use_time_budget = True
+    assert RenderJob.of(scene.xrds).time_budget == 12.5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"time_budget": 0.0}, "not above 0"),
+        ({"time_budget": 5.0, "quality": 30.0}, "not both"),
+        ({"denoiser": "BEST"}, "HIGH-ACCURATE"),
+    ],
+)
+def test_wrong_wishes_are_refused(wrong: dict[str, Any], told: str) -> None:
+    with pytest.raises(UsageError, match=told):
+        RenderJob(**wrong)

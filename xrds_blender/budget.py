@@ -1,0 +1,332 @@
+"""Seconds asked for -> what to render: the least error expected in them.
+
+Seconds come from a cost model of the scene at hand (what the probes found), errors
+from a table that `xrds bench` measured on other scenes. Pure functions: neither
+Blender nor torch is needed here.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from .plan import Decision
+
+# Cycles' denoiser as QUALITY-PREFILTER; the first is Blender's default.
+DENOISERS = tuple(
+    f"{quality}-{prefilter}"
+    for quality, prefilter in product(
+        ("HIGH", "BALANCED", "FAST"), ("ACCURATE", "FAST", "NONE")
+    )
+)
+DEFAULT_DENOISER = DENOISERS[0]
+# Those worth trying on the low-resolution picture.
+LOW_DENOISERS = ("HIGH-ACCURATE", "HIGH-FAST", "BALANCED-ACCURATE")
+# The one whose seconds a probe measures; the others' are multiples of it.
+PROBE_DENOISER = "HIGH-FAST"
+MODEL = Path(__file__).with_name("budget.json")
+# Predictions scatter; a frame that is late is worse than one that is early.
+AIM = 0.93
+MOST_SAMPLES = 16384
+
+Network = tuple[str, int, str]
+"""Preset, scale and guide set of a weights file."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What is rendered: scale 1 is Cycles + OIDN alone, without a network.
+
+    `samples` are per low-resolution pixel, `guide_samples` per full one.
+    """
+
+    denoiser: str
+    samples: int
+    scale: int = 1
+    preset: str = ""
+    guides: str = ""
+    guide_samples: int = 0
+
+    @property
+    def network(self) -> Network:
+        """The weights it needs."""
+        return self.preset, self.scale, self.guides
+
+    @property
+    def label(self) -> str:
+        """In a few words, as the panel and the command print it."""
+        if self.scale == 1:
+            return f"plain, {self.samples} samples, OIDN {self.denoiser}"
+        guides = "full guide" if self.guides == "full" else "guide"
+        return (
+            f"{self.preset} x{self.scale}, {self.samples} samples, "
+            f"{self.guide_samples} {guides} samples, OIDN {self.denoiser}"
+        )
+
+
+@dataclass(frozen=True)
+class Costs:
+    """Seconds of one frame's parts, all for the whole frame at its full size.
+
+    `fixed`: scene sync, BVH, reading and writing, whatever is rendered; `beauty` and
+    `guide`: one sample; `denoise` by denoiser; `network` by network.
+    """
+
+    fixed: float
+    beauty: float
+    guide: float
+    denoise: Mapping[str, float]
+    network: Mapping[Network, float]
+
+    def seconds(self, choice: Choice) -> float:
+        """Of the whole frame; raises KeyError for an unknown denoiser or network."""
+        return self._without_samples(choice) + choice.samples * self._sample(choice)
+
+    def samples(self, choice: Choice, seconds: float) -> int:
+        """Most samples for which the choice keeps to `seconds`; 0 if none does."""
+        left = seconds - self._without_samples(choice)
+        return max(0, min(MOST_SAMPLES, math.floor(left / self._sample(choice))))
+
+    def _sample(self, choice: Choice) -> float:
+        return self.beauty / choice.scale**2
+
+    def _without_samples(self, choice: Choice) -> float:
+        seconds = self.fixed + self.denoise[choice.denoiser] / choice.scale**2
+        if choice.scale > 1:
+            guide = self.beauty if choice.guides == "full" else self.guide
+            seconds += choice.guide_samples * guide + self.network[choice.network]
+        return seconds
+
+
+@dataclass(frozen=True)
+class Curve:
+    """PSNR in dB over sample counts, never falling; linear in log2 of the count.
+
+    Beyond its last sample it rises as between the last two.
+    """
+
+    samples: tuple[int, ...]
+    psnr: tuple[float, ...]
+
+    def at(self, samples: int) -> float:
+        """PSNR at a count of at least the first."""
+        if len(self.samples) == 1:
+            return self.psnr[0]
+        last = len(self.samples) - 2
+        i = min(max(bisect_right(self.samples, samples) - 1, 0), last)
+        low, high = self.samples[i : i + 2]
+        share = math.log2(samples / low) / math.log2(high / low)
+        return self.psnr[i] + max(share, 0.0) * (self.psnr[i + 1] - self.psnr[i])
+
+    @classmethod
+    def of(cls, points: Mapping[int, float]) -> Curve:
+        """Through measured points; where more samples are worse, the best so far."""
+        counts = sorted(points)
+        best = [max(points[n] for n in counts[: i + 1]) for i in range(len(counts))]
+        return cls(tuple(counts), tuple(best))
+
+
+@dataclass(frozen=True)
+class ErrorModel:
+    """Expected PSNR of every choice: one curve over samples for each of the others.
+
+    The keys are choices with no samples.
+    """
+
+    curves: Mapping[Choice, Curve]
+
+    def psnr(self, choice: Choice) -> float:
+        """In dB; raises KeyError for what was not measured."""
+        return self.curves[_without_count(choice)].at(choice.samples)
+
+    def families(self, networks: Sequence[Network]) -> Iterator[tuple[Choice, Curve]]:
+        """Everything but the sample counts, of what these weights can render."""
+        for choice, curve in self.curves.items():
+            if choice.scale == 1 or choice.network in networks:
+                yield choice, curve
+
+
+@dataclass(frozen=True)
+class Model:
+    """What `xrds bench` has learnt about all scenes and all machines.
+
+    `denoiser_speed` and `network_speed` are seconds at one size over those of
+    PROBE_DENOISER; `other_per_megapixel` seconds of reading, writing and all else.
+    """
+
+    errors: ErrorModel
+    denoiser_speed: Mapping[str, float]
+    network_speed: Mapping[Network, float]
+    other_per_megapixel: float
+    source: str = ""
+
+    @classmethod
+    def read(cls, path: Path = MODEL) -> Model:
+        """From the file that `xrds bench --model` writes."""
+        told = json.loads(path.read_text("utf-8"))
+        curves = {
+            Choice(samples=0, **entry["choice"]): Curve(
+                tuple(entry["samples"]), tuple(entry["psnr"])
+            )
+            for entry in told["curves"]
+        }
+        networks = {
+            (entry["preset"], entry["scale"], entry["guides"]): entry["speed"]
+            for entry in told["networks"]
+        }
+        return cls(
+            ErrorModel(curves),
+            told["denoisers"],
+            networks,
+            told["other_per_megapixel"],
+            told["source"],
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """What `read` reads."""
+        return {
+            "source": self.source,
+            "other_per_megapixel": self.other_per_megapixel,
+            "denoisers": dict(self.denoiser_speed),
+            "networks": [
+                {"preset": preset, "scale": scale, "guides": guides, "speed": speed}
+                for (preset, scale, guides), speed in self.network_speed.items()
+            ],
+            "curves": [
+                {
+                    "choice": {k: v for k, v in vars(choice).items() if k != "samples"},
+                    "samples": list(curve.samples),
+                    "psnr": [round(value, 3) for value in curve.psnr],
+                }
+                for choice, curve in self.errors.curves.items()
+            ],
+        }
+
+
+@dataclass(frozen=True)
+class Picked:
+    """The choice with what is expected of it, and the best of the other kind."""
+
+    choice: Choice
+    seconds: float
+    psnr: float
+    rival: Picked | None = None
+    fits: bool = True
+
+    def decision(self, goal: float, in_seconds: bool = True) -> Decision:
+        """What was chosen and why, for the plan: `goal` in seconds or in dB."""
+        name, unit = ("time budget", "s") if in_seconds else ("quality", "dB")
+        reason = f"{self.psnr:.1f} dB expected in {self.seconds:.1f} s"
+        if not self.fits and in_seconds:
+            reason = f"{goal:g} s is too little for this scene; the fastest: {reason}"
+        elif not self.fits:
+            reason = f"{goal:g} dB is beyond what was measured; the best: {reason}"
+        elif self.rival is None:
+            reason += f", the only kind for {goal:g} {unit}"
+        else:
+            other = self.rival
+            reason += (
+                f"; best {_kind(other.choice)} for {goal:g} {unit}: "
+                f"{other.choice.label}: {other.psnr:.1f} dB in {other.seconds:.1f} s"
+            )
+        return Decision(name, self.choice.label, reason)
+
+
+def choose(
+    budget: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
+) -> Picked:
+    """The least error expected within `budget` seconds; the fastest where none fits.
+
+    More seconds never give more expected error.
+    """
+    fitting = list(_fitting(budget * AIM, costs, errors, networks))
+    if not fitting:
+        return _fastest(costs, errors, networks)
+    best = max(fitting, key=_merit)
+    rivals = [p for p in fitting if _kind(p.choice) != _kind(best.choice)]
+    rival = max(rivals, key=_merit, default=None)
+    return Picked(best.choice, best.seconds, best.psnr, rival)
+
+
+def reach(
+    psnr: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
+) -> Picked:
+    """The fastest choice of at least `psnr` dB; the best there is where none has it."""
+    found = []
+    for family, curve in errors.families(networks):
+        samples = _least_samples(curve, psnr)
+        found.append(_picked(family, samples, costs, curve))
+    enough = [p for p in found if p.psnr >= psnr]
+    if not enough:
+        best = max(found, key=_merit)
+        return Picked(best.choice, best.seconds, best.psnr, None, fits=False)
+    best = min(enough, key=lambda p: p.seconds)
+    rivals = [p for p in enough if _kind(p.choice) != _kind(best.choice)]
+    rival = min(rivals, key=lambda p: p.seconds, default=None)
+    return Picked(best.choice, best.seconds, best.psnr, rival)
+
+
+def _fitting(
+    seconds: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
+) -> Iterator[Picked]:
+    for family, curve in errors.families(networks):
+        samples = costs.samples(family, seconds)
+        if samples >= curve.samples[0]:
+            yield _picked(family, samples, costs, curve)
+
+
+def _fastest(costs: Costs, errors: ErrorModel, networks: Sequence[Network]) -> Picked:
+    found = [
+        _picked(family, curve.samples[0], costs, curve)
+        for family, curve in errors.families(networks)
+    ]
+    best = min(found, key=lambda p: p.seconds)
+    return Picked(best.choice, best.seconds, best.psnr, None, fits=False)
+
+
+def _least_samples(curve: Curve, psnr: float) -> int:
+    """Smallest count that reaches `psnr`; the largest allowed where none does."""
+    low, high = curve.samples[0], MOST_SAMPLES
+    while low < high:
+        middle = (low + high) // 2
+        if curve.at(middle) >= psnr:
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+def _picked(family: Choice, samples: int, costs: Costs, curve: Curve) -> Picked:
+    choice = _with_count(family, samples)
+    return Picked(choice, costs.seconds(choice), curve.at(samples))
+
+
+def _merit(picked: Picked) -> tuple[float, float]:
+    """Least error first; of equals the faster."""
+    return picked.psnr, -picked.seconds
+
+
+def _kind(choice: Choice) -> str:
+    return "plain" if choice.scale == 1 else "XRDS"
+
+
+def _with_count(family: Choice, samples: int) -> Choice:
+    fields = vars(family) | {"samples": samples}
+    return Choice(**fields)
+
+
+def _without_count(choice: Choice) -> Choice:
+    return _with_count(choice, 0)
+
+
+@lru_cache(maxsize=1)
+def shipped() -> Model:
+    """The model that comes with XRDS."""
+    return Model.read()

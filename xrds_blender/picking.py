@@ -1,0 +1,151 @@
+"""Probes of the scene at hand, and the job that keeps to a time budget.
+
+Both probes are renders of a few ten thousand pixels and one sample each, in the
+session that the frame is then rendered with, so that the scene is synced once.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from . import budget
+from .cycles_session import has_denoiser
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .budget import Costs, Network, Picked
+    from .job import RenderJob
+    from .passes import CyclesPasses
+    from .plan import Decision
+
+PROBE_PIXELS = 40_000
+NETWORK_SIDE = 256  # of the output that a network is tried on, in pixels
+
+
+def pick(
+    passes: CyclesPasses, job: RenderJob, start: float
+) -> tuple[RenderJob, Decision]:
+    """The job for the seconds or the quality asked for, and why.
+
+    `start` is the perf_counter reading from which the budget counts; what has passed
+    since then and what the probes take is part of it.
+    """
+    model = budget.shipped()
+    networks = [n for n in known_networks(job) if n in model.network_speed]
+    costs = probe(passes, model, networks, start)
+    picked = _choose(job, costs, model, networks)
+    if picked.choice.scale > 1:
+        # The network's speed was a guess so far; others are slower by as much.
+        costs = _with_network(costs, picked.choice.network, job, passes, start)
+        picked = _choose(job, costs, model, networks)
+    goal = job.time_budget or job.quality
+    assert goal is not None
+    return _job(job, picked), picked.decision(goal, job.time_budget is not None)
+
+
+def _choose(
+    job: RenderJob, costs: Costs, model: budget.Model, networks: Sequence[Network]
+) -> Picked:
+    if job.time_budget is not None:
+        return budget.choose(job.time_budget, costs, model.errors, networks)
+    assert job.quality is not None
+    return budget.reach(job.quality, costs, model.errors, networks)
+
+
+def _job(job: RenderJob, picked: Picked) -> RenderJob:
+    choice = picked.choice
+    chosen = {"denoiser": choice.denoiser, "samples": choice.samples}
+    if choice.scale == 1:
+        chosen |= {"plain": True}
+    else:
+        chosen |= {
+            "plain": False,
+            "scale": choice.scale,
+            "preset": choice.preset,
+            "guides": choice.guides,
+            "guide_samples": choice.guide_samples,
+        }
+    return replace(job, time_budget=None, quality=None, **chosen)
+
+
+def probe(
+    passes: CyclesPasses,
+    model: budget.Model,
+    networks: Sequence[Network],
+    start: float,
+) -> Costs:
+    """Costs of the scene's frame; those of the networks are guessed from OIDN's."""
+    pixels = passes.region.width * passes.region.height
+    scale = max(1, round(math.sqrt(pixels / PROBE_PIXELS)))
+    beauty = passes.beauty(scale, 1, denoise=False).seconds["beauty"]
+    guide = passes.probe_guides(scale, 1)["guides"]
+    denoise = 0.0
+    if has_denoiser():
+        quality, prefilter = budget.PROBE_DENOISER.split("-")
+        both = passes.beauty(scale, 1, quality=quality, prefilter=prefilter)
+        denoise = max(both.seconds["beauty"] - beauty, 0.0)
+    whole = scale**2
+    megapixels = pixels / 1e6
+    return budget.Costs(
+        fixed=time.perf_counter() - start + model.other_per_megapixel * megapixels,
+        beauty=beauty * whole,
+        guide=guide * whole,
+        denoise={m: denoise * whole * x for m, x in model.denoiser_speed.items()},
+        network={n: denoise * whole * model.network_speed[n] for n in networks},
+    )
+
+
+def _with_network(
+    costs: Costs, network: Network, job: RenderJob, passes: CyclesPasses, start: float
+) -> Costs:
+    """The costs with the network's measured speed; its loading is behind us then."""
+    begun = time.perf_counter()
+    seconds = network_seconds_per_pixel(network, job)
+    pixels = passes.region.width * passes.region.height
+    factor = seconds * pixels / max(costs.network[network], 1e-9)
+    return replace(
+        costs,
+        fixed=costs.fixed + time.perf_counter() - begun,
+        network={n: s * factor for n, s in costs.network.items()},
+    )
+
+
+def network_seconds_per_pixel(network: Network, job: RenderJob) -> float:
+    """Seconds per output pixel, of the second of two runs on a small noise picture."""
+    import numpy as np
+
+    from .layer import load_upscaler
+
+    preset, scale, guides = network
+    upscaler = load_upscaler(replace(job, preset=preset, scale=scale, guides=guides))
+    random = np.random.default_rng(0)
+    side = NETWORK_SIDE // scale
+    low = random.random((side, side, 3), np.float32)
+    full = random.random((NETWORK_SIDE, NETWORK_SIDE, 3), np.float32)
+    extra = full if guides == "full" else None
+    for _ in range(2):
+        begun = time.perf_counter()
+        upscaler(low, full, full, guide_radiance=extra)
+        seconds = time.perf_counter() - begun
+    return seconds / NETWORK_SIDE**2
+
+
+def known_networks(job: RenderJob) -> list[Network]:
+    """Those whose weights are there; none for plain renders or without PyTorch."""
+    if job.plain:
+        return []
+    try:
+        from xrds_core import weights
+    except ImportError:
+        return []
+    if job.weights is not None and not Path(job.weights).is_dir():
+        return [(job.preset, job.scale, job.guides)]
+    return [
+        (record["preset"], record["scale"], record["guides"])
+        for record in weights.available(job.weights)
+    ]
