@@ -103,6 +103,8 @@ def _job(options: argparse.Namespace) -> Any:
         exposure=options.exposure,
         seed=options.seed,
         plain=options.plain,
+        time_budget=options.time_budget,
+        quality=options.quality,
         memory_limit=options.memory_limit,
         weights=options.weights,
         keep=OMISSIONS if options.keep_all else (),
@@ -177,6 +179,35 @@ def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
         weights=options.weights,
         progress=_progress,
     )
+
+
+def _bench(options: argparse.Namespace) -> dict[str, Any]:
+    _need_blender("bench")
+    from .bench.bench import bench
+
+    return bench(
+        options.scenes,
+        options.out,
+        budgets=options.budgets,
+        resolution=options.resolution,
+        reference_samples=options.reference_samples,
+        windows=options.windows,
+        references=options.references,
+        cache=options.cache,
+        presets=options.preset,
+        rounds=options.rounds,
+        timing=not options.errors_only,
+        picker=not options.errors_only,
+        growth=options.growth,
+        model=options.model,
+        weights=options.weights,
+        device=options.device,
+    )
+
+
+def _bench_lines(told: dict[str, Any]) -> list[str]:
+    failed = [f"left out: {name}: {why}" for name, why in told["failures"].items()]
+    return [f"{len(told['points'])} points", *failed]
 
 
 def _progress(line: str) -> None:
@@ -275,6 +306,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_evaluate,
         _add_stability,
         _add_plan_report,
+        _add_bench,
         _add_dataset,
         _add_train,
     ):
@@ -319,6 +351,18 @@ def _add_job(command: argparse.ArgumentParser) -> None:
     size = command.add_mutually_exclusive_group()
     size.add_argument("--scale", type=int, choices=(1, 2, 4, 8), default=2)
     size.add_argument("--plain", action="store_true", help="Cycles as the file has it")
+    size.add_argument(
+        "--time-budget",
+        type=_factor,
+        metavar="SECONDS",
+        help="of a frame; chooses scale, samples, guides, network and denoiser",
+    )
+    size.add_argument(
+        "--quality",
+        type=_factor,
+        metavar="DB",
+        help="expected PSNR; chooses the same for the least seconds",
+    )
     add("--samples", type=_positive, help="of the low-resolution render")
     add("--guide-samples", type=_positive, default=4)
     add("--guide-cache", type=Path, metavar="DIR", help="folder that keeps guides")
@@ -394,6 +438,32 @@ def _add_plan_report(commands: Any) -> argparse.ArgumentParser:
     add("--rounds", type=_positive, default=1, help="pairs of runs")
     add("--out", type=Path, required=True, help="path of the .json and .md")
     command.set_defaults(work=_plan_report, lines=lambda _: ())
+
+
+def _add_bench(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser("bench", help="error against run time, a report")
+    add = command.add_argument
+    add("scenes", type=Path, nargs="+", metavar="SCENE.blend")
+    add("--out", type=Path, required=True, help="folder; an unfinished run resumes")
+    add(
+        "--budgets",
+        type=_factors,
+        default=(0.5, 1.0, 2.0, 4.0, 8.0),
+        help="multiples of each scene's 1 spp + OIDN, as 0.5,1,2",
+    )
+    add("--resolution", type=_size, metavar="WxH", help="in place of the files' own")
+    add("--reference-samples", type=_positive, default=128, help="of each half")
+    add("--windows", type=Path, help="JSON file of windows that errors are taken on")
+    add("--references", type=Path, help="folder of NAME.exr, for the windows")
+    add("--cache", type=Path, help="folder of rendered inputs; OUT/cache")
+    add("--preset", type=_names(PRESETS), help="as fast,balanced; all with weights")
+    add("--rounds", type=_positive, default=3, help="runs of each timed stage")
+    add("--errors-only", action="store_true", help="time nothing")
+    add("--growth", type=_sizes, default=(), help="frames, as 512x512,1920x1080")
+    add("--model", type=Path, help="where to write what --time-budget goes by")
+    add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
+    add("--weights", type=Path, help="folder of weights files")
+    command.set_defaults(work=_bench, lines=_bench_lines)
     return command
 
 
@@ -442,6 +512,10 @@ def _factor(text: str) -> float:
     return value
 
 
+def _factors(text: str) -> tuple[float, ...]:
+    return tuple(_factor(part) for part in text.split(","))
+
+
 def _integers(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in text.split(","))
 
@@ -479,6 +553,10 @@ def _size(text: str) -> tuple[int, int]:
     if not match or "0" in match.groups():
         raise argparse.ArgumentTypeError(f"{text!r} is no size as 1920x1080")
     return int(match[1]), int(match[2])
+
+
+def _sizes(text: str) -> tuple[tuple[int, int], ...]:
+    return tuple(_size(part) for part in text.split(","))
 
 
 def _bytes(text: str) -> int:

@@ -11,6 +11,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, NoReturn
 
 from xrds_core.errors import Cancelled, UsageError, XRDSError
@@ -45,6 +46,21 @@ def stdout_for_json() -> Iterator[Callable[[Any], None]]:
         os.close(kept)
     for value in told:
         print(json.dumps(value, indent=1), flush=True)
+
+
+@contextmanager
+def stdout_to(path: Path) -> Iterator[None]:
+    """Append what is printed to stdout, by Cycles' C code too, to a file."""
+    flush_all()
+    kept = os.dup(1)
+    try:
+        with path.open("ab") as file:
+            os.dup2(file.fileno(), 1)
+        yield
+    finally:
+        flush_all()
+        os.dup2(kept, 1)
+        os.close(kept)
 
 
 def status_of(work: Callable[[], None]) -> int:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 # Counts up whenever the pass code changes what it renders: old files are then left.
 GENERATION = 2
 # Unlike each other and unlike the references', so that no noise is shared.
+OFF = "OFF"  # in place of a denoiser's mode: the picture as rendered
 SEEDS = {"low": 101, "guides": 202, "full": 303, "plain": 404}
 
 
@@ -36,26 +37,30 @@ class Request:
     """One rendered input.
 
     low: denoised beauty at 1/scale; guides: albedo and normal; full: the same with
-    the radiance of all bounces; plain: denoised full-resolution Cycles.
+    the radiance of all bounces; plain: denoised full-resolution Cycles. ``denoiser``
+    is one of budget.DENOISERS or OFF; None is what the standard measure takes.
     """
 
     kind: str
     samples: int
     scale: int = 1
+    denoiser: str | None = None
+    seed: int | None = None
 
     def file_name(self, shot: Shot) -> str:
         """Name that changes with everything the pixels depend on."""
         import bpy
 
-        seed = SEEDS[self.kind]
-        what = f"{self.kind}{self.scale}-{self.samples}spp-seed{seed}-v{GENERATION}"
+        mode = "" if self.denoiser is None else f"-{self.denoiser}"
+        what = f"{self.kind}{self.scale}-{self.samples}spp{mode}-seed{self._seed}"
+        what += f"-v{GENERATION}"
         version = bpy.app.version_string.replace(" ", "")
         scene = f"{shot.name}-{shot.digest}-{shot.window.label}"
         return f"{scene}-{what}-blender{version}.npz"
 
     def render(self, passes: Any) -> tuple[Arrays, dict[str, float]]:
         """Arrays and seconds by stage, from inside run_job."""
-        seed = SEEDS[self.kind]
+        seed = self._seed
         if self.kind in {"guides", "full"}:
             full = self.kind == "full"
             guides = passes.guides(self.samples, full=full, seed=seed)
@@ -63,18 +68,30 @@ class Request:
             return arrays | ({"radiance": guides.radiance} if full else {}), (
                 guides.seconds
             )
-        # Blender's own default for plain pictures; the product's choice for low ones
-        prefilter = "ACCURATE" if self.kind == "plain" else None
-        beauty = passes.beauty(self.scale, self.samples, seed=seed, prefilter=prefilter)
+        beauty = passes.beauty(self.scale, self.samples, seed=seed, **self._denoising())
         if any(beauty.offset):
             raise SceneError(
                 f"the window does not start on whole pixels at scale {self.scale}: "
                 f"move it by {tuple(beauty.offset)}"
             )
         arrays = {"radiance": beauty.radiance}
-        if beauty.noisy is not None:
+        if beauty.noisy is not None and self.denoiser is None:
             arrays["noisy"] = beauty.noisy
         return arrays, beauty.seconds
+
+    @property
+    def _seed(self) -> int:
+        return SEEDS[self.kind] if self.seed is None else self.seed
+
+    def _denoising(self) -> dict[str, Any]:
+        """Arguments of passes.beauty."""
+        if self.denoiser == OFF:
+            return {"denoise": False}
+        if self.denoiser is not None:
+            quality, prefilter = self.denoiser.split("-")
+            return {"quality": quality, "prefilter": prefilter}
+        # Blender's own default for plain pictures; the product's choice for low ones
+        return {"prefilter": "ACCURATE" if self.kind == "plain" else None}
 
 
 class Folder:
@@ -93,6 +110,12 @@ class Folder:
                 return dict(file)
         except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error):
             return None
+
+    def has(self, name: str) -> bool:
+        """Whether there is such a file, not yet whether it can be read."""
+        if self.directory is None:
+            return name in self.kept
+        return (self.directory / name).is_file()
 
     def write(self, name: str, arrays: Arrays, seconds: dict[str, float]) -> None:
         """Keep arrays (as float32); a reader never sees half a file."""

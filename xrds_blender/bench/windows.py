@@ -55,11 +55,14 @@ class Window:
 
 @dataclass(frozen=True)
 class Shot:
-    """A scene file seen through a window, with the reference to compare with."""
+    """A scene file seen through a window, with the reference to compare with.
+
+    Without one, `xrds bench` renders its own.
+    """
 
     path: Path
     window: Window
-    reference: Path
+    reference: Path | None
     digest: str
 
     @property
@@ -100,5 +103,9 @@ def _shot(
     reference = references / f"{path.stem}.exr"
     if not reference.is_file():
         raise UsageError(f"there is no reference {reference} for {path}")
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
-    return Shot(path, known[path.stem], reference, digest)
+    return Shot(path, known[path.stem], reference, digest(path))
+
+
+def digest(path: Path) -> str:
+    """Of a scene file, short; part of every cached file's name."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:12]

@@ -1,0 +1,76 @@
+"""What failed, and what was running when a run was killed."""
+
+from __future__ import annotations
+
+import json
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from xrds_core.atomic import replacing
+from xrds_core.errors import Cancelled
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+    from .inputs import Say
+
+MOST_KILLS = 3  # so often a task may end with its process before it is left out
+
+
+class Journal:
+    """Keeps one bad configuration from ending a run, even if it ends the process.
+
+    The name of the running task lies in a file, so that the next run knows where the
+    last one was killed; a task that was running at ``MOST_KILLS`` ends is left out.
+    """
+
+    def __init__(self, path: Path, say: Say) -> None:
+        self.path, self.say = path, say
+        self.failures: dict[str, str] = {}
+        self.kills: dict[str, int] = {}
+        self._running: str | None = None
+        self._read()
+
+    def _read(self) -> None:
+        if not self.path.is_file():
+            return
+        told = json.loads(self.path.read_text("utf-8"))
+        self.kills = told["kills"]
+        if told["running"] is not None:
+            killed = told["running"]
+            self.kills[killed] = self.kills.get(killed, 0) + 1
+
+    @contextmanager
+    def attempt(self, name: str) -> Iterator[None]:
+        """Run the body; an error in it is written down and swallowed."""
+        self._running = name
+        self._write()
+        try:
+            yield
+        except (Cancelled, KeyboardInterrupt):
+            self._running = None
+            raise
+        except Exception as error:  # any fault of one configuration is only its own
+            self.failures[name] = f"{type(error).__name__}: {error}"
+            self.say(f"{name} failed and is left out: {self.failures[name]}")
+        else:
+            self.failures.pop(name, None)
+        finally:
+            self._running = None
+            self._write()
+
+    def gives_up(self, name: str) -> bool:
+        """Whether a task is to be left out: it failed now, or kills the process."""
+        if self.kills.get(name, 0) >= MOST_KILLS:
+            self.failures[name] = (
+                f"ended with its process {self.kills[name]} times; "
+                f"remove {self.path} to try it again"
+            )
+        return name in self.failures
+
+    def _write(self) -> None:
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(self.path) as part:
+            told = {"running": self._running, "kills": self.kills}
+            part.write_text(json.dumps(told), "utf-8")

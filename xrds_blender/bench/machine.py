@@ -1,0 +1,108 @@
+"""The machine a figure was measured on, and how much memory a task takes at most."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import platform
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+_SELF = Path("/proc/self")
+
+
+def describe(device: str = "cpu") -> dict[str, Any]:
+    """Processor, cores, memory and versions, as they stand in a report."""
+    import bpy
+    import torch
+
+    from xrds_core import info
+
+    return {
+        "processor": _processor(),
+        "cores": cores(),
+        "memory": _memory(),
+        "system": f"{platform.system()} {platform.release()}",
+        "device": device,
+        "python": platform.python_version(),
+        "blender": bpy.app.version_string,
+        "torch": torch.__version__,
+        "torch_threads": torch.get_num_threads(),
+        "xrds": info.package_version(),
+    }
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+@contextmanager
+def only_cores(count: int) -> Iterator[None]:
+    """Hold every thread of this process to the first ``count`` of its cores (Linux).
+
+    Threads made meanwhile inherit it. Raises OSError where there are too few.
+    """
+    import torch
+
+    allowed = sorted(os.sched_getaffinity(0))
+    if count > len(allowed):
+        raise OSError(f"this process may use {len(allowed)} cores, not {count}")
+    threads = torch.get_num_threads()
+    _hold(set(allowed[:count]))
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        _hold(set(allowed))
+        torch.set_num_threads(threads)
+
+
+def _hold(chosen: set[int]) -> None:
+    for thread in (_SELF / "task").iterdir():
+        with suppress(ProcessLookupError):  # it has ended meanwhile
+            os.sched_setaffinity(int(thread.name), chosen)
+
+
+def forget_peak() -> bool:
+    """Start a new peak of resident memory; False where the system cannot (not Linux).
+
+    What the C library keeps for itself is given back first.
+    """
+    try:
+        ctypes.CDLL(None).malloc_trim(0)
+        (_SELF / "clear_refs").write_text("5")
+    except (OSError, AttributeError):
+        return False
+    return True
+
+
+def peak() -> int | None:
+    """Bytes of resident memory at the peak since `forget_peak`; None if not known."""
+    try:
+        status = (_SELF / "status").read_text()
+    except OSError:
+        return None
+    lines = [line for line in status.splitlines() if line.startswith("VmHWM:")]
+    return int(lines[0].split()[1]) * 1024 if lines else None
+
+
+def _processor() -> str:
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def _memory() -> int | None:
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (ValueError, AttributeError, OSError):
+        return None

@@ -1,0 +1,143 @@
+"""Error against seconds, drawn for screen and print."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+from . import pareto
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    Point = dict[str, Any]
+    Line = list[tuple[float, float]]
+
+MEASURES = {"psnr": "PSNR, dB (sRGB)", "relmse_trimmed": "RelMSE, trimmed"}
+# Colour, line and mark differ each by itself: readable in grey and by the colour-blind.
+STYLES = {
+    "Cycles": ("#999999", ":", "."),
+    "OIDN, default": ("#d55e00", "--", "s"),
+    "OIDN, best mode": ("#000000", "-", "o"),
+    "bicubic": ("#bbbbbb", "-.", "v"),
+    "demodulated bilinear": ("#cc79a7", "-.", "^"),
+    "XRDS": ("#0072b2", "-", "D"),
+    pareto.CACHED: ("#56b4e9", "--", "d"),
+}
+SIZE = (9.0, 4.2)  # inches; two panels
+
+
+def scene_plot(
+    scene: str, points: Sequence[Point], unit: float, floor: float | None
+) -> bytes:
+    """SVG of one scene: all points, each group's frontier, the reference's floor."""
+    figure, panels = _figure(scene, "seconds of a whole frame")
+    groups = pareto.groups(points)
+    for panel, measure in zip(panels, MEASURES, strict=True):
+        for name, members in groups.items():
+            if name in STYLES:
+                _group(panel, name, members, measure)
+        panel.axvline(unit, color="#cccccc", zorder=0, linewidth=1)
+        if measure == "psnr" and floor is not None:
+            panel.axhline(floor, color="#009e73", linewidth=1, linestyle=":")
+            panel.text(0.01, floor, " the reference's own error", fontsize=7,
+                       va="bottom", transform=panel.get_yaxis_transform())  # fmt: skip
+    return _svg(figure, panels)
+
+
+def mean_plot(scenes: dict[str, tuple[Sequence[Point], float]]) -> bytes:
+    """SVG over all scenes: mean error over multiples of 1 spp + OIDN's seconds."""
+    title = f"mean over {len(scenes)} scenes"
+    figure, panels = _figure(title, "budget, of 1 spp + OIDN (Blender's default)")
+    grouped = {
+        name: (pareto.groups(points), unit) for name, (points, unit) in scenes.items()
+    }
+    for panel, measure in zip(panels, MEASURES, strict=True):
+        for name in STYLES:
+            members = {
+                scene: (groups.get(name, []), unit)
+                for scene, (groups, unit) in grouped.items()
+            }
+            _draw(panel, name, pareto.mean_curve(members, measure))
+        panel.axvline(1.0, color="#cccccc", zorder=0, linewidth=1)
+    return _svg(figure, panels)
+
+
+def growth_plot(growth: dict[str, Any]) -> bytes:
+    """SVG of seconds and peak memory over pixels of the output, on all cores."""
+    figure, panels = _figure("growth with the frame", "megapixels of the output")
+    most = max(row["cores"] for row in growth["rows"])
+    lines: dict[str, list[dict[str, Any]]] = {}
+    for row in growth["rows"]:
+        if row["cores"] == most and "less the network" not in row["task"]:
+            lines.setdefault(row["task"], []).append(row)
+    keys = (("seconds", 1.0, "seconds"), ("peak_memory", 2.0**30, "peak memory, GiB"))
+    for panel, (key, unit, label) in zip(panels, keys, strict=True):
+        panel.set_ylabel(label)
+        panel.set_yscale("log")
+        for number, (name, rows) in enumerate(lines.items()):
+            shown = [(r["pixels"] / 1e6, r[key] / unit) for r in rows if r[key]]
+            if shown:
+                panel.plot(*zip(*shown, strict=True), color=f"C{number}", label=name,
+                           marker="osD^v<>"[number % 7], markersize=4)  # fmt: skip
+    return _svg(figure, panels, outside=True)
+
+
+def save(svg: bytes, path: Path) -> None:
+    """Write an SVG file."""
+    path.write_bytes(svg)
+
+
+def _figure(title: str, axis: str) -> tuple[Any, Any]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=SIZE, layout="constrained")
+    figure.suptitle(title, fontsize=11)
+    panels = figure.subplots(1, 2)
+    for panel, (measure, label) in zip(panels, MEASURES.items(), strict=True):
+        panel.set_xscale("log")
+        panel.set_xlabel(axis)
+        panel.set_ylabel(label)
+        panel.grid(visible=True, which="both", linewidth=0.3, color="#dddddd")
+        if measure != "psnr":
+            panel.set_yscale("log")
+    return figure, panels
+
+
+def _group(panel: Any, name: str, members: Sequence[Point], measure: str) -> None:
+    """Its points faintly, its frontier as a line."""
+    colour, _, mark = STYLES[name]
+    if name != pareto.CACHED:
+        shown = [(p["seconds"]["total"], p[measure]) for p in members]
+        panel.scatter(*zip(*shown, strict=True), s=4, color=colour, alpha=0.25,
+                      marker=mark, linewidths=0)  # fmt: skip
+    line = pareto.frontier(members, measure)
+    _draw(panel, name, [(p["seconds"]["total"], p[measure]) for p in line], marks=True)
+
+
+def _draw(panel: Any, name: str, line: Line, marks: bool = False) -> None:
+    if not line:
+        return
+    colour, dash, mark = STYLES[name]
+    panel.plot(
+        *zip(*line, strict=True),
+        color=colour,
+        linestyle=dash,
+        linewidth=1.4,
+        marker=mark if marks else None,
+        markersize=4,
+        label=name,
+    )
+
+
+def _svg(figure: Any, panels: Any, outside: bool = False) -> bytes:
+    if outside:
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=7,
+                      frameon=False)  # fmt: skip
+    else:
+        panels[0].legend(fontsize=7, frameon=False)
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    return buffer.getvalue()

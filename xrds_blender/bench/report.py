@@ -1,0 +1,335 @@
+"""report.html: plots, tables and crops in one file that needs nothing beside it."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import json
+from pathlib import Path
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_core.atomic import replacing
+from xrds_core.errors import XRDSError
+from xrds_core.metrics import to_srgb
+
+from . import plots
+from .sweep import Config
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .measure import SceneBench
+
+    Report = dict[str, Any]
+
+PAGE = Path(__file__).with_name("report.html")
+CROP = (480, 320)  # pixels of the part that is shown, at most
+SHOWN = ("OIDN, default", "OIDN, best mode", "XRDS", "demodulated bilinear")
+QUALITY = 92  # of the pictures in the page; they are to be looked at, not measured
+
+
+def write(out: Path, told: Report, scenes: Sequence[SceneBench]) -> None:
+    """Write report.html and the plots as files."""
+    timed = {
+        scene["scene"]: (
+            [p for p in told["points"] if p["scene"] == scene["scene"]],
+            scene["default_seconds"],
+        )
+        for scene in told["scenes"]
+        if "default_seconds" in scene
+    }
+    timed = {name: pair for name, pair in timed.items() if pair[0]}
+    sections = [_machine(told), _failures(told)]
+    if timed:
+        overall = plots.mean_plot(timed)
+        plots.save(overall, out / "pareto.svg")
+        sections[:0] = [_figure(overall), _mean_table(told), _picker(told)]
+    if "growth" in told:
+        sections.append(_growth(out, told["growth"]))
+    by_name = {scene.name: scene for scene in scenes}
+    for scene in told["scenes"]:
+        name = scene["scene"]
+        sections.append(f"<h2>{html.escape(name)}</h2>")
+        if name in timed:
+            floor = scene["reference_psnr_floor"]
+            svg = plots.scene_plot(name, *timed[name], floor)
+            plots.save(svg, out / f"pareto-{name}.svg")
+            sections += [_facts(told, scene), _figure(svg), _table(told, name)]
+            sections.append(_viewer(told, by_name[name]))
+    page = Template(PAGE.read_text("utf-8")).substitute(body="\n".join(sections))
+    with replacing(out / "report.html") as part:
+        part.write_text(page, "utf-8")
+
+
+# --- tables ---------------------------------------------------------------------------
+
+
+def _rows(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    def cells(tag: str, values: Sequence[object]) -> str:
+        shown = "".join(f"<{tag}>{html.escape(str(v))}</{tag}>" for v in values)
+        return f"<tr>{shown}</tr>"
+
+    body = "\n".join(cells("td", row) for row in rows)
+    return f"<table><thead>{cells('th', head)}</thead><tbody>{body}</tbody></table>"
+
+
+def _mean_table(told: Report) -> str:
+    names = list(dict.fromkeys(n for row in told["mean"] for n in row["groups"]))
+    rows = []
+    for row in told["mean"]:
+        cells = [_mean_cell(row["groups"].get(name), told) for name in names]
+        rows.append([f"{row['budget']:g}", *cells, _mean_cell(row["picker"], told)])
+    head = ["budget", *names, "picker"]
+    note = (
+        "Mean PSNR in dB (trimmed RelMSE) of the best configuration within each "
+        "budget; budgets are multiples of each scene's own 1 spp + OIDN with "
+        "Blender's defaults. In brackets how many scenes had one, where not all."
+    )
+    return f"<p>{note}</p>{_rows(head, rows)}"
+
+
+def _mean_cell(mean: dict[str, float] | None, told: Report) -> str:
+    if mean is None:
+        return "–"
+    some = mean["scenes"] < sum("default_seconds" in s for s in told["scenes"])
+    count = f" [{mean['scenes']}]" if some else ""
+    return f"{mean['psnr']:.2f} ({mean['relmse_trimmed']:.4f}){count}"
+
+
+def _table(told: Report, scene: str) -> str:
+    entries = [e for e in told["budgets"] if e["scene"] == scene]
+    names = list(dict.fromkeys(n for e in entries for n in e["best"]))
+    rows: list[list[str]] = []
+    for entry in entries:
+        for name in [*names, "picker"]:
+            best = entry["picker"] if name == "picker" else entry["best"].get(name)
+            if best is not None:
+                seconds = best["seconds"]
+                total = seconds["total"] if isinstance(seconds, dict) else seconds
+                rows.append(
+                    [
+                        f"{entry['budget']:g} = {entry['seconds']:.1f} s",
+                        name,
+                        best["label"],
+                        f"{total:.1f}",
+                        f"{best['psnr']:.2f}",
+                        f"{best['relmse']:.4f}",
+                        f"{best['relmse_trimmed']:.4f}",
+                        f"{best['flip']:.4f}",
+                    ]
+                )
+    head = ["budget", "group", "best within it", "seconds"]
+    measures = ["PSNR", "RelMSE", "trimmed", "FLIP"]
+    table = _rows([*head, *measures], rows)
+    return f"<details><summary>All budgets</summary>{table}</details>"
+
+
+def _facts(told: Report, scene: dict[str, Any]) -> str:
+    crossing = next(c for c in told["crossings"] if c["scene"] == scene["scene"])
+    check = scene["check"]
+    floor = scene["reference_psnr_floor"]
+    frame, rho = "x".join(map(str, scene["frame"])), scene["rho"]
+    facts = [
+        f"Frame {frame}; error on the window {scene['window']} against "
+        f"{scene['reference']}"
+        + (f", good to {floor:.1f} dB." if floor is not None else "."),
+        f"1 spp + OIDN (default) takes {scene['default_seconds']:.1f} s "
+        f"({check['composed']:.1f} s as sum of its stages). A guide sample costs "
+        f"rho = {rho:.2f} of a beauty sample ({scene['seconds_per_sample']:.2f} s).",
+        *(
+            f"Guides {kind}: {_changes(crossing[kind])}"
+            for kind in ("rendered", "cached")
+        ),
+        f"Most of XRDS' seconds at that budget: {crossing['dearest_stage']}.",
+    ]
+    return "".join(f"<p>{html.escape(fact)}</p>" for fact in facts)
+
+
+def _changes(changes: list[dict[str, Any]]) -> str:
+    """Who is better from which budget on."""
+    if not changes:
+        return "no XRDS with weights."
+    told = [
+        f"from {c['seconds']:.1f} s (budget {c['budget']:.2f}) "
+        f"{'XRDS' if c['ours_better'] else 'the best OIDN mode'}"
+        for c in changes
+    ]
+    return f"better is {', '.join(told)}."
+
+
+def _picker(told: Report) -> str:
+    picker = told["picker"]
+    if picker is None:
+        return ""
+    line = (
+        f"Time budgets: {picker['within']:.0%} of {picker['runs']} whole frames took "
+        f"between -40 % and +10 % of the seconds asked for; the latest took "
+        f"{picker['latest']:.2f} of them."
+    )
+    rows = [
+        [f"{row['budget']:g}", _gap(row["behind_best"]), _gap(row["behind_oidn"])]
+        for row in picker["budgets"]
+    ]
+    head = ["budget", "dB below the sweep's best", "dB below the best OIDN mode"]
+    return f"<p>{line}</p>{_rows(head, rows)}"
+
+
+def _gap(gap: float | None) -> str:
+    return "–" if gap is None else f"{gap:+.2f}"
+
+
+def _machine(told: Report) -> str:
+    rows = [[key, value] for key, value in told["machine"].items()]
+    lacking = ", ".join(
+        f"{preset} x{scale} {guides}"
+        for preset, scale, guides in told["settings"]["without_weights"]
+    )
+    rows.append(["without weights, so not measured", lacking or "none"])
+    return f"<h2>Machine</h2>{_rows(['', ''], rows)}"
+
+
+def _failures(told: Report) -> str:
+    if not told["failures"]:
+        return ""
+    rows = [[name, error] for name, error in told["failures"].items()]
+    return f"<h2>Left out</h2>{_rows(['what', 'why'], rows)}"
+
+
+def _growth(out: Path, growth: dict[str, Any]) -> str:
+    svg = plots.growth_plot(growth)
+    plots.save(svg, out / "growth.svg")
+    rows = [
+        [
+            row["task"],
+            "x".join(map(str, row["size"])),
+            row["cores"],
+            f"{row['seconds']:.2f}",
+            "–" if row["peak_memory"] is None else f"{row['peak_memory'] / 2**30:.2f}",
+        ]
+        for row in growth["rows"]
+    ]
+    fits = [
+        [f["task"], f["cores"], f"{f['seconds']:.2f}", _optional(f["peak_memory"])]
+        for f in growth["exponents"]
+    ]
+    breaks = [
+        [
+            row["network"],
+            "x".join(map(str, row["size"])),
+            row["cores"] + (" (extrapolated)" if row["extrapolated"] else ""),
+            f"{row['saved']:.1f}",
+            f"{row['paid']:.1f}",
+            "yes" if row["saved"] > row["paid"] else "no",
+        ]
+        for row in growth["break_even"]
+    ]
+    head = ["task", "frame", "cores", "seconds", "peak GiB"]
+    return "".join(
+        [
+            f"<h2>Growth: {html.escape(growth['scene'])}</h2>",
+            _figure(svg),
+            "<p>Exponents of pixels: seconds or bytes as pixels to that power.</p>",
+            _rows(["task", "cores", "seconds", "peak memory"], fits),
+            f"<p>{html.escape(growth['note'])}</p>",
+            _rows(["network", "frame", "cores", "s saved", "s paid", "pays"], breaks),
+            f"<details><summary>All runs</summary>{_rows(head, rows)}</details>",
+        ]
+    )
+
+
+def _optional(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"
+
+
+def _figure(svg: bytes) -> str:
+    text = svg.decode("utf-8")
+    return f"<figure>{text[text.index('<svg') :]}</figure>"
+
+
+# --- crops ----------------------------------------------------------------------------
+
+
+def _viewer(told: Report, scene: SceneBench) -> str:
+    """Crops of the frontier's methods at equal time, zoomed and moved together."""
+    reference = scene.pictures.reference()
+    place = _place(reference)
+    shown: dict[str, str] = {}
+    budgets = []
+    for entry in (e for e in told["budgets"] if e["scene"] == scene.name):
+        columns = []
+        for name in SHOWN:
+            best = entry["best"].get(name)
+            if best is None or best["label"] in {c["label"] for c in columns}:
+                continue
+            key = best["label"]
+            if key not in shown:
+                picture = _crop(scene, told, key, place)
+                if picture is None:
+                    continue
+                shown[key] = picture
+            figures = f"{best['psnr']:.2f} dB, {best['seconds']:.1f} s"
+            columns.append({"label": key, "name": name, "figures": figures})
+        title = f"{entry['budget']:g} x = {entry['seconds']:.1f} s"
+        budgets.append({"title": title, "columns": columns})
+    exposure = _exposure(scene)
+    data = {
+        "reference": _encoded(reference[place], exposure),
+        "pictures": shown,
+        "budgets": budgets,
+    }
+    packed = json.dumps(data).replace("</", "<\\/")
+    return (
+        '<div class="viewer"></div>'
+        f'<script type="application/json" class="crops">{packed}</script>'
+    )
+
+
+def _crop(
+    scene: SceneBench, told: Report, label: str, place: tuple[slice, slice]
+) -> str | None:
+    point = next(
+        p for p in told["points"] if p["label"] == label and p["scene"] == scene.name
+    )
+    config = Config(method=point["method"], **point["settings"])
+    try:
+        picture = scene.pictures.picture(config)
+    except XRDSError:  # its inputs are gone from the cache
+        return None
+    return _encoded(picture[place], scene.pictures.exposure(config))
+
+
+def _exposure(scene: SceneBench) -> float:
+    known = [c for c in scene.configs if scene.pictures.knows(c)]
+    return scene.pictures.exposure(known[0])
+
+
+def _place(reference: np.ndarray) -> tuple[slice, slice]:
+    """The part of the picture with most detail, of CROP's size at most."""
+    height, width = reference.shape[:2]
+    columns, rows = min(CROP[0], width), min(CROP[1], height)
+    shown = to_srgb(reference).mean(-1)
+    detail = np.abs(np.diff(shown, axis=0, append=shown[-1:]))
+    detail += np.abs(np.diff(shown, axis=1, append=shown[:, -1:]))
+    total = np.pad(detail, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
+    inside = (
+        total[rows:, columns:]
+        - total[:-rows, columns:]
+        - total[rows:, :-columns]
+        + total[:-rows, :-columns]
+    )
+    y, x = np.unravel_index(int(inside.argmax()), inside.shape)
+    return slice(int(y), int(y) + rows), slice(int(x), int(x) + columns)
+
+
+def _encoded(linear: np.ndarray, stops: float) -> str:
+    """A data URI of the picture as it is shown."""
+    from PIL import Image
+
+    pixels = np.round(to_srgb(linear, stops) * 255).astype(np.uint8)
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "WEBP", quality=QUALITY)
+    return "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode()
