@@ -212,6 +212,8 @@ def test_break_even_sets_saved_against_paid() -> None:
         rows.append(row(PLAIN_FRAME, 10, cores, 40 / cores))
         rows.append(row(f"whole frame, {name}, less the network", 10, cores, 8 / cores))
         rows.append(row(name, 10, cores, 6 / cores))
+        rows.append(row("OIDN HIGH-ACCURATE alone", 10, cores, 30 / cores))
+        rows.append(row("OIDN HIGH-FAST alone", 10, cores, 2 / cores))
     found = growth.break_even(rows, [("fast", 2, "fast")])
     assert [(r["cores"], r["extrapolated"]) for r in found] == [
         ("1", False),
@@ -221,3 +223,4 @@ def test_break_even_sets_saved_against_paid() -> None:
     ]
     assert found[2]["saved"] == pytest.approx(4)
     assert found[2]["paid"] == pytest.approx(0.75)
+    assert found[1]["saved_quick"] == pytest.approx((40 - 30 + 2 - 8) / 2)

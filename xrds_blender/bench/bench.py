@@ -68,7 +68,9 @@ def bench(
     out.mkdir(parents=True, exist_ok=True)
     networks = Networks(weights, device)
     folder = Folder(cache or out / "cache")
-    journal = Journal(out / "journal.json", _say)
+    assert folder.directory is not None
+    folder.directory.mkdir(parents=True, exist_ok=True)
+    journal = Journal(folder.directory / "journal.json", _say)
     chosen = Settings(
         sweep or Sweep(_chosen(networks, presets)),
         folder,
@@ -80,7 +82,7 @@ def bench(
         timing,
         picker,
     )
-    with console.stdout_to(out / "blender.log"):
+    with console.stdout_to(folder.directory / "blender.log"):
         shots = find_shots(scenes, resolution, windows, references)
         parts = [SceneBench(shot, chosen) for shot in shots]
         _tell_missing(networks, presets)

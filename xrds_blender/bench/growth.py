@@ -38,11 +38,12 @@ if TYPE_CHECKING:
 MORE_CORES = (8, 32)
 MEMORY_LIMIT = 1 << 30
 NOTE = (
-    "Break-even at equal rays: saved is a frame of 1 spp + OIDN (Blender's default) "
-    "less the low-resolution render of scale² samples, its OIDN and one guide sample; "
-    "paid is the network. Rows of more cores than this machine has are extrapolated: "
-    "every stage as a + b / cores through its runs on fewer. No graphics card was "
-    "there to fit."
+    "Break-even at equal rays: saved is a frame of one sample + OIDN less the "
+    "low-resolution render of scale² samples, its OIDN and one guide sample; paid is "
+    f"the network. OIDN at full size is Blender's default ({DEFAULT_DENOISER}) or the "
+    f"quicker {PROBE_DENOISER}. More cores than this machine has are extrapolated: "
+    "every stage as a + b / cores through its runs on fewer. There was no graphics "
+    "card to fit."
 )
 
 
@@ -149,6 +150,14 @@ def _frame(name: str) -> str:
     return f"whole frame, {name}"
 
 
+def _less_network(name: str) -> str:
+    return f"{_frame(name)}, less the network"
+
+
+def _alone(denoiser: str) -> str:
+    return f"OIDN {denoiser} alone"
+
+
 def _limited_network(shot: Shot, settings: Settings, network: Network) -> Task:
     def task() -> Run:
         low, full = tasks.noise(shot.window, network[1])
@@ -174,7 +183,7 @@ def _xrds_frame(shot: Shot, settings: Settings, network: Network) -> Task:
         guide_samples=1,
         device=settings.networks.device,
         weights=settings.networks.weights,
-        denoiser=DEFAULT_DENOISER,
+        denoiser=PROBE_DENOISER,
     )
 
     def task() -> Run:
@@ -197,13 +206,13 @@ def _rows(
                 yield task, times.median(task), times.peak(task)
         if times.count(_frame(name)):
             seconds = times.median(_frame(name)) - times.median(_frame(name), "network")
-            yield f"{_frame(name)}, less the network", seconds, None
+            yield _less_network(name), seconds, None
     for mode in (DEFAULT_DENOISER, PROBE_DENOISER):
         try:
             seconds = times.denoising(mode)
         except KeyError:
             continue
-        yield f"OIDN {mode} alone", seconds, None
+        yield _alone(mode), seconds, None
     for kind in ("plain", "guides"):
         try:
             yield f"one sample, {kind}", times.line(kind)[1], None
@@ -244,12 +253,19 @@ def break_even(rows: Sequence[Row], networks: Sequence[Network]) -> list[Row]:
         for size in sizes:
             here = [row for row in rows if tuple(row["size"]) == size]
             for cores in [*known, *(c for c in MORE_CORES if c > max(known))]:
-                plain, rest, paid = (
+                plain, rest, paid, default, quick = (
                     seconds_on(here, task, cores)
-                    for task in (PLAIN_FRAME, f"{_frame(name)}, less the network", name)
+                    for task in (
+                        PLAIN_FRAME,
+                        _less_network(name),
+                        name,
+                        _alone(DEFAULT_DENOISER),
+                        _alone(PROBE_DENOISER),
+                    )
                 )
-                if None in {plain, rest, paid}:
+                if plain is None or rest is None or paid is None:
                     continue
+                known_oidn = default is not None and quick is not None
                 found.append(
                     {
                         "network": name,
@@ -257,6 +273,9 @@ def break_even(rows: Sequence[Row], networks: Sequence[Network]) -> list[Row]:
                         "cores": str(cores),
                         "extrapolated": cores not in known,
                         "saved": plain - rest,
+                        "saved_quick": plain - default + quick - rest
+                        if known_oidn
+                        else None,
                         "paid": paid,
                     }
                 )

@@ -269,24 +269,37 @@ class SceneBench:
             "reference": _named(self.shot, self.settings.reference_samples),
             "reference_psnr_floor": self.pictures.floor(),
         }
-        if self.settings.timing and self.times.count(PLAIN_FRAME):
-            beauty, guide = (self.times.line(kind)[1] for kind in ("plain", "guides"))
-            told |= {
-                "default_seconds": self.unit(),
-                "seconds_per_sample": beauty,
-                "seconds_per_guide_sample": guide,
-                "rho": guide / beauty,
-                "denoise_seconds": {
-                    mode: self.times.denoising(mode) for mode in budget.DENOISERS
-                },
-                "check": self._check(),
-                "stages": self.times.runs,
-            }
-        return told
+        return told | self._timed() if self.settings.timing else told
 
-    def _check(self) -> dict[str, float]:
-        """The composed seconds of a frame beside those of one rendered whole."""
-        return {"composed": self.unit(), "whole": self.times.median(PLAIN_FRAME)}
+    def _timed(self) -> dict[str, Any]:
+        """What was timed; nothing where a stage that all else rests on failed."""
+        try:
+            beauty, guide = (self.times.line(k)[1] for k in ("plain", "guides"))
+            modes = {mode: self.times.denoising(mode) for mode in budget.DENOISERS}
+            check = {
+                "composed": self.times.cost(DEFAULT).total,
+                "whole": self.times.median(PLAIN_FRAME),
+            }
+        except KeyError:
+            return {}
+        return {
+            "default_seconds": self.unit(),
+            "seconds_per_sample": beauty,
+            "seconds_per_guide_sample": guide,
+            "rho": guide / beauty,
+            "denoise_seconds": modes,
+            "check": check,
+            "network_load_seconds": self._loads(),
+            "stages": self.times.runs,
+        }
+
+    def _loads(self) -> dict[str, float]:
+        """Seconds of loading each network's weights: the first time of a process."""
+        return {
+            name: max(run.get("load") or 0.0 for run in runs)
+            for name, runs in self.times.runs.items()
+            if name.startswith("XRDS")
+        }
 
 
 def picked_config(job: RenderJob) -> Config:

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 import html
-import io
-import json
 from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from xrds_core.atomic import replacing
-from xrds_core.errors import XRDSError
-from xrds_core.metrics import to_srgb
 
 from . import plots
-from .sweep import Config
+from .crops import viewer
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,9 +20,6 @@ if TYPE_CHECKING:
     Report = dict[str, Any]
 
 PAGE = Path(__file__).with_name("report.html")
-CROP = (480, 320)  # pixels of the part that is shown, at most
-SHOWN = ("OIDN, default", "OIDN, best mode", "XRDS", "demodulated bilinear")
-QUALITY = 92  # of the pictures in the page; they are to be looked at, not measured
 
 
 def write(out: Path, told: Report, scenes: Sequence[SceneBench]) -> None:
@@ -59,7 +49,7 @@ def write(out: Path, told: Report, scenes: Sequence[SceneBench]) -> None:
             svg = plots.scene_plot(name, *timed[name], floor)
             plots.save(svg, out / f"pareto-{name}.svg")
             sections += [_facts(told, scene), _figure(svg), _table(told, name)]
-            sections.append(_viewer(told, by_name[name]))
+            sections.append(viewer(told, by_name[name]))
     page = Template(PAGE.read_text("utf-8")).substitute(body="\n".join(sections))
     with replacing(out / "report.html") as part:
         part.write_text(page, "utf-8")
@@ -140,6 +130,9 @@ def _facts(told: Report, scene: dict[str, Any]) -> str:
         f"1 spp + OIDN (default) takes {scene['default_seconds']:.1f} s "
         f"({check['composed']:.1f} s as sum of its stages). A guide sample costs "
         f"rho = {rho:.2f} of a beauty sample ({scene['seconds_per_sample']:.2f} s).",
+        "Loading the weights, apart: "
+        + ", ".join(f"{n} {s:.2f} s" for n, s in scene["network_load_seconds"].items())
+        + ".",
         *(
             f"Guides {kind}: {_changes(crossing[kind])}"
             for kind in ("rendered", "cached")
@@ -221,9 +214,8 @@ def _growth(out: Path, growth: dict[str, Any]) -> str:
             row["network"],
             "x".join(map(str, row["size"])),
             row["cores"] + (" (extrapolated)" if row["extrapolated"] else ""),
-            f"{row['saved']:.1f}",
             f"{row['paid']:.1f}",
-            "yes" if row["saved"] > row["paid"] else "no",
+            *(_saved(row[key], row["paid"]) for key in ("saved", "saved_quick")),
         ]
         for row in growth["break_even"]
     ]
@@ -235,10 +227,19 @@ def _growth(out: Path, growth: dict[str, Any]) -> str:
             "<p>Exponents of pixels: seconds or bytes as pixels to that power.</p>",
             _rows(["task", "cores", "seconds", "peak memory"], fits),
             f"<p>{html.escape(growth['note'])}</p>",
-            _rows(["network", "frame", "cores", "s saved", "s paid", "pays"], breaks),
+            _rows(
+                ["network", "frame", "cores", "s paid", "s saved", "quick OIDN"], breaks
+            ),
             f"<details><summary>All runs</summary>{_rows(head, rows)}</details>",
         ]
     )
+
+
+def _saved(saved: float | None, paid: float) -> str:
+    """Seconds saved, and whether they pay."""
+    if saved is None:
+        return "–"
+    return f"{saved:.1f}, {'pays' if saved > paid else 'does not pay'}"
 
 
 def _optional(value: float | None) -> str:
@@ -248,88 +249,3 @@ def _optional(value: float | None) -> str:
 def _figure(svg: bytes) -> str:
     text = svg.decode("utf-8")
     return f"<figure>{text[text.index('<svg') :]}</figure>"
-
-
-# --- crops ----------------------------------------------------------------------------
-
-
-def _viewer(told: Report, scene: SceneBench) -> str:
-    """Crops of the frontier's methods at equal time, zoomed and moved together."""
-    reference = scene.pictures.reference()
-    place = _place(reference)
-    shown: dict[str, str] = {}
-    budgets = []
-    for entry in (e for e in told["budgets"] if e["scene"] == scene.name):
-        columns = []
-        for name in SHOWN:
-            best = entry["best"].get(name)
-            if best is None or best["label"] in {c["label"] for c in columns}:
-                continue
-            key = best["label"]
-            if key not in shown:
-                picture = _crop(scene, told, key, place)
-                if picture is None:
-                    continue
-                shown[key] = picture
-            figures = f"{best['psnr']:.2f} dB, {best['seconds']:.1f} s"
-            columns.append({"label": key, "name": name, "figures": figures})
-        title = f"{entry['budget']:g} x = {entry['seconds']:.1f} s"
-        budgets.append({"title": title, "columns": columns})
-    exposure = _exposure(scene)
-    data = {
-        "reference": _encoded(reference[place], exposure),
-        "pictures": shown,
-        "budgets": budgets,
-    }
-    packed = json.dumps(data).replace("</", "<\\/")
-    return (
-        '<div class="viewer"></div>'
-        f'<script type="application/json" class="crops">{packed}</script>'
-    )
-
-
-def _crop(
-    scene: SceneBench, told: Report, label: str, place: tuple[slice, slice]
-) -> str | None:
-    point = next(
-        p for p in told["points"] if p["label"] == label and p["scene"] == scene.name
-    )
-    config = Config(method=point["method"], **point["settings"])
-    try:
-        picture = scene.pictures.picture(config)
-    except XRDSError:  # its inputs are gone from the cache
-        return None
-    return _encoded(picture[place], scene.pictures.exposure(config))
-
-
-def _exposure(scene: SceneBench) -> float:
-    known = [c for c in scene.configs if scene.pictures.knows(c)]
-    return scene.pictures.exposure(known[0])
-
-
-def _place(reference: np.ndarray) -> tuple[slice, slice]:
-    """The part of the picture with most detail, of CROP's size at most."""
-    height, width = reference.shape[:2]
-    columns, rows = min(CROP[0], width), min(CROP[1], height)
-    shown = to_srgb(reference).mean(-1)
-    detail = np.abs(np.diff(shown, axis=0, append=shown[-1:]))
-    detail += np.abs(np.diff(shown, axis=1, append=shown[:, -1:]))
-    total = np.pad(detail, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    inside = (
-        total[rows:, columns:]
-        - total[:-rows, columns:]
-        - total[rows:, :-columns]
-        + total[:-rows, :-columns]
-    )
-    y, x = np.unravel_index(int(inside.argmax()), inside.shape)
-    return slice(int(y), int(y) + rows), slice(int(x), int(x) + columns)
-
-
-def _encoded(linear: np.ndarray, stops: float) -> str:
-    """A data URI of the picture as it is shown."""
-    from PIL import Image
-
-    pixels = np.round(to_srgb(linear, stops) * 255).astype(np.uint8)
-    buffer = io.BytesIO()
-    Image.fromarray(pixels).save(buffer, "WEBP", quality=QUALITY)
-    return "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode()

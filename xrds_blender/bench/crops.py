@@ -1,0 +1,106 @@
+"""Crops of the best pictures at equal time, shown side by side in the report."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_core.errors import XRDSError
+from xrds_core.metrics import to_srgb
+
+from .sweep import Config
+
+if TYPE_CHECKING:
+    from .measure import SceneBench
+
+    Report = dict[str, Any]
+
+CROP = (480, 320)  # pixels of the part that is shown, at most
+SHOWN = ("OIDN, default", "OIDN, best mode", "XRDS", "demodulated bilinear")
+QUALITY = 92  # of the pictures in the page; they are to be looked at, not measured
+
+
+def viewer(told: Report, scene: SceneBench) -> str:
+    """HTML of a scene's crops; the page's script zooms and moves them together."""
+    reference = scene.pictures.reference()
+    place = _place(reference)
+    shown: dict[str, str] = {}
+    budgets = []
+    for entry in (e for e in told["budgets"] if e["scene"] == scene.name):
+        columns = []
+        for name in SHOWN:
+            best = entry["best"].get(name)
+            if best is None or best["label"] in {c["label"] for c in columns}:
+                continue
+            key = best["label"]
+            if key not in shown:
+                picture = _crop(scene, told, key, place)
+                if picture is None:
+                    continue
+                shown[key] = picture
+            figures = f"{best['psnr']:.2f} dB, {best['seconds']:.1f} s"
+            columns.append({"label": key, "name": name, "figures": figures})
+        title = f"{entry['budget']:g} x = {entry['seconds']:.1f} s"
+        budgets.append({"title": title, "columns": columns})
+    exposure = _exposure(scene)
+    data = {
+        "reference": _encoded(reference[place], exposure),
+        "pictures": shown,
+        "budgets": budgets,
+    }
+    packed = json.dumps(data).replace("</", "<\\/")
+    return (
+        '<div class="viewer"></div>'
+        f'<script type="application/json" class="crops">{packed}</script>'
+    )
+
+
+def _crop(
+    scene: SceneBench, told: Report, label: str, place: tuple[slice, slice]
+) -> str | None:
+    point = next(
+        p for p in told["points"] if p["label"] == label and p["scene"] == scene.name
+    )
+    config = Config(method=point["method"], **point["settings"])
+    try:
+        picture = scene.pictures.picture(config)
+    except XRDSError:  # its inputs are gone from the cache
+        return None
+    return _encoded(picture[place], scene.pictures.exposure(config))
+
+
+def _exposure(scene: SceneBench) -> float:
+    known = [c for c in scene.configs if scene.pictures.knows(c)]
+    return scene.pictures.exposure(known[0])
+
+
+def _place(reference: np.ndarray) -> tuple[slice, slice]:
+    """The part of the picture with most detail, of CROP's size at most."""
+    height, width = reference.shape[:2]
+    columns, rows = min(CROP[0], width), min(CROP[1], height)
+    shown = to_srgb(reference).mean(-1)
+    detail = np.abs(np.diff(shown, axis=0, append=shown[-1:]))
+    detail += np.abs(np.diff(shown, axis=1, append=shown[:, -1:]))
+    total = np.pad(detail, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
+    inside = (
+        total[rows:, columns:]
+        - total[:-rows, columns:]
+        - total[rows:, :-columns]
+        + total[:-rows, :-columns]
+    )
+    y, x = np.unravel_index(int(inside.argmax()), inside.shape)
+    return slice(int(y), int(y) + rows), slice(int(x), int(x) + columns)
+
+
+def _encoded(linear: np.ndarray, stops: float) -> str:
+    """A data URI of the picture as it is shown."""
+    from PIL import Image
+
+    pixels = np.round(to_srgb(linear, stops) * 255).astype(np.uint8)
+    buffer = io.BytesIO()
+    Image.fromarray(pixels).save(buffer, "WEBP", quality=QUALITY)
+    return "data:image/webp;base64," + base64.b64encode(buffer.getvalue()).decode()
