@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from xrds_blender.bench import growth, pareto
+from xrds_blender.bench import growth, machine, pareto
 from xrds_blender.bench.inputs import OFF
 from xrds_blender.bench.journal import MOST_KILLS, Journal
 from xrds_blender.bench.stages import (
@@ -175,6 +176,28 @@ def test_what_kills_the_process_again_and_again_is_left_out(tmp_path: Path) -> N
     last = Journal(path, print)
     assert last.gives_up("deadly")
     assert "ended with its process 3 times" in last.failures["deadly"]
+
+
+@pytest.mark.skipif(machine.cores() < 2, reason="there is one core alone")
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="not Linux")
+def test_threads_are_held_to_cores_and_let_go_again() -> None:
+    before = os.sched_getaffinity(0)
+    with machine.only_cores(1):
+        assert machine.cores() == 1
+    assert os.sched_getaffinity(0) == before
+    with pytest.raises(OSError, match="cores, not 4096"), machine.only_cores(4096):
+        pass
+
+
+@pytest.mark.skipif(not machine.forget_peak(), reason="the system tells no peak")
+def test_peak_memory_is_of_the_task_alone() -> None:
+    megabytes = 64
+    machine.forget_peak()
+    before = machine.peak()
+    del bytearray(b"x" * (megabytes << 20))[:]
+    assert machine.peak() - before > megabytes << 19
+    machine.forget_peak()
+    assert machine.peak() - before < megabytes << 19
 
 
 # --- growth ---------------------------------------------------------------------------

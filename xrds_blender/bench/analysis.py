@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     Point = dict[str, Any]
     Report = dict[str, Any]
 
-OURS, CACHED, RIVAL, DEFAULT = "XRDS", pareto.CACHED, "OIDN, best mode", "OIDN, default"
+OURS, CACHED, RIVAL = "XRDS", pareto.CACHED, "OIDN, best mode"
 
 
 def analysed(report: Report, budgets: Sequence[float]) -> Report:

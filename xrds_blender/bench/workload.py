@@ -10,7 +10,7 @@ from .inputs import OFF
 if TYPE_CHECKING:
     from ..budget import Costs
     from .inputs import Request
-    from .sweep import Config, Sweep
+    from .sweep import Config
     from .windows import Window
 
 # Of the errors of one picture, seconds per megapixel: FLIP above all.
@@ -44,11 +44,6 @@ def picture_seconds(config: Config, costs: Costs, window: Window) -> float:
         network = config.preset, config.scale, config.guides
         seconds += costs.network[network] * share(window)
     return seconds
-
-
-def network_seconds(sweep: Sweep, costs: Costs) -> float:
-    """Predicted seconds of one whole frame through each network and baseline."""
-    return sum(costs.network.values()) + 3 * len(sweep.scales)
 
 
 def share(window: Window) -> float:
