@@ -162,7 +162,7 @@ def test_the_pickers_model_is_written_and_can_be_read(world: World) -> None:
     file = world.folder / "budget.json"
     world.run(timing=False, model=file)
     model = budget.Model.read(file)
-    assert model.source == "mean over 1 scenes: cubes"
+    assert model.source.startswith("mean over 1 scenes: cubes; weights: fast x4")
     plain = budget.Choice("HIGH-FAST", 0)
     assert model.errors.curves[plain].samples == (1, 2)
     own = budget.Choice("HIGH-FAST", 0, 4, "fast", "fast", 2)

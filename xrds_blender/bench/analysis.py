@@ -187,7 +187,17 @@ def fitted(scenes: Sequence[SceneBench], points: Sequence[Point]) -> budget.Mode
             curves.setdefault(choice, {})[samples] = statistics.fmean(psnr)
     model = budget.ErrorModel({c: Curve.of(points) for c, points in curves.items()})
     names = ", ".join(scene.name for scene in scenes)
-    return _speeds(scenes, model, f"mean over {len(scenes)} scenes: {names}")
+    source = f"mean over {len(scenes)} scenes: {names}; weights: "
+    return _speeds(scenes, model, source + _weights(scenes[0]))
+
+
+def _weights(scene: SceneBench) -> str:
+    """The networks with the beginnings of their files' checksums."""
+    chosen = scene.settings
+    return ", ".join(
+        f"{preset} x{scale} {guides} {chosen.networks.digest((preset, scale, guides))}"
+        for preset, scale, guides in chosen.sweep.networks
+    )
 
 
 def _speeds(
