@@ -438,6 +438,7 @@ def _add_plan_report(commands: Any) -> argparse.ArgumentParser:
     add("--rounds", type=_positive, default=1, help="pairs of runs")
     add("--out", type=Path, required=True, help="path of the .json and .md")
     command.set_defaults(work=_plan_report, lines=lambda _: ())
+    return command
 
 
 def _add_bench(commands: Any) -> argparse.ArgumentParser:
