@@ -10,7 +10,12 @@ import pytest
 import torch
 
 from xrds_core.errors import PictureError, UsageError
-from xrds_core.training.augmentation import random_rotation, transpose_and_flip
+from xrds_core.training import augmentation
+from xrds_core.training.augmentation import (
+    over_denoised,
+    random_rotation,
+    transpose_and_flip,
+)
 from xrds_core.training.config import TrainingConfig
 from xrds_core.training.crop import Batch, Crop
 from xrds_core.training.data import Variation, draw, with_noise_of
@@ -64,7 +69,21 @@ def test_normals_turn_with_the_picture() -> None:
     assert len(seen) == 8
 
 
-def test_shaded_crops_are_albedo_under_smooth_light(config: TrainingConfig) -> None:
+def test_over_denoised_radiance_loses_texture_in_half_of_the_crops() -> None:
+    low = np.random.default_rng(0).random((24, 24, 3)).astype(np.float32)
+    random = np.random.default_rng(1)
+    spreads = [over_denoised(low, random).std() for _ in range(200)]
+    same = np.isclose(spreads, low.std(), rtol=1e-6)
+    assert 80 < same.sum() < 120
+    assert min(spreads) < 0.3 * low.std()
+    flat = np.full((8, 8, 3), 0.7, np.float32)
+    np.testing.assert_allclose(over_denoised(flat, random), flat, rtol=1e-6)
+
+
+def test_shaded_crops_are_albedo_under_smooth_light(
+    config: TrainingConfig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(augmentation, "over_denoised", lambda low, random: low)
     window = read_window(first_window(config), 2, "fast")
     random = np.random.default_rng(1)
     batch = draw(window, 2, "fast", Variation(shaded=1.0), random)
