@@ -281,10 +281,10 @@ class CyclesPasses:
 
     def probe_guides(self, scale: int, samples: int) -> dict[str, float]:
         """Seconds (sync, guides) of guides at 1/scale of the size; no pixels."""
-        with Borrowed() as borrowed:
+        settings = guide_settings(self._depsgraph, GuideRender(shadows=False))
+        with Borrowed() as borrowed, settings:
             set_sampling(borrowed, self._scene, samples, None)
             set_denoising(borrowed, self._scene, self._layer_eval, False, None)
-            set_guide_bounces(borrowed, self._scene)
             clock = self._run_low(borrowed, self._grid(scale), exact=False)
         return {"sync": clock.sync, "guides": clock.render}
 
