@@ -341,10 +341,12 @@ def test_command_stops_on_ctrl_c_and_keeps_its_steps(
     assert "the same command goes on" in errors
 
 
-def test_second_signal_acts_as_before() -> None:
+def test_later_signal_acts_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     with Interruption() as stop:
         signal.raise_signal(signal.SIGINT)
         assert stop.wished
+        signal.raise_signal(signal.SIGINT)  # the same wish, handed on
+        monkeypatch.setattr("xrds_core.training.interruption.SAME_WISH", 0.0)
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(signal.SIGINT)
 

@@ -1,7 +1,8 @@
 """How crops are varied, so that few renders stand for many.
 
-After the training of OIDN (Afra, 2019 to 2026): colours permuted, pictures flipped and
-transposed, light left out. Ours are the turning normals, tints and light of our own.
+After OIDN's own training (github.com/RenderKit/oidn, training/dataset.py, 2026): colours
+permuted, pictures flipped and transposed, light left out. OIDN permutes the channels of
+normals; here they turn with the picture, as vectors do, and now and then at random.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 import threading
+import time
 from types import FrameType
 from typing import Any
 
@@ -14,14 +15,16 @@ TOLD = (
     "stopping after this step, from where the same command goes on; "
     "once more to stop at once"
 )
+SAME_WISH = 1.0  # seconds: torchrun hands on what the terminal has sent already
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interruption:
-    """While entered, the first signal sets `wished`; a second one acts as before."""
+    """While entered, the first signal sets `wished`; a later one acts as before."""
 
     def __init__(self) -> None:
         self.wished = False
+        self._when = 0.0
         self._before: dict[int, Any] = {}
         self._wake = -1
 
@@ -32,16 +35,17 @@ class Interruption:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._restore()
-
-    def _wish(self, number: int, frame: FrameType | None) -> None:
-        self.wished = True
-        self._restore()
-        tqdm.write(TOLD, file=sys.stderr)
-
-    def _restore(self) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
         if self._before:
             signal.set_wakeup_fd(self._wake)
         self._before = {}
+
+    def _wish(self, number: int, frame: FrameType | None) -> None:
+        now = time.monotonic()
+        if not self.wished:
+            self.wished, self._when = True, now
+            tqdm.write(TOLD, file=sys.stderr)
+        elif now - self._when >= SAME_WISH:
+            self.__exit__()
+            signal.raise_signal(number)
