@@ -142,7 +142,8 @@ def _left_out(kind: type) -> tuple[set[str], tuple[str, ...]]:
     bases = [n for n in _LEFT_OUT if issubclass(kind, getattr(bpy.types, n))]
     names = {name for base in bases for name in _LEFT_OUT[base].split()}
     prefixes = [each for base in bases for each in _INTERFACE.get(base, ())]
-    return names | {"rna_type", "bl_rna"}, ("bl_", *prefixes)
+    always_on = {"use_nodes"} if bpy.app.version >= (5,) else set()
+    return names | always_on | {"rna_type", "bl_rna"}, ("bl_", *prefixes)
 
 
 def _kind(item: Any) -> str:

@@ -78,9 +78,16 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
 
 def of_material(material: Any) -> Closures:
     """What a material can do; one without nodes is diffuse."""
-    if material.node_tree is None or not getattr(material, "use_nodes", True):
+    if not _uses_nodes(material):
         return Closures(scatters=True)
     return of_tree(material.node_tree)
+
+
+def _uses_nodes(item: Any) -> bool:
+    """Whether a material's or a world's tree counts; from Blender 5.0 on it does."""
+    import bpy
+
+    return item.node_tree is not None and (bpy.app.version >= (5,) or item.use_nodes)
 
 
 def requested_passes(layer: Any) -> tuple[str, ...]:
@@ -112,7 +119,7 @@ def _bare(objects: list[Any]) -> bool:
 def _world(world: Any) -> tuple[str, Closures]:
     if world is None:
         return "none", Closures()
-    if world.node_tree is None or not getattr(world, "use_nodes", True):
+    if not _uses_nodes(world):
         return ("constant" if any(world.color) else "none"), Closures()
     found = of_tree(world.node_tree)
     if found.varies or any(n.type == "LIGHT_PATH" for n in reachable(world.node_tree)):

@@ -108,7 +108,9 @@ def multiply(scene: Any) -> None:
 
 
 def recolour(scene: Any) -> None:
-    bpy.data.node_groups["Group"].nodes["RGB"].outputs[0].default_value[0] = 0.9
+    tree = bpy.data.node_groups["Group"]
+    colour = next(each for each in tree.nodes if each.type == "RGB")
+    colour.outputs[0].default_value[0] = 0.9
 
 
 def focus(scene: Any) -> None:

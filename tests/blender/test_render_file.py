@@ -154,3 +154,28 @@ def test_refusals_come_before_rendering(
     assert "Traceback" not in err
     assert "Fra:" not in out
     assert not (folder / "a.exr").exists()
+
+
+def test_a_plan_is_told_and_nothing_is_rendered(folder: Path) -> None:
+    done = xrds(folder, "plan scene.blend --json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told["facts"]["width"] == 62
+    assert told["facts"]["scene"]["lamps"] == 1
+    assert {"guide lights", "guide bounces"} <= {
+        each["decision"] for each in told["decisions"]
+    }
+    for each in told["decisions"]:
+        assert set(each) == {"decision", "value", "reason", "saving_seconds"}
+    assert "Sample" not in done.stderr
+    files = set(folder.iterdir())
+    explained = xrds(folder, "render scene.blend --explain --keep-all")
+    assert explained.returncode == 0, explained.stderr
+    assert "guide lights: all" in explained.stdout
+    assert set(folder.iterdir()) == files
+
+
+def test_a_render_without_output_is_wrong_usage(folder: Path) -> None:
+    done = xrds(folder, "render scene.blend")
+    assert done.returncode == 2
+    assert "name the output with -o" in done.stderr
