@@ -23,7 +23,8 @@ class RenderJob:
 
     `samples` and `seed` None leave Cycles' own; `exposure` None is found in the
     picture; `weights` is a folder of presets or a file in place of the shipped;
-    `memory_limit` in bytes is the network's. Raises UsageError on values out of range.
+    `memory_limit` in bytes and `threads` are the network's. Raises UsageError on
+    values out of range.
     """
 
     scale: int = 2
@@ -37,12 +38,13 @@ class RenderJob:
     plain: bool = False
     memory_limit: int | None = None
     weights: str | Path | None = None
+    threads: int | None = None
 
     def __post_init__(self) -> None:
         if self.scale not in SCALES:
             known = ", ".join(map(str, SCALES))
             raise UsageError(f"scale {self.scale} is not one of {known}")
-        for name in ("samples", "guide_samples"):
+        for name in ("samples", "guide_samples", "threads"):
             value = getattr(self, name)
             if value is not None and value < 1:
                 raise UsageError(f"{name} {value} is below 1")
@@ -68,6 +70,7 @@ class RenderJob:
             plain=settings.plain,
             memory_limit=here.memory_limit,
             weights=here.weights,
+            threads=here.threads,
         )
 
 
@@ -79,7 +82,8 @@ class Picture:
     (H, W, 3) and `low_resolution` (h, w, 3) are None for a plain render. `seconds` by
     stage: total, sync, beauty, denoise, guides, network, write; Cycles does not tell
     denoising from sampling, so `beauty` holds both and `denoise` is 0. `peak_memory`
-    is the largest in bytes that the process has taken so far.
+    is the largest in bytes that the process has taken so far; `device` is what the
+    network ran on, empty for a plain render.
     """
 
     radiance: Array
@@ -90,3 +94,4 @@ class Picture:
     seconds: dict[str, float] = field(default_factory=dict)
     plan: tuple[Decision, ...] = ()
     peak_memory: int = 0
+    device: str = ""

@@ -10,7 +10,7 @@ import numpy as np
 
 from xrds_core.errors import Cancelled, XRDSError
 
-from . import cycles_session, low_camera, plan
+from . import cycles_session, low_camera, plan, status_bar
 from .borrowed import Borrowed
 from .colour import converted, to_rec709, working_space
 from .cycles_settings import set_sampling
@@ -31,12 +31,16 @@ def render_layer(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
     """
     start = time.perf_counter()
     seconds = dict.fromkeys(STAGES, 0.0)
-    if job.is_plain:
-        picture = _plain(engine, depsgraph, job, seconds)
-    else:
-        upscaler = _upscaler(job)  # first: missing weights are to cost no render
-        picture = _enlarged(engine, depsgraph, job, upscaler, seconds)
+    try:
+        if job.is_plain:
+            picture = _plain(engine, depsgraph, job, seconds)
+        else:
+            upscaler = _upscaler(job)  # first: missing weights are to cost no render
+            picture = _enlarged(engine, depsgraph, job, upscaler, seconds)
+    finally:
+        status_bar.end()
     seconds["total"] = time.perf_counter() - start
+    status_bar.keep(seconds)
     return picture
 
 
@@ -92,6 +96,7 @@ def _enlarged(
     syncs = sorted(stage["sync"] for stage in stages)
     decisions += plan.after(syncs[1], syncs[0])
     started = time.perf_counter()
+    status_bar.begin(engine, status_bar.NETWORK, 3)
     pictures = {
         view: _upscale(engine, upscaler, job, exposure, beauties[view], guides[view])
         for view in passes.views
@@ -111,6 +116,7 @@ def _enlarged(
         seconds,
         decisions,
         peak_memory(),
+        str(upscaler.device),
     )
 
 
@@ -122,11 +128,11 @@ def _passes(
     seed = None if job.seed is None else job.seed + 1
 
     def guide() -> dict[str, Guides]:
-        engine.update_stats("XRDS", "Rendering guides")
+        status_bar.begin(engine, status_bar.GUIDES, 1 if full else 2)
         return passes.guides_by_view(job.guide_samples, full=full, seed=seed)
 
     def beauty() -> tuple[dict[str, Beauty], float | None]:
-        engine.update_stats("XRDS", "Rendering low resolution")
+        status_bar.begin(engine, status_bar.LOW, 2 if full else 1)
         low = passes.beauties(job.scale, job.samples, seed=job.seed)
         return low, job.exposure or passes.border_exposure()
 
@@ -156,7 +162,12 @@ def _facts(depsgraph: Any, job: RenderJob, passes: CyclesPasses) -> plan.Facts:
 def _upscaler(job: RenderJob) -> Upscaler:
     """The network of a job; the last one stays loaded for the next frame."""
     weights = None if job.weights is None else str(job.weights)
-    return _load(job.preset, job.scale, job.guides, job.device, weights)
+    upscaler = _load(job.preset, job.scale, job.guides, job.device, weights)
+    if job.threads is not None:
+        import torch
+
+        torch.set_num_threads(job.threads)
+    return upscaler
 
 
 @lru_cache(maxsize=1)
@@ -168,7 +179,7 @@ def _load(
     except ImportError as error:
         raise XRDSError(
             f"XRDS needs PyTorch, which Blender's Python does not find ({error}): "
-            "the add-on's preferences tell how to install it; or render plain"
+            "the add-on's preferences tell where from; or render plain"
         ) from error
     return Upscaler(preset, scale, guides, device, weights=weights)
 

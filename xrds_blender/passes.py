@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from xrds_core.errors import Cancelled
 
 from . import cycles_session
 from .borrowed import Borrowed, PipelineSettings
-from .cycles_session import Array
 from .cycles_settings import (
     set_box_filter,
     set_denoising,
@@ -27,6 +26,9 @@ from .cycles_settings import (
     set_sampling,
 )
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
+
+if TYPE_CHECKING:
+    from .cycles_session import Array
 
 ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth"
 GUIDE_PASSES = ((ALBEDO, "RGB", "COLOR"), (NORMAL, "XYZ", "VECTOR"))
