@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from . import cycles_session
+from . import cycles_session, write_lock
 
 
 class XRDSRender(bpy.types.RenderEngine):
@@ -57,9 +57,10 @@ class XRDSRender(bpy.types.RenderEngine):
         if self.is_preview:
             cycles_session.functions().render(self, depsgraph)
         else:
-            from .render import render_in
+            with write_lock.shared():
+                from .render import render_in
 
-            render_in(self, depsgraph)
+                render_in(self, depsgraph)
 
     def render_frame_finish(self) -> None:
         if self.session:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from xrds_core.errors import Cancelled, XRDSError
 
-from . import cycles_session, low_camera, plan, status_bar
+from . import cycles_session, low_camera, plan, status_bar, support
 from .borrowed import Borrowed
 from .colour import converted, to_rec709, working_space
 from .cycles_settings import set_sampling
@@ -86,8 +87,11 @@ def _enlarged(
     seconds: dict[str, float],
 ) -> Picture:
     name = depsgraph.view_layer_eval.name
+    cryptomatte = support.uses_cryptomatte(depsgraph.scene)
+    samples, of_samples = plan.guide_samples(job.guide_samples, cryptomatte)
+    job = replace(job, guide_samples=samples)
     with CyclesPasses(engine, depsgraph) as passes:
-        decisions = plan.decide(_facts(depsgraph, job, passes))
+        decisions = plan.decide(_facts(depsgraph, job, passes)) + of_samples
         beauties, guides, exposure = _passes(engine, job, passes)
     first = passes.views[0]
     stages = beauties[first].seconds, guides[first].seconds

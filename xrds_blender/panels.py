@@ -179,8 +179,10 @@ def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
 
     settings, facts = scene.xrds, _facts(scene)
     scale = facts.scale
+    cryptomatte = support.uses_cryptomatte(scene)
+    samples, _ = plan.guide_samples(settings.guide_samples, cryptomatte)
     width, height = forecast.low_size(facts.width, facts.height, scale)
-    light, guide = forecast.rays(scene.cycles.samples, settings.guide_samples, scale)
+    light, guide = forecast.rays(scene.cycles.samples, samples, scale)
     limit = machine().memory_limit
     bytes_taken = forecast.memory(
         facts.width, facts.height, settings.preset, scale, limit
@@ -189,7 +191,7 @@ def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
         ("Small Render", f"{width} × {height}, {scene.cycles.samples} spp"),
         (
             "Guides",
-            f"{facts.width} × {facts.height}, {settings.guide_samples} spp",
+            f"{facts.width} × {facts.height}, {samples} spp",
         ),
         ("Rays per Pixel", f"{light:.3g} + {guide:.3g}"),
         ("Memory", f"≤ {bytes_taken / 1e9:.1f} GB"),

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 # Mirrors and glass show other things' albedo and normals; four bounces hold them.
 GUIDE_BOUNCES = 4
+# Cryptomatte counts what covers a pixel by samples: fewer give ragged masks.
+CRYPTOMATTE_SAMPLES = 16
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,15 @@ def after(first_sync: float, second_sync: float) -> tuple[Decision, ...]:
 def guide_bounces(max_bounces: int) -> int:
     """Bounces of the guide render, never more than the scene's own."""
     return min(max_bounces, GUIDE_BOUNCES)
+
+
+def guide_samples(asked: int, cryptomatte: bool) -> tuple[int, tuple[Decision, ...]]:
+    """Samples of the guide render, and the decision where they are not those asked."""
+    if not cryptomatte or asked >= CRYPTOMATTE_SAMPLES:
+        return asked, ()
+    reason = f"Cryptomatte is on: its masks need more than the {asked} asked for"
+    told = Decision("guide samples", str(CRYPTOMATTE_SAMPLES), reason)
+    return CRYPTOMATTE_SAMPLES, (told,)
 
 
 def _denoise(facts: Facts) -> Decision:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import pytest
@@ -66,10 +67,9 @@ def test_panel_draws_every_property_it_names() -> None:
         layout = Layout()
 
     class Context:
-        scene, preferences = bpy.context.scene, bpy.context.preferences
-
-        class region:  # noqa: N801  # Blender's name
-            width = 300
+        scene = bpy.context.scene
+        region = SimpleNamespace(width=300)
+        preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
 
     status_bar.keep({**dict.fromkeys(panels.STAGE_NAMES, 0.0), "network": 12.34})
     for panel in panels.CLASSES:
