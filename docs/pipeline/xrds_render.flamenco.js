@@ -37,7 +37,7 @@ const JOB_TYPE = {
 // Run by Blender before the first frame; any exit but 0 fails the task.
 const CHECK = [
     "import bpy, sys",
-    "missing = not hasattr(bpy.types, 'XRDSRender')",
+    "missing = not bpy.types.RenderEngine.bl_rna_get_subclass_py('XRDS')",
     "other = bpy.context.scene.render.engine != 'XRDS'",
     "print('XRDS is missing' if missing else 'not set to XRDS' if other else 'XRDS')",
     "sys.exit(3 if missing or other else 0) if missing or other else None",

@@ -82,7 +82,7 @@ def test_installs_by_dropping_the_zip(window: Window) -> None:
     window.settle()
     window.shot("02_install_dialogue")
     window.click(548, 492)
-    window.wait("hasattr(bpy.types, 'XRDSRender')", 60)
+    window.wait("bpy.types.RenderEngine.bl_rna_get_subclass_py('XRDS')", 60)
     window.settle()
     window.shot("03_installed")
     assert window.ask("'bl_ext.user_default.xrds' in bpy.context.preferences.addons")
