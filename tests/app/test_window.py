@@ -43,7 +43,7 @@ def press(window: Window, entry: tuple[int, int]) -> None:
 def finished(window: Window, patience: float = 600.0) -> list[str]:
     """Wait for the end of a render; what Blender's handlers told."""
     window.wait(
-        "{'render_complete', 'render_cancel'} & {e[0] for e in EVENTS}", patience
+        "any(e[0] in ('render_complete', 'render_cancel') for e in EVENTS)", patience
     )
     window.wait("not bpy.app.is_job_running('RENDER')", 60)
     return window.ask("[e[0] for e in EVENTS]")
@@ -82,11 +82,11 @@ def test_installs_by_dropping_the_zip(window: Window) -> None:
     window.settle()
     window.shot("02_install_dialogue")
     window.click(548, 492)
-    window.wait("bpy.types.RenderEngine.bl_rna_get_subclass_py('XRDS')", 60)
+    window.wait("bpy.types.RenderEngine.bl_rna_get_subclass_py('XRDS') is not None", 60)
     window.settle()
     window.shot("03_installed")
     assert window.ask("'bl_ext.user_default.xrds' in bpy.context.preferences.addons")
-    assert not window.ask("__import__('sys').modules.get('torch')")
+    assert not window.ask("'torch' in __import__('sys').modules")
 
 
 def test_first_picture_from_the_render_menu(window: Window) -> None:
