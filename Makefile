@@ -1,4 +1,4 @@
-# make install | test | demo | extension | clean.  BPY=5.0.1 picks another Blender.
+# make install | test | test-app | demo | extension | clean.  BPY=5.0.1 picks another Blender.
 PYTHON ?= python3.11
 VENV   ?= .venv
 BPY    ?= 4.5.15
@@ -6,7 +6,10 @@ TORCH  ?= 2.13.0
 RUN    := $(VENV)/bin/python
 STAMP  := $(VENV)/.installed-bpy-$(BPY)-torch-$(TORCH)
 
-.PHONY: install test demo extension clean
+PLATFORMS ?= linux-x64 windows-x64 macos-arm64
+SUITES ?= trixie sid
+
+.PHONY: install test test-app demo extension clean
 
 install: $(STAMP)
 
@@ -23,11 +26,18 @@ test: install
 	$(RUN) -m mypy
 	$(RUN) tests/run.py
 
+# Real Blender programs out of Debian, fetched once into build/blender; needs root.
+test-app: install
+	for suite in $(SUITES); do \
+	    PYTHON=$(RUN) tests/app/fetch_blender.sh $$suite build/blender/$$suite || exit 1; \
+	done
+	$(RUN) -m pytest tests/app -s -rs
+
 demo: install
 	$(RUN) -m xrds_blender.studio.demo --out demo
 
 extension: install
-	$(RUN) extension/build.py --out dist
+	$(RUN) extension/build.py --out dist --torch $(TORCH) --platform $(PLATFORMS)
 
 clean:
 	rm -rf build dist demo *.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -1,16 +1,22 @@
-"""Build the extension's zip: manifest, a root module and one pure wheel.
+"""Build the extension's zips: one per platform and Python, and one without torch.
 
-Blender's own `extension build` makes and checks the zip; it comes with the bpy module.
+Each holds a manifest, a root module and wheels: the project's own and, but for the one
+without torch, those of PyTorch's CPU build, safetensors and OpenEXR. Blender's own
+`extension build` makes and checks them; it comes with the bpy module.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
+
+from wheels import PLATFORMS, NoCpuBuild, download, resolve, targets
 
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = "blender_manifest.toml"
@@ -18,24 +24,35 @@ PROJECT_FILES = ("pyproject.toml", "README.md", "LICENSE")
 PACKAGES = ("xrds_core", "xrds_blender")
 # They serve the making of XRDS, not rendering with it.
 LEFT_OUT = ("training", "studio", "bench", "__pycache__")
+SIZE_LIMIT = 300_000_000  # bytes; what the extension platform means to take
+# Python inside Blender, and the Blenders that have it: from, to (not included).
+PYTHONS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
+WITHOUT_TORCH = "without_torch"
 
 
-def build(out: Path) -> Path:
-    """Build the zip into the folder `out` and return its path."""
+def build(
+    out: Path, name: str, wheels: list[Path], lines: dict[str, object] | None = None
+) -> Path:
+    """Build one zip into the folder `out`; `lines` replace those of the manifest."""
+    version = tomllib.loads((ROOT / MANIFEST).read_text("utf-8"))["version"]
     with tempfile.TemporaryDirectory() as folder:
-        work = Path(folder)
-        add_on = work / "xrds"
-        _wheel(work / "source", add_on / "wheels")
-        shutil.copy(ROOT / MANIFEST, add_on)
+        add_on = Path(folder)
+        (add_on / "wheels").mkdir()
+        for wheel in wheels:
+            shutil.copy(wheel, add_on / "wheels")
+        named = [f"./wheels/{wheel.name}" for wheel in wheels]
+        (add_on / MANIFEST).write_text(_manifest({**(lines or {}), "wheels": named}))
         shutil.copy(ROOT / "LICENSE", add_on)
         shutil.copy(ROOT / "extension" / "__init__.py", add_on)
         out.mkdir(parents=True, exist_ok=True)
-        _blenders_build(add_on, out)
-    return max(out.glob("xrds-*.zip"), key=lambda path: path.stat().st_mtime)
+        path = out / f"xrds-{version}-{name}.zip"
+        _blenders_build(add_on, path)
+    return path
 
 
-def _wheel(source: Path, folder: Path) -> None:
+def own_wheel(folder: Path) -> Path:
     """Build a wheel of what renders, from a copy without the rest."""
+    source = folder / "source"
     source.mkdir()
     for name in PROJECT_FILES:
         shutil.copy(ROOT / name, source)
@@ -44,15 +61,26 @@ def _wheel(source: Path, folder: Path) -> None:
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
     options = ["--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]
     _run("-m", "pip", "wheel", *options, str(folder), str(source))
+    (wheel,) = folder.glob("xrds-*.whl")
+    return wheel
 
 
-def _blenders_build(add_on: Path, out: Path) -> None:
+def _manifest(lines: dict[str, object]) -> str:
+    """The manifest with some of its top-level lines replaced or added."""
+    head, tables, rest = (ROOT / MANIFEST).read_text("utf-8").partition("\n[")
+    kept = [line for line in head.splitlines() if line.partition(" =")[0] not in lines]
+    added = [f"{name} = {json.dumps(value)}" for name, value in lines.items()]
+    return "\n".join([*kept, *added]) + "\n" + tables + rest
+
+
+def _blenders_build(add_on: Path, path: Path) -> None:
     """Let Blender's extension tool check the folder and zip it."""
     import bpy
 
     scripts = Path(bpy.utils.resource_path("LOCAL")) / "scripts"
     tool = scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
-    _run(str(tool), "build", "--source-dir", str(add_on), "--output-dir", str(out))
+    places = ["--source-dir", str(add_on), "--output-filepath", str(path)]
+    _run(str(tool), "build", *places)
 
 
 def _run(*words: str) -> None:
@@ -63,11 +91,45 @@ def _run(*words: str) -> None:
         sys.exit(f"{' '.join(words)} failed:\n{done.stdout}{done.stderr}")
 
 
+def _with_torch(options: argparse.Namespace, own: Path) -> None:
+    """One zip for each platform and Python that the index has a CPU torch for."""
+    wanted = [f"torch=={options.torch}", "safetensors", "OpenEXR"]
+    for target in targets(options.platform, list(PYTHONS)):
+        try:
+            pins = resolve(target, wanted)
+            found = download(target, pins, options.cache / target.name)
+        except (NoCpuBuild, LookupError) as error:
+            print(f"{target.name}: no zip with torch, {error}")
+            continue
+        least, end = PYTHONS[target.python]
+        lines = {"platforms": [target.platform], "blender_version_min": least}
+        if end:
+            lines["blender_version_max"] = end
+        _tell(build(options.out, target.name, [own, *found], lines))
+
+
+def _tell(path: Path) -> None:
+    size = path.stat().st_size
+    verdict = "" if size <= SIZE_LIMIT else f", above {SIZE_LIMIT / 1e6:.0f} MB"
+    print(f"{path}  {size / 1e6:.1f} MB{verdict}", flush=True)
+
+
 def main() -> None:
     """Build into the folder named on the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=ROOT / "dist")
-    print(build(parser.parse_args().out))
+    add = parser.add_argument
+    add("--out", type=Path, default=ROOT / "dist")
+    add("--cache", type=Path, default=ROOT / "build" / "wheels", help="of downloads")
+    add("--without-torch", action="store_true", help="only the small zip")
+    add("--torch", default="2.13.0", help="its version")
+    names = {"nargs": "+", "choices": list(PLATFORMS), "default": list(PLATFORMS)}
+    add("--platform", **names)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        own = own_wheel(Path(folder))
+        _tell(build(options.out, WITHOUT_TORCH, [own]))
+        if not options.without_torch:
+            _with_torch(options, own)
 
 
 if __name__ == "__main__":

@@ -17,13 +17,22 @@ def register(package: str = __name__) -> None:
     """
     import bpy
 
-    from . import cycles_session, engine, operators, panels, preferences, properties
+    from . import (
+        cycles_session,
+        engine,
+        operators,
+        panels,
+        preferences,
+        properties,
+        write_lock,
+    )
 
     global _registered
     cycles_session.functions()
     bpy.utils.register_class(properties.XRDSSettings)
     bpy.types.Scene.xrds = bpy.props.PointerProperty(type=properties.XRDSSettings)
     bpy.utils.register_class(engine.XRDSRender)
+    write_lock.register()
     preferences.register(package)
     operators.register()
     panels.register()
@@ -34,12 +43,13 @@ def unregister() -> None:
     """Take back everything that `register` did."""
     import bpy
 
-    from . import engine, operators, panels, preferences, properties
+    from . import engine, operators, panels, preferences, properties, write_lock
 
     global _registered
     panels.unregister()
     operators.unregister()
     preferences.unregister()
+    write_lock.unregister()
     bpy.utils.unregister_class(engine.XRDSRender)
     del bpy.types.Scene.xrds
     bpy.utils.unregister_class(properties.XRDSSettings)

@@ -9,14 +9,16 @@ sync and its BVH then cost next to nothing.
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any
 
 from .clock import StageClock
 
-Array = NDArray[np.float32]
+if TYPE_CHECKING:
+    # At run time where pixels are: Blender starts faster without numpy.
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float32]
 
 
 def functions() -> Any:
@@ -128,6 +130,8 @@ def read_pass(layer: Any, name: str, view: str, size: tuple[int, int]) -> Array 
     found = layer.passes.find_by_name(name, view)
     if found is None:
         return None
+    import numpy as np
+
     width, height = size
     pixels = np.empty(width * height * found.channels, np.float32)
     found.rect.foreach_get(pixels)
@@ -136,6 +140,8 @@ def read_pass(layer: Any, name: str, view: str, size: tuple[int, int]) -> Array 
 
 def write_pass(layer: Any, name: str, view: str, pixels: Array) -> None:
     """Replace the pixels (height, width, channels), row 0 on top, of a whole pass."""
+    import numpy as np
+
     found = layer.passes.find_by_name(name, view)
     if found is not None:
         flipped = np.ascontiguousarray(pixels[::-1], dtype=np.float32)

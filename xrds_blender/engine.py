@@ -7,9 +7,7 @@ from typing import Any
 
 import bpy
 
-from . import cycles_session
-from .pass_names import GUIDE_PASSES
-from .render import render_in
+from . import cycles_session, write_lock
 
 
 class XRDSRender(bpy.types.RenderEngine):
@@ -35,7 +33,11 @@ class XRDSRender(bpy.types.RenderEngine):
         with suppress(ReferenceError):
             cycles_session.free(self)
 
+    # What renders is imported when Blender first asks for it: Blender starts faster.
+
     def update_render_passes(self, scene: Any, layer: Any) -> None:
+        from .pass_names import GUIDE_PASSES
+
         cycles = cycles_session.functions()
         cycles.register_passes(self, scene, layer)
         known = {name for name, *_ in cycles.list_render_passes(scene, layer)}
@@ -55,7 +57,10 @@ class XRDSRender(bpy.types.RenderEngine):
         if self.is_preview:
             cycles_session.functions().render(self, depsgraph)
         else:
-            render_in(self, depsgraph)
+            with write_lock.shared():
+                from .render import render_in
+
+                render_in(self, depsgraph)
 
     def render_frame_finish(self) -> None:
         if self.session:

@@ -24,9 +24,10 @@ class RenderJob:
 
     `samples` and `seed` None leave Cycles' own; `exposure` None is found in the
     picture; `weights` is a folder of presets or a file in place of the shipped;
-    `memory_limit` in bytes is the network's; `keep` names omissions of the plan that
-    are not to be made. `guide_cache` is a folder for guides beside those in memory;
-    each render of the same view adds its samples to them until they are `guide_limit`.
+    `memory_limit` in bytes and `threads` are the network's; `keep` names omissions of
+    the plan that are not to be made. `guide_cache` is a folder for guides beside those
+    in memory; each render of the same view adds its samples to them until they are
+    `guide_limit`.
     `denoiser` is one of budget.DENOISERS, None the scene's own. With `time_budget`
     (seconds a frame) or `quality` (PSNR in dB) scale, samples, guides, network and
     denoiser are chosen anew for the scene.
@@ -50,12 +51,13 @@ class RenderJob:
     denoiser: str | None = None
     time_budget: float | None = None
     quality: float | None = None
+    threads: int | None = None
 
     def __post_init__(self) -> None:
         if self.scale not in SCALES:
             known = ", ".join(map(str, SCALES))
             raise UsageError(f"scale {self.scale} is not one of {known}")
-        for name in ("samples", "guide_samples"):
+        for name in ("samples", "guide_samples", "threads"):
             value = getattr(self, name)
             if value is not None and value < 1:
                 raise UsageError(f"{name} {value} is below 1")
@@ -112,6 +114,7 @@ class RenderJob:
             time_budget=settings.time_budget if settings.use_time_budget else None,
             memory_limit=here.memory_limit,
             weights=here.weights,
+            threads=here.threads,
         )
 
 
@@ -123,8 +126,9 @@ class Picture:
     (H, W, 3) and `low_resolution` (h, w, 3) are None for a plain render. `seconds` by
     stage: total, sync, beauty, denoise, guides, network, write; Cycles does not tell
     denoising from sampling, so `beauty` holds both and `denoise` is 0. `peak_memory`
-    is the largest in bytes that the process has taken so far; `job` what was rendered,
-    as a time budget chose it.
+    is the largest in bytes that the process has taken so far; `device` is what the
+    network ran on, empty for a plain render; `job` what was rendered, as a time budget
+    chose it.
     """
 
     radiance: Array
@@ -135,4 +139,5 @@ class Picture:
     seconds: dict[str, float] = field(default_factory=dict)
     plan: tuple[Decision, ...] = ()
     peak_memory: int = 0
+    device: str = ""
     job: RenderJob | None = None

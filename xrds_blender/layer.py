@@ -11,7 +11,7 @@ import numpy as np
 
 from xrds_core.errors import Cancelled, XRDSError
 
-from . import cycles_session, low_camera, plan
+from . import cycles_session, low_camera, plan, status_bar
 from .borrowed import Borrowed
 from .colour import converted, to_rec709, working_space
 from .cycles_settings import set_denoising, set_sampling
@@ -47,12 +47,18 @@ def render_layer(
         rest = () if picked.is_plain else picture.plan  # its reason stands above
         return replace(picture, seconds=seconds, plan=(decision, *rest), job=picked)
     seconds = dict.fromkeys(STAGES, 0.0)
-    if job.is_plain:
-        picture = _plain(engine, depsgraph, job, seconds)
-    else:
-        upscaler = load_upscaler(job)  # first: missing weights are to cost no render
-        picture = _enlarged(engine, depsgraph, job, upscaler, seconds)
+    try:
+        if job.is_plain:
+            picture = _plain(engine, depsgraph, job, seconds)
+        else:
+            upscaler = load_upscaler(
+                job
+            )  # first: missing weights are to cost no render
+            picture = _enlarged(engine, depsgraph, job, upscaler, seconds)
+    finally:
+        status_bar.end()
     seconds["total"] = time.perf_counter() - start
+    status_bar.keep(seconds)
     return picture
 
 
@@ -116,6 +122,7 @@ def _enlarged(
     if syncs[0]:
         decisions += plan.after(syncs[1], syncs[0])
     started = time.perf_counter()
+    status_bar.begin(engine, status_bar.NETWORK, 3)
     pictures = {
         view: _upscale(
             engine, upscaler, job, chosen, exposure, beauties[view], guides[view]
@@ -137,6 +144,7 @@ def _enlarged(
         seconds,
         decisions,
         peak_memory(),
+        str(upscaler.device),
     )
 
 
@@ -148,13 +156,14 @@ def _passes(
     source: GuideSource,
 ) -> tuple[dict[str, Beauty], dict[str, Guides], float | None]:
     """Render both; the result then holds the guides' data passes at full size."""
+    full = job.guides == "full"
 
     def guide(low: dict[str, Beauty] | None = None) -> dict[str, Guides]:
-        engine.update_stats("XRDS", "Rendering guides")
+        status_bar.begin(engine, status_bar.GUIDES, 1 if full else 2)
         return source.guides(low)
 
     def beauty() -> tuple[dict[str, Beauty], float | None]:
-        engine.update_stats("XRDS", "Rendering low resolution")
+        status_bar.begin(engine, status_bar.LOW, 2 if full else 1)
         low = passes.beauties(
             job.scale,
             job.samples,
@@ -164,7 +173,7 @@ def _passes(
         )
         return low, job.exposure or passes.border_exposure()
 
-    if job.guides != "full":
+    if not full:
         low, exposure = beauty()
         return low, guide(low), exposure
     # Fewer samples first: noise that matters, and one sync all the same.
@@ -177,7 +186,12 @@ def _passes(
 def load_upscaler(job: RenderJob) -> Upscaler:
     """The network of a job; the last one stays loaded for the next frame."""
     weights = None if job.weights is None else str(job.weights)
-    return _load(job.preset, job.scale, job.guides, job.device, weights)
+    upscaler = _load(job.preset, job.scale, job.guides, job.device, weights)
+    if job.threads is not None:
+        import torch
+
+        torch.set_num_threads(job.threads)
+    return upscaler
 
 
 @lru_cache(maxsize=1)
@@ -189,7 +203,7 @@ def _load(
     except ImportError as error:
         raise XRDSError(
             f"XRDS needs PyTorch, which Blender's Python does not find ({error}): "
-            "the add-on's preferences tell how to install it; or render plain"
+            "the add-on's preferences tell where from; or render plain"
         ) from error
     return Upscaler(preset, scale, guides, device, weights=weights)
 

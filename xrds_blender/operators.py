@@ -77,17 +77,21 @@ def menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     animation.animation = True
 
 
+def _run_command(argv: list[str]) -> int:
+    from . import cli
+
+    return cli.main(argv)
+
+
 _command: Any = None
 
 
 def register() -> None:
     """Register the operator, its menu entries and the command."""
-    from . import cli
-
     global _command
     bpy.utils.register_class(XRDS_OT_render)
     bpy.types.TOPBAR_MT_render.append(menu)
-    _command = bpy.utils.register_cli_command("xrds", cli.main)
+    _command = bpy.utils.register_cli_command("xrds", _run_command)
 
 
 def unregister() -> None:

@@ -1,38 +1,64 @@
-"""The XRDS panel in the render properties, and Cycles' own panels beside it."""
+"""The XRDS panel in the render properties."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import textwrap
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
+from . import (
+    cycles_panels,
+    cycles_session,
+    forecast,
+    presets,
+    status_bar,
+    support,
+    torch_folder,
+)
 from .explain import Glance
 from .job import RenderJob
-from .operators import ENGINE, XRDS_OT_render
+from .operators import ENGINE
+
+CHARACTER = 6.5  # pixels that a letter takes on the average, at an interface scale of 1
+STAGE_NAMES = {
+    "sync": "Scene",
+    "beauty": "Low Resolution",
+    "guides": "Guides",
+    "network": "Network",
+    "write": "Writing",
+    "total": "Total",
+}
 
 
-class XRDS_PT_settings(bpy.types.Panel):
-    """Scale, quality and guides of the XRDS engine."""
+class _RenderPanel:
+    """Where all of them are, and for which engine."""
 
-    bl_label = "Super-Resolution"
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
-    bl_order = -1
     COMPAT_ENGINES = {ENGINE}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         return context.engine in cls.COMPAT_ENGINES
 
+
+class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
+    """Scale, quality and samples of the XRDS engine."""
+
+    bl_label = "Super-Resolution"
+    bl_order = -1
+
+    def draw_header_preset(self, context: bpy.types.Context) -> None:
+        presets.XRDS_PT_presets.draw_panel_header(self.layout)
+
     def draw(self, context: bpy.types.Context) -> None:
-        layout, settings = self.layout, context.scene.xrds
+        layout, scene = self.layout, context.scene
+        settings = scene.xrds
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.operator(XRDS_OT_render.bl_idname, icon="RENDER_STILL")
-        layout.prop(settings, "plain")
         layout.prop(settings, "use_time_budget")
         row = layout.row()
         row.active = settings.use_time_budget
@@ -41,57 +67,151 @@ class XRDS_PT_settings(bpy.types.Panel):
         column.active = not (settings.plain or settings.use_time_budget)
         column.prop(settings, "scale")
         column.prop(settings, "preset")
-        column.prop(settings, "guides")
-        column.prop(settings, "guide_samples")
-        column.prop(settings, "device")
-        for line in summary(context.scene):
-            layout.label(text=line, icon="INFO")
+        layout.prop(scene.cycles, "samples")
+        layout.prop(settings, "plain")
+        width = context.region.width / context.preferences.system.ui_scale
+        for icon, text in remarks(scene):
+            _paragraph(layout, icon, text, width)
 
 
-class XRDS_PT_advanced(bpy.types.Panel):
-    """What few scenes need."""
+class XRDS_PT_forecast(_RenderPanel, bpy.types.Panel):
+    """What the next render will do."""
 
-    bl_label = "Advanced"
+    bl_label = "What Will Be Rendered"
     bl_parent_id = "XRDS_PT_settings"
-    bl_space_type = "PROPERTIES"
-    bl_region_type = "WINDOW"
-    bl_context = "render"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return super().poll(context) and not context.scene.xrds.plain
+
+    def draw(self, context: bpy.types.Context) -> None:
+        for name, value in summary(context.scene):
+            _row(self.layout, name, value)
+
+
+class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):
+    """What is rendered at full size."""
+
+    bl_label = "Guides"
+    bl_parent_id = "XRDS_PT_settings"
     bl_options = {"DEFAULT_CLOSED"}
-    COMPAT_ENGINES = {ENGINE}
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.xrds
         layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.active = not settings.plain
+        layout.prop(settings, "guides")
+        layout.prop(settings, "guide_samples")
+
+
+class XRDS_PT_advanced(_RenderPanel, bpy.types.Panel):
+    """What few scenes need."""
+
+    bl_label = "Advanced"
+    bl_parent_id = "XRDS_PT_settings"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, settings = self.layout, context.scene.xrds
+        layout.use_property_split = True
+        layout.active = not settings.plain
+        layout.prop(settings, "device")
         layout.prop(settings, "use_exposure")
         row = layout.row()
         row.active = settings.use_exposure
         row.prop(settings, "exposure")
 
 
+class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
+    """Where the time of the last render went."""
+
+    bl_label = "Last Render"
+    bl_parent_id = "XRDS_PT_settings"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return super().poll(context) and bool(status_bar.last_seconds())
+
+    def draw(self, context: bpy.types.Context) -> None:
+        seconds = status_bar.last_seconds()
+        for stage, name in STAGE_NAMES.items():
+            if seconds[stage] > 0.0:
+                _row(self.layout, name, f"{seconds[stage]:.1f} s")
+
+
+def _row(layout: Any, name: str, value: str) -> None:
+    """A name at the left, a value at the right, as Blender's own statistics."""
+    split = layout.split(factor=0.4)
+    side = split.row()
+    side.alignment = "RIGHT"
+    side.label(text=name)
+    split.label(text=value, translate=False)
+
+
+def _paragraph(layout: Any, icon: str, text: str, width: float) -> None:
+    """Lines as long as the panel is wide: a label alone would be cut off."""
+    told = bpy.app.translations.pgettext_iface(text)
+    letters = max(int((width - 60) / CHARACTER), 20)
+    column = layout.column(align=True)
+    column.scale_y = 0.8
+    for line in textwrap.wrap(told, letters):
+        column.label(text=line, icon=icon, translate=False)
+        icon = "BLANK1"
+
+
+def remarks(scene: bpy.types.Scene) -> list[tuple[str, str]]:
+    """Icon and sentence of all that is missing or otherwise than under Cycles."""
+    if scene.xrds.plain:
+        return [("INFO", "Plain: one full-resolution Cycles render, no network")]
+    told = []
+    if not torch_folder.is_there():
+        told.append(("ERROR", "PyTorch is missing: see the add-on's preferences"))
+    if not cycles_session.has_denoiser():
+        sentence = (
+            "This Blender has no denoiser: the network gets the noisy picture. "
+            "Take more samples"
+        )
+        told.append(("INFO", sentence))
+    return told + [("INFO", sentence) for sentence in support.notes(scene)]
+
+
 _glance = Glance()
 
 
-def summary(scene: bpy.types.Scene) -> list[str]:
-    """What the render will do and leave out, one line each."""
+def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
+    """Name and value of what the render will do, take and leave out."""
+    from .preferences import machine
+
     job = RenderJob.of(scene.xrds)
     if job.is_picked:
-        return ["Scale, samples, guides, network and denoiser: chosen when rendering"]
+        return [("Settings", "chosen when rendering")]
     if job.is_plain:
-        return ["Plain: one full-resolution Cycles render, no network"]
+        return []
     facts = _glance.facts(scene, bpy.context.view_layer, job)
-    return [f"{d.decision.capitalize()}: {d.value}" for d in job.plan(facts).decisions]
+    chosen = job.plan(facts)
+    width, height = forecast.low_size(facts.width, facts.height, job.scale)
+    light, guide = forecast.rays(scene.cycles.samples, chosen.guide_samples, job.scale)
+    limit = machine().memory_limit
+    bytes_taken = forecast.memory(
+        facts.width, facts.height, job.preset, job.scale, limit
+    )
+    told = [
+        ("Small Render", f"{width} × {height}, {scene.cycles.samples} spp"),
+        ("Guides", f"{facts.width} × {facts.height}, {chosen.guide_samples} spp"),
+        ("Rays per Pixel", f"{light:.3g} + {guide:.3g}"),
+        ("Memory", f"≤ {bytes_taken / 1e9:.1f} GB"),
+    ]
+    return told + [(d.decision.capitalize(), d.value) for d in chosen.decisions]
 
 
-def _cycles_classes(base: Any = None) -> Iterator[Any]:
-    """All registered panels and menus that name Cycles."""
-    for root in (base,) if base else (bpy.types.Panel, bpy.types.Menu):
-        for found in root.__subclasses__():
-            if "CYCLES" in getattr(found, "COMPAT_ENGINES", ()):
-                yield found
-            yield from _cycles_classes(found)
-
-
-CLASSES = (XRDS_PT_settings, XRDS_PT_advanced)
+CLASSES = (
+    XRDS_PT_settings,
+    XRDS_PT_forecast,
+    XRDS_PT_guides,
+    XRDS_PT_advanced,
+    XRDS_PT_last_render,
+)
 
 
 @persistent
@@ -105,11 +225,12 @@ def _changes() -> tuple[Any, ...]:
 
 
 def register() -> None:
-    """Register the panels and show Cycles' own under XRDS, too."""
+    """Register the panels and show Cycles' own under XRDS."""
+    presets.register()
     for panel in CLASSES:
         bpy.utils.register_class(panel)
-    for found in _cycles_classes():
-        found.COMPAT_ENGINES.add(ENGINE)
+    cycles_panels.register()
+    bpy.types.STATUSBAR_HT_header.append(status_bar.draw)
     for changes in _changes():
         changes.append(_forget)
 
@@ -118,7 +239,8 @@ def unregister() -> None:
     """Take all of it back."""
     for changes in _changes():
         changes.remove(_forget)
-    for found in _cycles_classes():
-        found.COMPAT_ENGINES.discard(ENGINE)
+    bpy.types.STATUSBAR_HT_header.remove(status_bar.draw)
+    cycles_panels.unregister()
     for panel in reversed(CLASSES):
         bpy.utils.unregister_class(panel)
+    presets.unregister()

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from xrds_core.errors import Cancelled
 
 from . import cycles_session
 from .borrowed import Borrowed, PipelineSettings
-from .cycles_session import Array
 from .cycles_settings import (
     set_box_filter,
     set_denoising,
@@ -38,6 +37,9 @@ from .pass_names import (
     is_light,
 )
 from .plan import GuideRender
+
+if TYPE_CHECKING:
+    from .cycles_session import Array
 
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8

@@ -43,6 +43,8 @@ LIGHT_SHARE = 0.45
 BOUNCE_SHARE = 0.12
 # Guide samples where nothing is finer than an edge.
 CRISP_SAMPLES = 2
+# Cryptomatte counts what covers a pixel by samples: fewer give ragged masks.
+CRYPTOMATTE_SAMPLES = 16
 
 
 @dataclass(frozen=True)
@@ -156,10 +158,15 @@ def _render_guides(facts: Facts, keep: bool) -> tuple[bool, Decision]:
 
 def _samples(facts: Facts, keep: bool) -> tuple[int, Decision]:
     asked, name = facts.guide_samples, "guide samples"
+    masks = any(each.startswith("cryptomatte") for each in facts.scene.passes)
+    if masks and asked < CRYPTOMATTE_SAMPLES:
+        reason = f"Cryptomatte is on: its masks need more than the {asked} asked for"
+        told = Decision(name, str(CRYPTOMATTE_SAMPLES), reason)
+        return CRYPTOMATTE_SAMPLES, told
     fine = _fine_detail(facts.scene)
     if facts.guides == "full":
         return asked, Decision(name, str(asked), "full guides hold light, so noise")
-    if fine or keep or asked <= CRISP_SAMPLES:
+    if fine or masks or keep or asked <= CRISP_SAMPLES:
         reason = f"as asked for; the scene has {fine}" if fine else "as asked for"
         return asked, Decision(name, str(asked), reason)
     saving = _part(facts, 1 - CRISP_SAMPLES / asked)

@@ -1,14 +1,18 @@
-"""What belongs to the machine rather than to a scene: device, memory, weights."""
+"""What belongs to the machine, not to a scene: torch, device, memory, weights."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import bpy
+
+from xrds_core.errors import UsageError
+
+from . import torch_folder
+from .self_test import XRDS_OT_self_test
 
 MEBIBYTE = 1 << 20
 
@@ -22,6 +26,47 @@ class Machine:
     """Bytes that the network may add; None leaves it to the device."""
     weights: Path | None = None
     """Folder of weights files; None means the shipped ones."""
+    threads: int | None = None
+    """Of the network on the processor; None leaves it to PyTorch."""
+    torch: Path | None = None
+    """Folder that PyTorch is taken from; None means the one that Python finds."""
+
+
+# Numbers stay with their devices: a preference holds the number.
+_DEVICES = [
+    ("auto", "Automatic", "A graphics card if PyTorch finds one", 0),
+    ("cpu", "Processor", "The processor, whatever else there is", 1),
+    ("mps", "Metal", "The graphics part of an Apple chip", 2),
+]
+_MOST_CARDS = 16
+_cards: list[tuple[str, str, str, int]] = []
+
+
+def _devices(_: Any, __: Any) -> list[tuple[str, str, str, int]]:
+    """The devices to choose from; graphics cards by name once torch is loaded."""
+    torch = sys.modules.get("torch")
+    names = {0: "First graphics card"}
+    if torch is not None and torch.cuda.is_available():
+        cards = range(min(torch.cuda.device_count(), _MOST_CARDS))
+        names = {i: torch.cuda.get_device_name(i) for i in cards}
+    # Blender keeps no reference to the texts of a list made on the fly.
+    _cards[:] = [
+        (f"cuda:{i}", name, "A graphics card (CUDA or ROCm)", 10 + i)
+        for i, name in names.items()
+    ]
+    return [*_DEVICES, *_cards]
+
+
+def _apply_torch(preferences: Any, _: Any = None) -> None:
+    """Look for torch where the preferences say; what is wrong is shown below."""
+    try:
+        torch_folder.use(_path(preferences.torch))
+    except UsageError:
+        torch_folder.use(None)
+
+
+def _path(text: str) -> Path | None:
+    return Path(bpy.path.abspath(text)) if text else None
 
 
 class XRDS_Preferences(bpy.types.AddonPreferences):
@@ -29,10 +74,15 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
 
     bl_idname = __package__ or "xrds_blender"
 
-    device: bpy.props.StringProperty(
-        name="Device",
-        description="Where the network runs: auto, cpu, cuda, cuda:1, mps",
-        default="auto",
+    device: bpy.props.EnumProperty(
+        name="Device", items=_devices, description="Where the network runs"
+    )
+    threads: bpy.props.IntProperty(
+        name="Threads",
+        description="Threads of the network on the processor; 0 takes all cores",
+        default=0,
+        min=0,
+        max=1024,
     )
     memory_limit: bpy.props.IntProperty(
         name="Memory Limit",
@@ -47,15 +97,25 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
         subtype="DIR_PATH",
         default="",
     )
+    torch: bpy.props.StringProperty(
+        name="PyTorch Folder",
+        description="Folder with a PyTorch of your own, for a graphics card or a "
+        "pipeline; empty takes the one that came with XRDS",
+        subtype="DIR_PATH",
+        default="",
+        update=_apply_torch,
+    )
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        layout.prop(self, "device")
-        layout.prop(self, "memory_limit")
-        layout.prop(self, "weights")
-        for line in torch_status():
-            layout.label(text=line, icon="INFO")
+        for name in ("device", "threads", "memory_limit", "weights", "torch"):
+            layout.prop(self, name)
+        for icon, line in torch_status(_path(self.torch)):
+            layout.label(text=line, icon=icon)
+        layout.operator(XRDS_OT_self_test.bl_idname, icon="CHECKMARK")
+        for line in XRDS_OT_self_test.told:
+            layout.label(text=line)
 
 
 def machine() -> Machine:
@@ -65,27 +125,51 @@ def machine() -> Machine:
     if told is None:
         return Machine()
     return Machine(
-        device=told.device.strip() or "auto",
+        device=told.device or "auto",
         memory_limit=told.memory_limit * MEBIBYTE or None,
-        weights=Path(bpy.path.abspath(told.weights)) if told.weights else None,
+        weights=_path(told.weights),
+        threads=told.threads or None,
+        torch=_path(told.torch),
     )
 
 
-def torch_status() -> list[str]:
-    """Which PyTorch is used, or how this Blender's Python gets one."""
+def torch_status(folder: Path | None = None) -> list[tuple[str, str]]:
+    """Icon and line: which PyTorch is used and on what, or what is wrong."""
+    lines = []
+    if folder is not None:
+        try:
+            torch_folder.inspect(folder)
+        except UsageError as error:
+            lines.append(("ERROR", str(error)))
     try:
-        return [f"PyTorch {metadata.version('torch')}"]
-    except metadata.PackageNotFoundError:
-        command = f'"{sys.executable}" -m pip install torch safetensors'
-        return ["PyTorch is not there; XRDS can only render plain.", command]
+        torch = torch_folder.available()
+    except UsageError as error:
+        return [*lines, ("ERROR", str(error)), ("BLANK1", _install())]
+    lines.append(
+        ("INFO", f"PyTorch {torch.version} ({torch.build}) from {torch.folder}")
+    )
+    loaded = torch_folder.loaded()
+    if folder is not None and loaded is not None and loaded != folder:
+        lines.append(("ERROR", "Another PyTorch is in use; restart Blender to change"))
+    return lines
+
+
+def _install() -> str:
+    return torch_folder.install(Path("FOLDER"))
 
 
 def register(package: str) -> None:
     """Register the preferences under the add-on's module name."""
     XRDS_Preferences.bl_idname = package
+    bpy.utils.register_class(XRDS_OT_self_test)
     bpy.utils.register_class(XRDS_Preferences)
+    entry = bpy.context.preferences.addons.get(package)
+    if entry and entry.preferences and entry.preferences.torch:
+        _apply_torch(entry.preferences)
 
 
 def unregister() -> None:
     """Take them back."""
+    torch_folder.use(None)
     bpy.utils.unregister_class(XRDS_Preferences)
+    bpy.utils.unregister_class(XRDS_OT_self_test)

@@ -41,7 +41,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Scale", items=_SCALES, description="Enlargement along each side"
     )
     preset: EnumProperty(
-        name="Network", items=_PRESETS, description="Which network enlarges"
+        name="Quality", items=_PRESETS, description="Which network enlarges"
     )
     guides: EnumProperty(
         name="Guides", items=_GUIDES, description="What is rendered at full size"

@@ -11,8 +11,15 @@ from pathlib import Path
 
 import pytest
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "extension"))
+
+import build  # lies beside the add-on's root module
+import wheels
+from packaging.requirements import Requirement
+
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
+WHEEL = f"wheels/xrds-{MANIFEST['version']}-py3-none-any.whl"
 
 
 @pytest.fixture(scope="module")
@@ -20,32 +27,34 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("extension")
     script = ROOT / "extension" / "build.py"
     done = subprocess.run(
-        [sys.executable, script, "--out", out],
+        [sys.executable, script, "--without-torch", "--out", out],
         capture_output=True,
         text=True,
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    with zipfile.ZipFile(done.stdout.strip().splitlines()[-1]) as file:
+    (path,) = out.glob("*.zip")
+    assert path.stat().st_size < build.SIZE_LIMIT
+    with zipfile.ZipFile(path) as file:
         file.extractall(out / "zip")
     return out / "zip"
 
 
 def wheel_names(unpacked: Path) -> set[str]:
-    with zipfile.ZipFile(unpacked / MANIFEST["wheels"][0]) as wheel:
+    with zipfile.ZipFile(unpacked / WHEEL) as wheel:
         return set(wheel.namelist())
 
 
 def test_one_version_everywhere() -> None:
     told = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     assert MANIFEST["version"] == told["project"]["version"] == version("xrds")
-    assert f"xrds-{MANIFEST['version']}-" in MANIFEST["wheels"][0]
 
 
 def test_zip_holds_manifest_root_module_and_wheel(unpacked: Path) -> None:
     files = {str(p.relative_to(unpacked)) for p in unpacked.rglob("*") if p.is_file()}
-    wheel = MANIFEST["wheels"][0].removeprefix("./")
-    assert files == {"__init__.py", "LICENSE", "blender_manifest.toml", wheel}
+    assert files == {"__init__.py", "LICENSE", "blender_manifest.toml", WHEEL}
+    told = tomllib.loads((unpacked / "blender_manifest.toml").read_text("utf-8"))
+    assert told == {**MANIFEST, "wheels": [f"./{WHEEL}"]}
 
 
 def test_wheel_holds_what_renders(unpacked: Path) -> None:
@@ -53,8 +62,62 @@ def test_wheel_holds_what_renders(unpacked: Path) -> None:
     assert {"xrds_core/network.py", "xrds_blender/engine.py"} <= names
     weights = {p.name for p in (ROOT / "xrds_core" / "weights").glob("*.safetensors")}
     assert {f"xrds_core/weights/{name}" for name in weights} <= names
+    presets = "xrds_blender/shipped/presets/xrds/render"
+    assert f"{presets}/Draft.py" in names
 
 
 @pytest.mark.parametrize("folder", ["training", "studio", "bench", "tests"])
 def test_wheel_leaves_out_what_makes_xrds(unpacked: Path, folder: str) -> None:
     assert not [name for name in wheel_names(unpacked) if f"/{folder}/" in f"/{name}"]
+
+
+def target(platform: str, python: str) -> wheels.Target:
+    return wheels.targets([platform], [python])[0]
+
+
+@pytest.fixture
+def index(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[str]]:
+    """A package index: what depends on what, by name."""
+    told: dict[str, list[str]] = {}
+
+    def look_up(_: wheels.Target, wanted: Requirement) -> dict[str, object]:
+        if wanted.name not in told:
+            raise LookupError(f"no wheel of {wanted.name}")
+        return {"version": "1.0", "requires_dist": told[wanted.name]}
+
+    monkeypatch.setattr(wheels, "_look_up", look_up)
+    return told
+
+
+def test_wheels_are_those_of_the_target_and_never_numpy(
+    index: dict[str, list[str]],
+) -> None:
+    index |= {
+        "torch": ["sympy", "numpy", 'winlib; platform_system == "Windows"'],
+        "sympy": ['old; python_version < "3.12"', "torch", 'more; extra == "more"'],
+        "winlib": [],
+        "old": [],
+    }
+    found = wheels.resolve(target("windows-x64", "3.13"), ["torch"])
+    assert found == ["sympy==1.0", "torch==1.0", "winlib==1.0"]
+    found = wheels.resolve(target("linux-x64", "3.11"), ["torch"])
+    assert found == ["old==1.0", "sympy==1.0", "torch==1.0"]
+
+
+def test_a_build_for_graphics_cards_is_no_cpu_build(
+    index: dict[str, list[str]],
+) -> None:
+    index["torch"] = ['nvidia-cudnn-cu12; platform_system == "Linux"']
+    with pytest.raises(wheels.NoCpuBuild, match="linux_x64-cp313 wants nvidia"):
+        wheels.resolve(target("linux-x64", "3.13"), ["torch"])
+    assert wheels.resolve(target("macos-arm64", "3.13"), ["torch"]) == ["torch==1.0"]
+    with pytest.raises(LookupError, match="no wheel of jax"):
+        wheels.resolve(target("linux-x64", "3.13"), ["jax"])
+
+
+def test_a_manifest_takes_lines_above_its_tables() -> None:
+    text = build._manifest({"platforms": ["linux-x64"], "wheels": ["./wheels/a.whl"]})
+    told = tomllib.loads(text)
+    assert told["platforms"] == ["linux-x64"]
+    assert told["wheels"] == ["./wheels/a.whl"]
+    assert told["permissions"] == MANIFEST["permissions"]

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import bpy
 import pytest
 
 import xrds_blender
-from xrds_blender import operators, panels, preferences
+from xrds_blender import (
+    cycles_panels,
+    operators,
+    panels,
+    preferences,
+    status_bar,
+    torch_folder,
+)
 from xrds_blender.job import RenderJob
 
 
@@ -19,7 +27,7 @@ def registered() -> None:
 
 
 def test_cycles_panels_show_under_xrds() -> None:
-    found = list(panels._cycles_classes())
+    found = list(cycles_panels.cycles_classes())
     assert len(found) > 100
     assert all("XRDS" in panel.COMPAT_ENGINES for panel in found)
 
@@ -27,7 +35,7 @@ def test_cycles_panels_show_under_xrds() -> None:
 def test_unregister_takes_everything_back() -> None:
     xrds_blender.unregister()
     try:
-        found = list(panels._cycles_classes())
+        found = list(cycles_panels.cycles_classes())
         assert not [p for p in found if "XRDS" in p.COMPAT_ENGINES]
         assert not hasattr(bpy.types, "XRDS_PT_settings")
         assert not hasattr(bpy.types.Scene, "xrds")
@@ -47,27 +55,30 @@ def test_panel_draws_every_property_it_names() -> None:
             assert name in owner.bl_rna.properties
             self.drawn.append(name)
 
-        def operator(self, name: str, **_: object) -> None:
-            self.drawn.append(name)
+        def label(self, text: str, **_: object) -> None:
+            self.drawn.append(text)
 
-        def label(self, **_: object) -> None:
-            pass
-
-        def column(self) -> Layout:
+        def column(self, **_: object) -> Layout:
             return self
 
-        row = column
+        row = split = column
 
     class Drawn:
         layout = Layout()
 
-    drawn = Drawn()
-    panels.XRDS_PT_settings.draw(drawn, bpy.context)
-    panels.XRDS_PT_advanced.draw(drawn, bpy.context)
-    assert {"xrds.render", "scale", "preset", "guide_samples", "guides", "device"} <= (
-        set(drawn.layout.drawn)
-    )
-    assert {"use_exposure", "exposure"} <= set(drawn.layout.drawn)
+    class Context:
+        scene = bpy.context.scene
+        region = SimpleNamespace(width=300)
+        preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+
+    status_bar.keep({**dict.fromkeys(panels.STAGE_NAMES, 0.0), "network": 12.34})
+    for panel in panels.CLASSES:
+        panel.draw(Drawn, Context)
+    drawn = set(Drawn.layout.drawn)
+    assert {"scale", "preset", "samples", "guide_samples", "guides"} <= drawn
+    assert {"device", "use_exposure", "exposure", "plain"} <= drawn
+    assert {"12.3 s", "960 × 540, 4096 spp"} <= drawn
+    assert "0.0 s" not in drawn
 
 
 @pytest.mark.parametrize(("scale", "low"), [("2", "683x384"), ("8", "171x96")])
@@ -76,10 +87,22 @@ def test_summary_tells_the_low_size(scale: str, low: str) -> None:
     scene.render.resolution_x, scene.render.resolution_y = 1366, 768
     scene.render.resolution_percentage = 100
     scene.xrds.scale = scale
-    assert f"Low frame: {low}" in panels.summary(scene)
-    assert "Guide bounces: 0" in panels.summary(scene)
+    told = dict(panels.summary(scene))
+    assert told["Small Render"].startswith(low.replace("x", " × "))
+    assert told["Guide bounces"] == "0"
     scene.xrds.plain = True
-    assert "no network" in panels.summary(scene)[0]
+    assert "no network" in panels.remarks(scene)[0][1]
+
+
+def test_panel_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = bpy.context.scene
+    assert panels.remarks(scene) == []
+    monkeypatch.setattr(torch_folder, "is_there", lambda: False)
+    monkeypatch.setattr(panels.cycles_session, "has_denoiser", lambda: False)
+    scene.view_layers[0].use_pass_glossy_direct = True
+    told = " ".join(text for _, text in panels.remarks(scene))
+    for word in ("PyTorch is missing", "no denoiser", "Light passes"):
+        assert word in told
 
 
 def test_operator_needs_a_camera() -> None:
@@ -118,11 +141,67 @@ def test_operator_keeps_the_engine() -> None:
     assert scene.render.engine == "CYCLES"
 
 
-def test_preferences_tell_how_to_get_torch(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert preferences.torch_status()[0].startswith("PyTorch 2.")
+def test_every_shipped_preset_sets_what_a_saved_one_would(tmp_path: Path) -> None:
+    from xrds_blender import presets
 
-    def missing(name: str) -> str:
-        raise preferences.metadata.PackageNotFoundError(name)
+    shipped = sorted((presets.SHIPPED / "presets" / presets.FOLDER).glob("*.py"))
+    assert len(shipped) == 3
+    assert any(path.endswith(presets.FOLDER) for path in preset_folders())
+    for path in shipped:
+        text = path.read_text()
+        assert all(
+            f"{name} = " in text for name in presets.XRDS_OT_preset_add.preset_values
+        )
+        told = bpy.ops.script.execute_preset(
+            filepath=str(path), menu_idname="XRDS_PT_presets"
+        )
+        assert told == {"FINISHED"}
+        assert f"scene.cycles.samples = {bpy.context.scene.cycles.samples}" in text
 
-    monkeypatch.setattr(preferences.metadata, "version", missing)
-    assert preferences.torch_status()[1].endswith("-m pip install torch safetensors")
+
+def preset_folders() -> list[str]:
+    from xrds_blender import presets
+
+    return bpy.utils.preset_paths(presets.FOLDER)
+
+
+def test_self_test_renders_and_leaves_nothing() -> None:
+    kinds = ("scenes", "objects", "meshes", "lights", "cameras", "worlds")
+    before = {kind: len(getattr(bpy.data, kind)) for kind in kinds}
+    assert bpy.ops.xrds.self_test() == {"FINISHED"}
+    assert {kind: len(getattr(bpy.data, kind)) for kind in kinds} == before
+    works, seconds, versions = preferences.XRDS_OT_self_test.told
+    assert works == "XRDS works: 64 x 64 pixels on cpu"
+    assert "network" in seconds
+    assert f"Blender {bpy.app.version_string}" in versions
+
+
+def test_self_test_tells_what_is_wrong(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = preferences.Machine(weights=tmp_path)
+    monkeypatch.setattr(preferences, "machine", lambda: here)
+    with pytest.raises(RuntimeError, match="no weights"):
+        bpy.ops.xrds.self_test()
+    assert preferences.XRDS_OT_self_test.told[0].startswith("Failed: no weights")
+
+
+def test_status_bar_tells_the_stage() -> None:
+    told: list[str] = []
+
+    class Bar:
+        class layout:  # noqa: N801  # Blender's name
+            @staticmethod
+            def label(text: str) -> None:
+                told.append(text)
+
+    class Engine:
+        update_stats = staticmethod(lambda *_: None)
+        update_progress = staticmethod(lambda _: None)
+
+    status_bar.draw(Bar, None)
+    status_bar.begin(Engine, status_bar.GUIDES, 2)
+    status_bar.draw(Bar, None)
+    status_bar.end()
+    status_bar.draw(Bar, None)
+    assert told == ["XRDS 2/3: Guides"]

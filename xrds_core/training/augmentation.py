@@ -1,8 +1,9 @@
 """How crops are varied, so that few renders stand for many.
 
-After OIDN's own training (github.com/RenderKit/oidn, training/dataset.py, 2026): colours
-permuted, pictures flipped and transposed, light left out. OIDN permutes the channels of
-normals; here they turn with the picture, as vectors do, and now and then at random.
+After OIDN's own training (github.com/RenderKit/oidn, training/dataset.py, 2026):
+colours permuted, pictures flipped and transposed, light left out. OIDN permutes the
+channels of normals; here they turn with the picture, as vectors do, and now and then at
+random.
 """
 
 from __future__ import annotations

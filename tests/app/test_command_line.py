@@ -1,0 +1,176 @@
+"""The extension in a real Blender without a window: install, start, use, remove."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from program import Program
+
+pytestmark = pytest.mark.timeout(1200)
+MODULE = "bl_ext.user_default.xrds"
+ENGINE = "bpy.types.RenderEngine.bl_rna_get_subclass_py('XRDS')"
+NOISE = ("Warning", "Error", "Traceback", "Exception")
+
+
+@pytest.fixture(scope="module")
+def bare(program: Program) -> Iterator[Program]:
+    """The program with a home of its own, so that the window's is left alone."""
+    share = program.share / "command_line"
+    shutil.rmtree(share, ignore_errors=True)
+    (share / "home").mkdir(parents=True)
+    for path in program.share.glob("*.zip"):
+        shutil.copy(path, share)
+    yield replace(program, share=share)
+    shutil.rmtree(share / "home", ignore_errors=True)
+
+
+def zip_in(program: Program) -> str:
+    (path,) = program.share.glob("*.zip")
+    return program.seen(path)
+
+
+def extension(program: Program, *words: str) -> str:
+    done = program.run("blender", "--command", "extension", *words)
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def python(program: Program, code: str, timeout: float = 600.0) -> str:
+    """What Blender prints while it runs `code` in the background."""
+    script = program.share / "script.py"
+    script.write_text(code)
+    done = program.run(
+        "blender",
+        "-b",
+        "--python-exit-code",
+        "3",
+        "--python",
+        program.seen(script),
+        timeout=timeout,
+    )
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def told(text: str, key: str) -> str:
+    return next(
+        line.partition("=")[2] for line in text.splitlines() if line.startswith(key)
+    )
+
+
+def files(folder: Path) -> set[str]:
+    return {
+        str(path.relative_to(folder))
+        for path in folder.rglob("*")
+        if path.is_file() and "xrds" in str(path.relative_to(folder))
+    }
+
+
+def test_validate_is_clean(bare: Program) -> None:
+    text = extension(bare, "validate", zip_in(bare))
+    assert not [word for word in NOISE if word in text]
+
+
+def test_installs_and_enables_without_a_word(bare: Program) -> None:
+    text = extension(bare, "install-file", "-r", "user_default", "-e", zip_in(bare))
+    assert not [word for word in NOISE if word in text], text
+    assert files(bare.share / "home")
+
+
+def test_start_is_quiet_and_quick_and_loads_no_torch(bare: Program) -> None:
+    code = f"""
+import sys, time, addon_utils
+print("torch=%d" % ("torch" in sys.modules))
+import bpy
+assert {ENGINE}
+addon_utils.disable({MODULE!r})
+start = time.process_time()
+addon_utils.enable({MODULE!r})
+print("milliseconds=%.1f" % (1e3 * (time.process_time() - start)))
+"""
+    times = []
+    for _ in range(5):
+        text = python(bare, code)
+        assert told(text, "torch") == "0"
+        assert not [
+            w for w in NOISE if w in text.replace("WARNING Could not get a", "")
+        ]
+        times.append(float(told(text, "milliseconds")))
+    print("start-up in milliseconds:", times)
+    assert min(times) < 20.0
+
+
+def test_survives_reloads_and_factory_settings(bare: Program) -> None:
+    code = f"""
+import bpy, addon_utils
+for _ in range(2):
+    addon_utils.disable({MODULE!r}); addon_utils.enable({MODULE!r})
+addon_utils.enable({MODULE!r})  # twice, without a disable
+bpy.ops.script.reload()
+assert bpy.context.scene.xrds.scale == "2"
+bpy.ops.wm.read_factory_settings()
+assert not hasattr(bpy.types.Scene, "xrds")
+addon_utils.enable({MODULE!r})
+bpy.context.scene.render.engine = "XRDS"
+addon_utils.disable({MODULE!r})
+import sys
+assert not [name for name in sys.modules if name.startswith(("xrds_", "torch"))]
+assert not [name for name in dir(bpy.types) if name.startswith("XRDS")]
+assert not [h for h in bpy.app.handlers.render_init if "xrds" in h.__module__]
+found = [c for k in (bpy.types.Panel, bpy.types.Menu) for c in k.__subclasses__()]
+left = [c for c in found if "XRDS" in getattr(c, "COMPAT_ENGINES", ())]
+assert not [c for c in left if c.is_registered]
+print("all=well")
+"""
+    text = python(bare, code)
+    assert told(text, "all") == "well"
+    assert not [w for w in ("Traceback", "Error") if w in text], text
+
+
+def test_self_test_tells_device_seconds_versions(bare: Program) -> None:
+    text = python(bare, "import bpy; bpy.ops.xrds.self_test()")
+    assert "XRDS works: 64 x 64 pixels on cpu" in text
+    assert "PyTorch" in text
+
+
+def test_a_farm_can_ask_whether_the_engine_is_there(bare: Program) -> None:
+    """The line of docs/pipeline.md ends with success here, and not without XRDS."""
+    line = f"import bpy, sys; {ENGINE} or sys.exit(3)"
+    words = ("blender", "-b", "--python-exit-code", "3", "--python-expr", line)
+    assert bare.run(*words).returncode == 0
+    without = ("blender", "-b", "--factory-startup", *words[2:])
+    assert bare.run(*without).returncode == 3
+
+
+def test_without_torch_it_loads_and_says_what_is_missing(bare: Program) -> None:
+    code = """
+import sys
+class Without:
+    def find_spec(self, name, *_):
+        if name.partition(".")[0] == "torch":
+            raise ModuleNotFoundError("No module named 'torch'", name="torch")
+sys.meta_path.insert(0, Without())
+import bpy
+bpy.context.scene.render.engine = "XRDS"
+try:
+    bpy.ops.render.render()
+except RuntimeError as error:
+    print("error=" + str(error).strip())
+"""
+    script = bare.share / "without.py"
+    script.write_text(code)
+    done = bare.run("blender", "-b", "--python", bare.seen(script))
+    error = told(done.stdout, "error")
+    assert "XRDS needs PyTorch" in error
+    assert "preferences tell where from" in error
+
+
+def test_uninstalls_without_residue(bare: Program) -> None:
+    extension(bare, "remove", "xrds")
+    assert not files(bare.share / "home")
+    text = python(bare, f"import bpy; print('there=%s' % {ENGINE})")
+    assert told(text, "there") == "None"

@@ -1,0 +1,257 @@
+"""The real window: clicks, keys and what is then seen. In order, as a user goes on.
+
+Every test ends with a screenshot under build/app/PROGRAM/shots, to be looked at.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from program import Window
+
+pytestmark = pytest.mark.timeout(1800)
+
+RENDER_MENU = (129, 34)
+RENDER_IMAGE, RENDER_ANIMATION = (175, 56), (175, 78)
+RENDER_WITH_XRDS = (190, 204)
+SIZE = (96, 64)
+
+
+def small_scene(window: Window, samples: int) -> None:
+    window.ask(
+        f"""
+scene = bpy.data.scenes[0]
+scene.render.resolution_x, scene.render.resolution_y = {SIZE}
+scene.cycles.samples = {samples}
+bpy.context.preferences.view.render_display_type = 'NONE'
+EVENTS.clear()
+"""
+    )
+
+
+def press(window: Window, entry: tuple[int, int]) -> None:
+    """Open the Render menu and press an entry."""
+    window.click(*RENDER_MENU)
+    time.sleep(2.0)
+    window.click(*entry)
+
+
+def finished(window: Window, patience: float = 600.0) -> list[str]:
+    """Wait for the end of a render; what Blender's handlers told."""
+    window.wait(
+        "any(e[0] in ('render_complete', 'render_cancel') for e in EVENTS)", patience
+    )
+    window.wait("not bpy.app.is_job_running('RENDER')", 60)
+    return window.ask("[e[0] for e in EVENTS]")
+
+
+def result(window: Window, name: str) -> np.ndarray:
+    """What the Render Result shows, (height, width, 3) of bytes."""
+    image = pytest.importorskip("PIL.Image")
+    path = window.program.share / name
+    seen = window.program.seen(path)
+    window.ask(f"bpy.data.images['Render Result'].save_render({seen!r})")
+    return np.asarray(image.open(path).convert("RGB")).astype(np.float32)
+
+
+def settings(window: Window) -> Any:
+    return window.ask(
+        """
+s = bpy.data.scenes[0]
+names = ('samples', 'max_bounces', 'diffuse_bounces', 'pixel_filter_type',
+         'use_denoising', 'use_adaptive_sampling')
+camera = s.camera.data
+([getattr(s.cycles, n) for n in names], s.render.engine, s.render.resolution_x,
+ s.render.resolution_percentage, s.render.use_persistent_data, camera.sensor_width,
+ camera.shift_x)
+"""
+    )
+
+
+def test_installs_by_dropping_the_zip(window: Window) -> None:
+    window.shot("01_first_start")
+    window.move(400, 620)
+    window.key("Escape")  # the splash screen
+    (path,) = window.program.share.glob("*.zip")
+    window.open_drag_source(path)
+    window.drag((120, 740), (610, 400))
+    window.settle()
+    window.shot("02_install_dialogue")
+    window.click(548, 492)
+    window.wait("bpy.types.RenderEngine.bl_rna_get_subclass_py('XRDS') is not None", 60)
+    window.settle()
+    window.shot("03_installed")
+    assert window.ask("'bl_ext.user_default.xrds' in bpy.context.preferences.addons")
+    assert not window.ask("'torch' in __import__('sys').modules")
+
+
+def test_first_picture_from_the_render_menu(window: Window) -> None:
+    small_scene(window, 16)
+    engine = window.ask("bpy.data.scenes[0].render.engine")
+    window.click(*RENDER_MENU)
+    window.settle()
+    window.shot("04_render_menu")
+    window.click(*RENDER_WITH_XRDS)
+    assert finished(window) == ["render_init", "render_complete"]
+    picture = result(window, "first.png")
+    assert picture.shape == (64, 96, 3)
+    parts = [half for row in np.split(picture, 2) for half in np.split(row, 2, axis=1)]
+    assert min(part.std() for part in parts) > 1.0  # not in one corner alone
+    window.wait(f"bpy.data.scenes[0].render.engine == {engine!r}", 20)
+
+
+def test_scripts_may_write_after_a_render(window: Window) -> None:
+    """Blender's guard against writes while drawing is open again."""
+    window.ask("bpy.data.scenes[0].frame_end = 3")
+    assert window.ask("bpy.data.scenes[0].frame_end") == 3
+
+
+def test_the_engine_is_chosen_in_the_render_properties(window: Window) -> None:
+    left, top, _, _ = window.region("PROPERTIES", "NAVIGATION_BAR")
+    window.click(left + 17, top + 59)
+    window.wait(
+        "any(a.spaces.active.context == 'RENDER' for a in window.screen.areas "
+        "if a.type == 'PROPERTIES')",
+        30,
+    )
+    window.settle()
+    left, top, width, _ = window.region("PROPERTIES", "WINDOW")
+    menu = left + width * 2 // 3, top + 57
+    window.click(*menu)
+    window.settle()
+    window.shot("05_engines")
+    window.key("x")  # the only engine with this letter first
+    window.settle()
+    if window.ask("bpy.data.scenes[0].render.engine") != "XRDS":
+        window.key("Return")
+        window.settle()
+    window.move(400, 620)
+    window.settle()
+    window.shot("06_panel")
+    assert window.ask("bpy.data.scenes[0].render.engine") == "XRDS"
+
+
+def test_render_image_under_the_engine(window: Window) -> None:
+    small_scene(window, 8)
+    before = settings(window)
+    press(window, RENDER_IMAGE)
+    assert finished(window) == ["render_init", "render_complete"]
+    assert settings(window) == before
+    window.settle()
+    window.shot("07_after_render")
+
+
+def test_escape_cancels_at_once(window: Window) -> None:
+    small_scene(window, 100_000)
+    window.ask("bpy.data.scenes[0].cycles.use_adaptive_sampling = False")
+    before = settings(window)
+    press(window, RENDER_IMAGE)
+    window.wait("bpy.app.is_job_running('RENDER')", 60)
+    time.sleep(5.0)
+    window.shot("08_rendering")
+    start = window.ask("__import__('time').time()")
+    window.move(400, 620)
+    window.key("Escape")
+    assert finished(window)[-1] == "render_cancel"
+    took = window.ask("EVENTS[-1][1]") - start
+    print(f"cancelled after {took:.1f} s, the drawing of the window included")
+    assert settings(window) == before
+    window.settle()
+    window.shot("09_cancelled")
+
+
+def test_an_animation_of_three_frames(window: Window) -> None:
+    small_scene(window, 4)
+    folder = window.program.share / "frames"
+    seen = window.program.seen(folder)
+    window.ask(
+        f"""
+scene = bpy.data.scenes[0]
+scene.frame_start, scene.frame_end = 1, 3
+scene.render.filepath = {seen!r} + '/'
+cube = bpy.data.objects['Cube']
+for frame in (1, 3):
+    cube.location.x = frame - 2
+    cube.keyframe_insert('location', frame=frame)
+"""
+    )
+    press(window, RENDER_ANIMATION)
+    assert finished(window).count("render_complete") == 1
+    frames = sorted(folder.iterdir())
+    assert [path.stem for path in frames] == ["0001", "0002", "0003"]
+    assert len({path.read_bytes() for path in frames}) == 3
+
+
+def test_the_compositors_result_is_saved(window: Window) -> None:
+    small_scene(window, 4)
+    press(window, RENDER_IMAGE)
+    finished(window)
+    plain = result(window, "plain.png")
+    window.ask(COMPOSITOR)
+    small_scene(window, 4)
+    press(window, RENDER_IMAGE)
+    finished(window)
+    mirrored = result(window, "mirrored.png")
+    assert np.abs(mirrored[:, ::-1] - plain).mean() < 2.0
+    assert np.abs(mirrored - plain).mean() > 4.0
+
+
+COMPOSITOR = """
+scene = bpy.data.scenes[0]
+if bpy.app.version >= (5, 0):
+    tree = bpy.data.node_groups.new('graph', 'CompositorNodeTree')
+    scene.compositing_node_group = tree
+    tree.interface.new_socket('Image', in_out='OUTPUT', socket_type='NodeSocketColor')
+    end = tree.nodes.new('NodeGroupOutput')
+else:
+    scene.use_nodes = True
+    tree = scene.node_tree
+    tree.nodes.clear()
+    end = tree.nodes.new('CompositorNodeComposite')
+flip = tree.nodes.new('CompositorNodeFlip')
+if 'Flip X' in flip.inputs:
+    flip.inputs['Flip X'].default_value = True
+    flip.inputs['Flip Y'].default_value = False
+layers = tree.nodes.new('CompositorNodeRLayers')
+tree.links.new(layers.outputs['Image'], flip.inputs[0])
+tree.links.new(flip.outputs[0], end.inputs[0])
+"""
+
+
+@pytest.mark.parametrize("shading", ["MATERIAL", "RENDERED"])
+def test_the_viewport_shades_as_under_cycles(window: Window, shading: str) -> None:
+    """Switched by the program's own setting; looked at in the screenshots."""
+    window.ask(
+        f"""
+view = next(a for a in window.screen.areas if a.type == 'VIEW_3D').spaces.active
+view.shading.type = {shading!r}
+"""
+    )
+    time.sleep(15.0)
+    window.settle()
+    path = window.shot(f"10_viewport_{shading.lower()}")
+    window.ask(
+        """
+view = next(a for a in window.screen.areas if a.type == 'VIEW_3D').spaces.active
+view.shading.type = 'SOLID'
+"""
+    )
+    image = pytest.importorskip("PIL.Image")
+    seen = np.asarray(image.open(path).convert("L"))[150:650, 100:900]
+    assert seen.std() > 4.0
+    assert "Traceback" not in window.log
+
+
+def test_nothing_went_wrong_on_the_way(window: Window) -> None:
+    window.ask("__import__('sys').stdout.flush()")
+    for word in ("Traceback", "AttributeError", "Error: "):
+        assert word not in window.log
+
+
+def test_screenshots_are_kept(window: Window) -> None:
+    assert len(window.shots) >= 10
+    assert all(isinstance(path, Path) and path.stat().st_size for path in window.shots)

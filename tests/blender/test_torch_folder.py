@@ -1,0 +1,89 @@
+"""Which PyTorch is taken: a folder is judged by its files, before any is loaded."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from importlib.machinery import EXTENSION_SUFFIXES
+from pathlib import Path
+
+import pytest
+
+from xrds_blender import torch_folder
+from xrds_core.errors import UsageError
+
+VERSION = "from typing import Optional\n__version__ = '2.9.1+cu128'\n"
+CUDA = VERSION + "cuda: Optional[str] = '12.8'\nhip: Optional[str] = None\n"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """What `pip install --target` leaves, as far as it is looked at."""
+    for name in torch_folder.NEEDED:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").touch()
+    (tmp_path / "torch" / "version.py").write_text(CUDA)
+    (tmp_path / "torch" / f"_C{EXTENSION_SUFFIXES[0]}").touch()
+    return tmp_path
+
+
+def test_a_folder_tells_version_and_build(folder: Path) -> None:
+    found = torch_folder.inspect(folder)
+    assert found == torch_folder.Torch("2.9.1+cu128", "CUDA 12.8", folder)
+    (folder / "torch" / "version.py").write_text("__version__ = '2.13.0'\ncuda = None")
+    assert torch_folder.inspect(folder).build == "CPU"
+
+
+def test_another_python_or_platform_is_refused(folder: Path) -> None:
+    binary = folder / "torch" / f"_C{EXTENSION_SUFFIXES[0]}"
+    binary.rename(folder / "torch" / "_C.cp39-win_amd64.pyd")
+    before = list(sys.path)
+    with pytest.raises(UsageError, match=r"_C.cp39-win_amd64.pyd.*this Blender needs"):
+        torch_folder.use(folder)
+    assert sys.path == before
+
+
+def test_an_empty_folder_tells_how_to_fill_it(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"holds no torch; fill it with pip install"):
+        torch_folder.inspect(tmp_path)
+
+
+def test_a_folder_goes_first_and_is_forgotten_again(folder: Path) -> None:
+    """In a process of its own: here torch may be loaded already."""
+    code = f"""
+import sys
+from pathlib import Path
+from xrds_blender import torch_folder
+before = list(sys.path)
+torch_folder.use(Path({str(folder)!r}))
+assert torch_folder.available().version == '2.9.1+cu128'
+assert torch_folder.is_there() and torch_folder.loaded() is None
+import numpy
+assert {str(folder)!r} not in numpy.__file__
+torch_folder.use(None)
+assert sys.path == before
+assert torch_folder.available().version != '2.9.1+cu128'
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_missing_torch_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch_folder, "loaded", lambda: None)
+    monkeypatch.setattr(torch_folder, "_where", lambda name: None)
+    assert not torch_folder.is_there()
+    with pytest.raises(UsageError, match="torch is not there"):
+        torch_folder.available()
+
+
+def test_preferences_show_what_is_used(folder: Path) -> None:
+    from xrds_blender import preferences
+
+    (icon, line) = preferences.torch_status()[0]
+    assert icon == "INFO"
+    assert line.startswith("PyTorch 2.")
+    wrong = preferences.torch_status(folder / "nowhere")
+    assert wrong[0][0] == "ERROR"
+    assert "holds no torch" in wrong[0][1]

@@ -1,0 +1,116 @@
+"""The farm examples of docs/pipeline.md, read by what reads them on a farm."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "pipeline"
+TEMPLATE = EXAMPLES / "xrds_render.template.yaml"
+OPENJD = str(Path(sys.executable).with_name("openjd"))
+# What Flamenco's Manager gives a job type: chunks of frames, tasks, commands.
+FLAMENCO = """
+const author = {
+    Task: (name, type) => ({ name, type, commands: [],
+        addCommand(command) { this.commands.push(command); } }),
+    Command: (name, parameters) => ({ name, parameters }),
+};
+function frameChunker(frames, size) {
+    const all = [];
+    for (const part of frames.split(",")) {
+        const [first, last = first] = part.trim().split("-").map(Number);
+        for (let frame = first; frame <= last; frame++) all.push(frame);
+    }
+    const chunks = [];
+    for (let i = 0; i < all.length; i += size) {
+        const chunk = all.slice(i, i + size);
+        const range = chunk.length > 1 && chunk.at(-1) - chunk[0] === chunk.length - 1;
+        chunks.push(range ? `${chunk[0]}-${chunk.at(-1)}` : chunk.join(","));
+    }
+    return chunks;
+}
+"""
+
+
+def test_open_job_description_accepts_the_template() -> None:
+    pytest.importorskip("openjd.cli")
+    command = [OPENJD, "check", str(TEMPLATE)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "passes validation" in done.stdout
+
+
+@pytest.fixture(scope="module")
+def tasks() -> list[dict[str, Any]]:
+    """The tasks that the Flamenco job type makes of seven frames in chunks of three."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("no node to run the job type with")
+    settings = {
+        "frames": "1-3, 7-10",
+        "chunk_size": 3,
+        "blendfile": "/shots/a.blend",
+        "render_output_path": "/out/######",
+        "format": "OPEN_EXR",
+    }
+    source = (EXAMPLES / "xrds_render.flamenco.js").read_text()
+    asks = f"""
+const tasks = [];
+compileJob({{ settings: {json.dumps(settings)}, addTask: (task) => tasks.push(task) }});
+console.log(JSON.stringify({{ tasks, type: JOB_TYPE }}));
+"""
+    script = FLAMENCO + source + asks
+    done = subprocess.run(
+        [node, "-e", script], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    keys = {setting["key"] for setting in told["type"]["settings"]}
+    assert settings.keys() <= keys
+    return told["tasks"]  # type: ignore[no-any-return]
+
+
+def test_flamenco_renders_every_chunk(tasks: list[dict[str, Any]]) -> None:
+    assert [task["name"] for task in tasks] == ["render-1-3", "render-7-9", "render-10"]
+    (command,) = tasks[1]["commands"]
+    args = command["parameters"]["args"]
+    assert command["name"] == "blender-render"
+    assert args[-2:] == ["--render-frame", "7..9"]
+    assert args[args.index("--render-output") + 1] == "/out/######"
+
+
+def test_flamenco_asks_for_the_engine_before_it_renders(
+    tasks: list[dict[str, Any]],
+) -> None:
+    """The check is Python that ends with status 3 without XRDS, and goes on with it."""
+    args = tasks[0]["commands"][0]["parameters"]["args"]
+    check = args[args.index("--python-expr") + 1]
+    assert args.index("--python-exit-code") < args.index("--python-expr")
+    assert args.index("--python-expr") < args.index("--render-frame")
+    for engine, there, status in (
+        ("XRDS", True, 0),
+        ("BLENDER_EEVEE", True, 3),
+        ("XRDS", False, 3),
+    ):
+        assert status_of(check, engine, there) == status
+
+
+def status_of(check: str, engine: str, there: bool) -> int:
+    code = f"""
+import sys
+from types import SimpleNamespace as N
+types = N(RenderEngine=N(bl_rna_get_subclass_py=lambda name: {there}))
+scene = N(render=N(engine={engine!r}))
+sys.modules["bpy"] = N(types=types, context=N(scene=scene))
+exec({check!r})
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], check=False, capture_output=True
+    )
+    return done.returncode

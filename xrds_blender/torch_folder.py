@@ -1,0 +1,134 @@
+"""Which PyTorch renders: the bundled one, Python's own, or that of a folder.
+
+The folder is one that `pip install --target FOLDER torch safetensors` filled. Nothing
+here imports torch: a folder is judged by its files, before anything of it is loaded.
+"""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import sys
+from dataclasses import dataclass
+from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
+from pathlib import Path
+
+from xrds_core.errors import UsageError
+
+NEEDED = ("torch", "safetensors")
+
+
+@dataclass(frozen=True)
+class Torch:
+    """A PyTorch on disk: its version, what it was built for, and where it lies."""
+
+    version: str
+    build: str
+    folder: Path
+
+
+def inspect(folder: Path) -> Torch:
+    """Describe the PyTorch in `folder`.
+
+    Raises UsageError where there is none, or none for this Python and platform.
+    """
+    package = folder / "torch"
+    if not (package / "version.py").is_file():
+        raise UsageError(f"{folder} holds no torch; fill it with {install(folder)}")
+    fitting = f"_C{EXTENSION_SUFFIXES[0]}"
+    found = sorted(path.name for path in package.glob("_C.*") if _is_binary(path))
+    if fitting not in found:
+        raise UsageError(
+            f"torch in {folder} is built as {', '.join(found) or 'nothing'}, this "
+            f"Blender needs {fitting}; fill a folder with {install(folder)}"
+        )
+    told = _constants(package / "version.py")
+    build = "CPU"
+    for key, name in (("cuda", "CUDA"), ("hip", "ROCm"), ("xpu", "XPU")):
+        if told.get(key):
+            build = f"{name} {told[key]}"
+    return Torch(str(told.get("__version__", "of unknown version")), build, folder)
+
+
+def _is_binary(path: Path) -> bool:
+    return path.suffix in {".so", ".pyd"}
+
+
+def _constants(path: Path) -> dict[str, object]:
+    """The constants that a module of plain assignments sets, without running it."""
+    told = {}
+    for node in ast.parse(path.read_text("utf-8")).body:
+        if isinstance(node, ast.AnnAssign):
+            targets, value = [node.target], node.value
+        elif isinstance(node, ast.Assign):
+            targets, value = node.targets, node.value
+        else:
+            continue
+        if isinstance(value, ast.Constant):
+            told |= {t.id: value.value for t in targets if isinstance(t, ast.Name)}
+    return told
+
+
+def install(folder: Path) -> str:
+    """The command that fills a folder with what this Blender's Python needs."""
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
+    return (
+        f"pip install --python-version {python} --only-binary :all: "
+        f'--target "{folder}" torch safetensors OpenEXR'
+    )
+
+
+def use(folder: Path | None) -> None:
+    """Look for torch in `folder` first from now on; None forgets the one before.
+
+    numpy stays Blender's own: it is loaded before the folder is in sight. Raises
+    UsageError, with nothing changed, where the folder's torch does not fit.
+    """
+    global _folder
+    if folder is not None:
+        inspect(folder)
+        importlib.import_module("numpy")
+    if _folder is not None and str(_folder) in sys.path:
+        sys.path.remove(str(_folder))
+    if folder is not None:
+        sys.path.insert(0, str(folder))
+    importlib.invalidate_caches()
+    _folder = folder
+
+
+_folder: Path | None = None
+
+
+def loaded() -> Path | None:
+    """Where the torch lies that is loaded already, None before the first use."""
+    module = sys.modules.get("torch")
+    return Path(str(module.__file__)).parents[1] if module else None
+
+
+def available() -> Torch:
+    """The PyTorch that is loaded, or that the first render will load.
+
+    Raises UsageError, saying what to do, where there is none.
+    """
+    folder = loaded() or _where("torch")
+    for name in NEEDED:
+        if _where(name) is None:
+            raise UsageError(
+                f"{name} is not there: XRDS can only render plain. Install the "
+                "extension with PyTorch, or choose a folder that holds it"
+            )
+    assert folder is not None
+    return inspect(folder)
+
+
+def is_there() -> bool:
+    """Whether a render would find all it needs; cheap enough for a panel."""
+    return all(_where(name) is not None for name in NEEDED)
+
+
+def _where(name: str) -> Path | None:
+    """The folder that a package would be imported from; nothing is imported."""
+    found = PathFinder.find_spec(name)
+    if found is None or not found.origin:
+        return None
+    return Path(found.origin).parents[1]
