@@ -125,9 +125,25 @@ EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
             "answer to them; at most 1 % farther than 24 pixels from an edge",
         ),
     ),
+    "firefly.far_change": (
+        Exemption(
+            "fast x4 *",
+            2e-2,
+            "attention looks eight cells around, the bound three: features change a "
+            "little there, by the same 1.2 % however bright the firefly",
+        ),
+    ),
+    "firefly.light_beyond_two_pixels": (
+        Exemption(
+            "fast x4 *",
+            2e-2,
+            "the same small change beside the light of the weakest fireflies; 0.01 % "
+            "for those of 1e4 and more",
+        ),
+    ),
     "tiles.difference": (
         Exemption(
-            "* x4 *",
+            "fast *",
             1e-3,
             "attention sees farther than the tiles' overlap, ever more weakly; "
             "no seam is measurable",
