@@ -5,7 +5,7 @@ Arrays are those of `Inputs`; areas are low-resolution rows and columns.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -90,10 +90,12 @@ def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
     return shines
 
 
-def _sums(x: Picture, block: int) -> Picture:
+def _sums(x: NDArray[Any], block: int) -> NDArray[np.float64]:
     """Return the sum over each block and its channels."""
     for axis in (0, 1):
-        x = np.add.reduceat(x, range(0, x.shape[axis], block), axis=axis)
+        # float64: sums of the brightest light would leave float32
+        starts = range(0, x.shape[axis], block)
+        x = np.add.reduceat(x, starts, axis=axis, dtype=np.float64)
     return np.asarray(x.sum(-1))
 
 

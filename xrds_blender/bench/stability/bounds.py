@@ -38,7 +38,7 @@ BOUNDS: dict[str, Bound] = {
     "range.scaling_far": Bound(None, "the same by 2^±30, 2^±40"),
     "range.spread_faults": Bound(0, "values below 0 or not finite, light over 1e12"),
     "range.spread_error": Bound(
-        1.5, "error of the dark half beside light 1e12 brighter, of its error alone"
+        1, "error of the dark half beside light 1e12 brighter, of bicubic's on it alone"
     ),
     "range.denormal_faults": Bound(0, "faults with light of 1e-45 to 1e-38"),
     "constant.value": Bound(5e-3, "largest relative error of a constant picture"),

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from xrds_core import baselines
+
 from .measured import Measured, distance, faults, relative_difference, worst
 from .pictures import Inputs, area_mean, blocks, constant, even, lit_surface, textured
 from .pictures import waves as smooth_light
@@ -39,11 +41,12 @@ def spread(subject: Subject) -> Iterator[Measured]:
     dark, bright = np.float32(1e-6), np.float32(1e6)
     middle = subject.side // 2
     factor = np.where(np.arange(subject.side) < middle, dark, bright)[:, None]
-    low = area_mean(inputs.radiance, 1) * factor[:: subject.scale, None]
+    low = inputs.radiance * factor[:: subject.scale, None]
     found = subject(inputs.with_radiance(low))
     rows = np.s_[: middle - 2 * subject.scale]
     error = np.abs(found / dark - truth)[rows].mean() / truth[rows].mean()
-    plain = np.abs(subject(inputs) - truth)[rows].mean() / truth[rows].mean()
+    bicubic = baselines.bicubic(inputs.radiance, subject.scale)
+    plain = np.abs(bicubic - truth)[rows].mean() / truth[rows].mean()
     yield Measured("range.spread_faults", faults(found))
     yield Measured("range.spread_error", float(error / plain))
 
