@@ -22,6 +22,8 @@ ALBEDO_EPSILON = 0.02
 RADIANCE_FLOOR = 0.02
 # Variance of the log radiance, unexplained by a fit, that doubles its ridge.
 NOISE = 0.01
+# Added to variances under a correlation: where nothing varies there is none.
+LEAST_VARIANCE = 0.002
 
 
 class Feature(NamedTuple):
@@ -55,7 +57,7 @@ def regress(radiance: Tensor, guides: Tensor, scale: int) -> tuple[Tensor, Tenso
     The slopes are common to the colour channels, so grey stays grey.
     """
     features = find_features(guides, scale)
-    slopes = blur(fit(radiance, features))
+    slopes = blur(fit(radiance, features, scale))
     enlarged = F.interpolate(slopes, scale_factor=scale, mode="bilinear")
     terms = (
         slope * feature.full
@@ -64,11 +66,13 @@ def regress(radiance: Tensor, guides: Tensor, scale: int) -> tuple[Tensor, Tenso
     return sum(terms, torch.zeros_like(enlarged[:, :1])).exp(), slopes
 
 
-def fit(radiance: Tensor, features: list[Feature]) -> Tensor:
-    """Slopes of the log radiance by each feature: (B, features, h, w).
+def fit(radiance: Tensor, features: list[Feature], scale: int) -> Tensor:
+    """Slopes of the log radiance by each feature, albedo first: (B, features, h, w).
 
     Where a feature has three channels, they are samples of one variable: each channel
-    of the radiance goes with its own.
+    of the radiance goes with its own. A denoiser at low resolution takes contrast from
+    fine texture but leaves it in its place, so the correlation with the albedo, too,
+    says how much of it is in the radiance: the more, the coarser the pixels are.
     """
     count = len(features)
     x = [feature.low for feature in features]
@@ -93,6 +97,9 @@ def fit(radiance: Tensor, features: list[Feature]) -> Tensor:
     terms = (slope * covariance[i, count] for i, slope in enumerate(ridged(0.0)))
     variance = covariance[count, count]
     slopes = ridged((variance - sum(terms, torch.zeros_like(variance))).clamp(min=0))
+    variances = (covariance[0, 0] + LEAST_VARIANCE) * (variance + LEAST_VARIANCE)
+    missing = covariance[0, count] / variances.clamp(min=1e-12).sqrt() - slopes[0]
+    slopes[0] = slopes[0] + min(1.0, scale / 4) * missing.clamp(min=0)
     clamped = (
         slope.clamp(*feature.slope)
         for slope, feature in zip(slopes, features, strict=True)
