@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
-MODULE_LIMIT = 600.0  # seconds for one process; single tests have their own limit
+MODULE_LIMIT = 1200.0  # seconds for one process; single tests have their own limit
 EXIT_GRACE = 10.0  # seconds to end after the last test
 
 
