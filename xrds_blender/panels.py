@@ -49,7 +49,8 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
     """Scale, quality and samples of the XRDS engine."""
 
     bl_label = "Super-Resolution"
-    bl_order = -1
+    # Below the choice of the engine: Blender puts panels of add-ons last otherwise.
+    bl_parent_id = "RENDER_PT_context"
 
     def draw_header_preset(self, context: bpy.types.Context) -> None:
         presets.XRDS_PT_presets.draw_panel_header(self.layout)
@@ -202,7 +203,8 @@ def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
         ("Rays per Pixel", f"{light:.3g} + {guide:.3g}"),
         ("Memory", f"≤ {bytes_taken / 1e9:.1f} GB"),
     ]
-    return told + [(d.decision.capitalize(), d.value) for d in chosen.decisions]
+    decisions = [d for d in chosen.decisions if d.decision != "low frame"]
+    return told + [(d.decision.capitalize(), d.value) for d in decisions]
 
 
 CLASSES = (
