@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import textwrap
-from typing import Any
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
 import bpy
 from bpy.app.handlers import persistent
@@ -17,9 +18,10 @@ from . import (
     support,
     torch_folder,
 )
-from .explain import Glance
-from .job import RenderJob
 from .operators import ENGINE
+
+if TYPE_CHECKING:
+    from .explain import Glance
 
 CHARACTER = 6.5  # pixels that a letter takes on the average, at an interface scale of 1
 STAGE_NAMES = {
@@ -177,11 +179,17 @@ def remarks(scene: bpy.types.Scene) -> list[tuple[str, str]]:
     return told + [("INFO", sentence) for sentence in support.notes(scene)]
 
 
-_glance = Glance()
+@lru_cache(maxsize=1)
+def _glance() -> Glance:
+    """Made when a panel is first drawn: Blender starts faster without its modules."""
+    from .explain import Glance
+
+    return Glance()
 
 
 def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
     """Name and value of what the render will do, take and leave out."""
+    from .job import RenderJob
     from .preferences import machine
 
     job = RenderJob.of(scene.xrds)
@@ -189,7 +197,7 @@ def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
         return [("Settings", "chosen when rendering")]
     if job.is_plain:
         return []
-    facts = _glance.facts(scene, bpy.context.view_layer, job)
+    facts = _glance().facts(scene, bpy.context.view_layer, job)
     chosen = job.plan(facts)
     width, height = forecast.low_size(facts.width, facts.height, job.scale)
     light, guide = forecast.rays(scene.cycles.samples, chosen.guide_samples, job.scale)
@@ -218,7 +226,8 @@ CLASSES = (
 
 @persistent
 def _forget(*_: object) -> None:
-    _glance.forget()
+    if _glance.cache_info().currsize:
+        _glance().forget()
 
 
 def _changes() -> tuple[Any, ...]:
