@@ -27,6 +27,7 @@ def full_variation() -> Variation:
         rotated_normals=0.2,
         black=0.1,
         shaded=0.3,
+        over_denoised=0.5,
         symmetries=True,
         padded=0.5,
     )

@@ -29,15 +29,15 @@ def shade(
     reference = (albedo * smooth).astype(np.float32)
     h, w = (n // scale for n in albedo.shape[:2])
     low = reference.reshape(h, scale, w, scale, 3).mean(axis=(1, 3))
-    return over_denoised(low, random), reference
+    return low, reference
 
 
 def over_denoised(low: Array, random: np.random.Generator) -> Array:
-    """In half of the cases a part of the texture is smoothed away.
+    """A random part of the texture smoothed away.
 
     A denoiser at low resolution takes fine texture for noise; the guides still hold it.
     """
-    share = max(0.0, random.uniform(-1, 1))
+    share = random.random()
     padded = np.pad(low, ((2, 2), (2, 2), (0, 0)), "edge")
     h, w = low.shape[:2]
     boxes = (padded[y : y + h, x : x + w] for y in range(5) for x in range(5))

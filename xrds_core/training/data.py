@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import PictureError
 from ..front_end import clean_albedo, clean_radiance
 from .augmentation import (
+    over_denoised,
     permute_colours,
     random_rotation,
     shade,
@@ -42,6 +43,8 @@ class Variation:
     There demodulation is exact, which teaches the network to trust it where radiance
     over albedo is smooth.
     """
+    over_denoised: float = 0.0
+    """Share of the crops lit anew whose low-resolution texture is smoothed away."""
     symmetries: bool = False
     """Flips, transposition and permutations of the colour channels."""
     padded: float = 0.0
@@ -97,6 +100,8 @@ def cut(
     if lit_anew:
         rendered = reference
         low, reference = shade(mean_albedo(window, box), scale, exposure, random)
+        if random.random() < variation.over_denoised:
+            low = over_denoised(low, random)
         if full is not None:
             full = with_noise_of(full, rendered, reference, exposure)
     return Crop(low, reference, albedo, normal, full, exposure)
