@@ -13,10 +13,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "extension"))
 
+import build  # lies beside the add-on's root module
 import wheels
 from packaging.requirements import Requirement
-
-import build  # lies beside the add-on's root module
 
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
