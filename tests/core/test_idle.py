@@ -12,8 +12,8 @@ from xrds_core.network import XRDS, preset_config
 from xrds_core.upscaler import Upscaler
 
 Array = NDArray[np.float32]
-SIDE, SCALE = 256, 2
-THING = slice(96, 128)  # low-resolution rows and columns that are not background
+SIDE, SCALE = 320, 2
+THING = slice(128, 160)  # low-resolution rows and columns that are not background
 
 
 def make(preset: str = "fast", guides: str = "fast") -> Upscaler:
