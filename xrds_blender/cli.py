@@ -7,7 +7,6 @@ holds the JSON alone.
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import re
 import sys
 from collections.abc import Callable, Sequence
@@ -236,11 +235,13 @@ def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
     _need_blender("plan-report")
     from .bench.plan_report import Setting, report
 
-    width, height = options.resolution
     setting = Setting(
-        options.scale, options.samples, options.guide_samples, width, height
+        options.scale,
+        options.samples,
+        options.guide_samples,
+        *options.resolution,
+        options.rounds,
     )
-    setting = dataclasses.replace(setting, rounds=options.rounds)
     return report(options.scenes, options.kind, setting, options.out, _progress)
 
 

@@ -51,9 +51,8 @@ def render_layer(
         if job.is_plain:
             picture = _plain(engine, depsgraph, job, seconds)
         else:
-            upscaler = load_upscaler(
-                job
-            )  # first: missing weights are to cost no render
+            # first: missing weights are to cost no render
+            upscaler = load_upscaler(job)
             picture = _enlarged(engine, depsgraph, job, upscaler, seconds)
     finally:
         status_bar.end()

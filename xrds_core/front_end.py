@@ -190,8 +190,7 @@ def demodulated_base(radiance: Picture, albedo: Picture, scale: int) -> Picture:
     interpolated.
     """
     guide = _to_tensor(albedo) + ALBEDO_EPSILON
-    lighting = _to_tensor(radiance) / area_mean(guide, scale)
-    return _to_picture(upsample_bilinear(lighting, scale) * guide)
+    return _to_picture(_modulated(_to_tensor(radiance), guide, scale))
 
 
 def regressed_base(
@@ -206,8 +205,24 @@ def regressed_base(
     low = _to_tensor(radiance * gain)
     guides = torch.cat((_to_tensor(albedo), _to_tensor(normal)), dim=1)
     explained, _ = regress(low, guides, scale)
-    rest = low / area_mean(explained, scale)
-    return _to_picture(upsample_bilinear(rest, scale) * explained) / gain
+    return _to_picture(_modulated(low, explained, scale)) / gain
+
+
+def _modulated(low: Tensor, modulator: Tensor, scale: int) -> Tensor:
+    """Return up(L / down(M)) M, where M (B, C, s h, s w) is positive."""
+    return upsample_bilinear(low / area_mean(modulator, scale), scale) * modulator
+
+
+def pad_guide(guide: Picture, low: Picture, scale: int) -> Picture:
+    """Return the guide (H, W, ...) as far as the pixels of ``low`` (h, w, ...) reach.
+
+    The edge is repeated at the bottom and right; H <= s h, W <= s w.
+    """
+    missing = [
+        (0, scale * size - have)
+        for size, have in zip(low.shape[:2], guide.shape[:2], strict=True)
+    ]
+    return np.pad(guide, (*missing, *[(0, 0)] * (guide.ndim - 2)), "edge")
 
 
 def upsample_alpha(low_alpha: Picture, guide_alpha: Picture, scale: int) -> Picture:
@@ -218,8 +233,8 @@ def upsample_alpha(low_alpha: Picture, guide_alpha: Picture, scale: int) -> Pict
     """
     height, width = guide_alpha.shape
     low = _to_tensor(np.clip(low_alpha, 0.0, 1.0)[..., None])
-    edge = ((0, low.shape[2] * scale - height), (0, low.shape[3] * scale - width))
-    guide = _to_tensor(np.pad(np.clip(guide_alpha, 0.0, 1.0), edge, "edge")[..., None])
+    padded = pad_guide(np.clip(guide_alpha, 0.0, 1.0), low_alpha, scale)
+    guide = _to_tensor(padded[..., None])
     missing = upsample_bilinear(low - area_mean(guide, scale), scale)
     alpha = (guide + missing).clamp(0.0, 1.0)
     block = functional.interpolate(low, scale_factor=float(scale), mode="nearest")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .front_end import demodulated_base
+from .front_end import demodulated_base, pad_guide
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -55,11 +55,7 @@ def base_picture(inputs: Inputs) -> Picture:
     """Return the demodulated base at full size, (H, W, 3)."""
     height, width = inputs.shape
     low = inputs.low[..., :3]
-    missing = [
-        (0, size * inputs.scale - have)
-        for size, have in zip(low.shape[:2], inputs.shape, strict=True)
-    ]
-    albedo = np.pad(inputs.albedo.clip(0.0, 1.0), (*missing, (0, 0)), "edge")
+    albedo = pad_guide(inputs.albedo.clip(0.0, 1.0), low, inputs.scale)
     return demodulated_base(low, albedo, inputs.scale)[:height, :width]
 
 

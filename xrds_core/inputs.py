@@ -9,7 +9,7 @@ import numpy as np
 import torch
 
 from .errors import PictureError
-from .front_end import clean_radiance, fill_holes, transfer
+from .front_end import clean_radiance, fill_holes, pad_guide, transfer
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -133,8 +133,7 @@ def check(
 def _low_alpha(cover: Picture, low: Picture, scale: int) -> Picture:
     """Return what the guides' alpha (H, W, 1) is at low resolution, (h, w, 1)."""
     height, width = low.shape[:2]
-    missing = (height * scale - cover.shape[0], width * scale - cover.shape[1])
-    whole = np.pad(cover, ((0, missing[0]), (0, missing[1]), (0, 0)), "edge")
+    whole = pad_guide(cover, low, scale)
     blocks = whole.reshape(height, scale, width, scale, 1)
     return np.asarray(blocks.mean(axis=(1, 3)))
 

@@ -429,12 +429,12 @@ class XRDS(nn.Module):
             sizes = config.scale, config.cell, c, config.tail_channels
             counts = config.guide_count, config.source_count
             self.tail: nn.Module = KernelTail(*sizes, *counts)
-        else:
-            self.tail = PixelTail(config)
-        if config.base:  # the paper pads with zeros, which darkens or tints the rim
+            # the paper pads with zeros, which darkens or tints the rim
             for layer in self.modules():
                 if isinstance(layer, nn.Conv2d):
                     layer.padding_mode = "replicate"
+        else:
+            self.tail = PixelTail(config)
 
     def forward(self, radiance: Tensor, guides: Tensor) -> Tensor:
         """Enlarge one batch.

@@ -150,6 +150,17 @@ def network(monkeypatch: pytest.MonkeyPatch) -> list[NearestUpscaler]:
     return made
 
 
+@pytest.fixture
+def life(still_life: Callable[..., Any]) -> Any:
+    """The still life at an odd size, for renders under XRDS."""
+    from xrds_blender import ensure_registered
+
+    ensure_registered()
+    scene = still_life(45, 33)
+    scene.cycles.seed = 1
+    return scene
+
+
 def load_image(path: Any) -> np.ndarray:
     """Pixels of a written picture, (height, width, 4), row 0 on top."""
     image = bpy.data.images.load(str(path))
@@ -158,6 +169,12 @@ def load_image(path: Any) -> np.ndarray:
     width, height = image.size
     bpy.data.images.remove(image)
     return pixels.reshape(height, width, 4)[::-1]
+
+
+@pytest.fixture
+def load() -> Callable[..., np.ndarray]:
+    """`load_image`, for tests that write their own files."""
+    return load_image
 
 
 @pytest.fixture

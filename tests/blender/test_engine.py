@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,20 +10,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import ensure_registered  # noqa: E402  # bpy is asked for first
 from xrds_blender.render import render, run_job  # noqa: E402
 from xrds_core.errors import UsageError, WeightsError  # noqa: E402
 
 BLENDER_5 = bpy.app.version >= (5, 0)
-Build = Callable[..., Any]
-
-
-@pytest.fixture
-def life(still_life: Build) -> Any:
-    ensure_registered()
-    scene = still_life(45, 33)
-    scene.cycles.seed = 1
-    return scene
 
 
 def low_picture(scene: Any, scale: int = 2) -> np.ndarray:
@@ -98,7 +87,7 @@ def test_a_transparent_film_leaves_alpha_to_network(
 
 
 def test_an_animation_with_motion_blur(
-    life: Any, network: Any, tmp_path: Path, written: Any
+    life: Any, network: Any, tmp_path: Path, written: Any, load: Any
 ) -> None:
     cube = bpy.data.objects["Red"]
     for frame, height in ((1, 1.0), (3, 3.0)):
@@ -115,15 +104,6 @@ def test_an_animation_with_motion_blur(
     assert len(frames) == 3
     np.testing.assert_array_equal(frames[1], alone)
     assert np.abs(frames[0] - frames[2]).mean() > 0.01
-
-
-def load(path: Path) -> np.ndarray:
-    image = bpy.data.images.load(str(path))
-    pixels = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(pixels)
-    width, height = image.size
-    bpy.data.images.remove(image)
-    return pixels.reshape(height, width, 4)[::-1]
 
 
 def test_persistent_data_changes_no_pixel(

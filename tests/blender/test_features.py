@@ -14,19 +14,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import cycles_session, ensure_registered  # noqa: E402
+from xrds_blender import cycles_session  # noqa: E402
 from xrds_blender.render import render, run_job  # noqa: E402
 
 BLENDER_5 = bpy.app.version >= (5, 0)
-Build = Callable[..., Any]
-
-
-@pytest.fixture
-def life(still_life: Build) -> Any:
-    ensure_registered()
-    scene = still_life(45, 33)
-    scene.cycles.seed = 1
-    return scene
 
 
 @pytest.fixture
@@ -294,7 +285,7 @@ def file_output(tree: Any, folder: Path) -> Any:
 
 
 def test_a_graph_with_a_file_output_gives_what_it_gives_under_cycles(
-    life: Any, network: Any, written: Any, tmp_path: Path
+    life: Any, network: Any, written: Any, load: Any, tmp_path: Path
 ) -> None:
     """Blur of the picture times its depth: the graph is the same under both."""
     life.xrds.plain = True
@@ -321,15 +312,6 @@ def test_a_graph_with_a_file_output_gives_what_it_gives_under_cycles(
     (path,) = (tmp_path / "enlarged").iterdir()
     np.testing.assert_array_equal(load(path)[..., :3], composite[..., :3])
     np.testing.assert_allclose(composite[..., :3], 1 - enlarged(life), atol=1e-5)
-
-
-def load(path: Path) -> np.ndarray:
-    image = bpy.data.images.load(str(path))
-    pixels = np.empty(len(image.pixels), np.float32)
-    image.pixels.foreach_get(pixels)
-    width, height = image.size
-    bpy.data.images.remove(image)
-    return pixels.reshape(height, width, 4)[::-1]
 
 
 def test_baking_is_cycles_own(life: Any, network: Any) -> None:

@@ -156,7 +156,7 @@ def test_window_files_hold_what_training_reads(made: Path) -> None:
     for letter in "ab":
         expected[f"guides_{letter}"] = (64, 64, 6)
         expected[f"guide_radiance_{letter}"] = (64, 64, 3)
-    for scale in (2, 4):
+    for scale in (2, 4, 8):
         for name in (f"low{scale}_0", f"low{scale}_1"):
             expected[name] = expected[name + "_noisy"] = (64 // scale, 64 // scale, 3)
     assert sizes == expected

@@ -7,10 +7,9 @@ import json
 import time
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from .contenders import ENLARGEMENTS
 from .inputs import SEEDS, open_scene
+from .tasks import noise
 from .timing import FrameTimes
 
 if TYPE_CHECKING:
@@ -72,7 +71,7 @@ class FrameSeconds:
 
     def _add(self, case: Case) -> None:
         """Tasks of a case; those it shares with another are listed once."""
-        low, guide = self._noise(case.scale)
+        low, guide = noise(self.shot.window, case.scale)
         self.times.add(self._render_name(case), self._render(case))
         for method, enlarge in ENLARGEMENTS.items():
             self.times.add(
@@ -120,13 +119,6 @@ class FrameSeconds:
             }
 
         return lambda: _whole_frame(self.shot, job)
-
-    def _noise(self, scale: int) -> tuple[np.ndarray, np.ndarray]:
-        """Low-resolution picture and guide of the frame's size, in [0, 1)."""
-        window, random = self.shot.window, np.random.default_rng(0)
-        low = -(-window.frame_height // scale), -(-window.frame_width // scale), 3
-        full = low[0] * scale, low[1] * scale, 3
-        return random.random(low, np.float32), random.random(full, np.float32)
 
 
 def _product(render: Stages, network: Stages) -> Stages:

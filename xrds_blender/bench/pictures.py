@@ -136,7 +136,7 @@ class Pictures:
             return baselines.bicubic(radiance, config.scale)[:height, :width]
         albedo = front_end.clean_albedo(guide[0]["albedo"])[0]
         if config.method == "demodulated_bilinear":
-            padded = _padded(albedo, radiance, config.scale)
+            padded = front_end.pad_guide(albedo, radiance, config.scale)
             picture = front_end.demodulated_base(radiance, padded, config.scale)
             return picture[:height, :width]
         extra = guide[0].get("radiance")
@@ -226,15 +226,6 @@ def has_lpips() -> bool:
 @lru_cache(maxsize=2)
 def _reference_file(path: Path) -> np.ndarray:
     return np.asarray(exr.read_beauty(path).radiance[..., :3])
-
-
-def _padded(albedo: np.ndarray, radiance: np.ndarray, scale: int) -> np.ndarray:
-    """The guide as large as the low picture's pixels reach."""
-    rows, columns = (
-        scale * low - full
-        for low, full in zip(radiance.shape[:2], albedo.shape[:2], strict=True)
-    )
-    return np.pad(albedo, ((0, rows), (0, columns), (0, 0)), mode="edge")
 
 
 def _identity(shot: Shot) -> str:

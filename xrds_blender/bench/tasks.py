@@ -6,30 +6,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_core import baselines, front_end
-
 from ..budget import DEFAULT_DENOISER
 from ..job import RenderJob
+from .contenders import ENLARGEMENTS
 from .inputs import open_scene
 from .stages import PLAIN_FRAME, XRDS_FRAME, clocked, network_name
 from .sweep import Config
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from ..job import Picture
+    from .contenders import Enlargement
     from .pictures import Networks
     from .stages import Run, Task
     from .sweep import Sweep
     from .windows import Shot, Window
 
     Arrays = tuple[np.ndarray, np.ndarray]
-    Enlarge = Callable[[np.ndarray, np.ndarray, int], object]
 
-BASELINES: dict[str, Enlarge] = {
-    "bicubic": lambda low, _, scale: baselines.bicubic(low, scale),
-    "demodulated_bilinear": front_end.demodulated_base,
-}
+BASELINES = ("bicubic", "demodulated_bilinear")
 
 
 def tasks(shot: Shot, sweep: Sweep, networks: Networks) -> dict[str, Task]:
@@ -37,9 +31,9 @@ def tasks(shot: Shot, sweep: Sweep, networks: Networks) -> dict[str, Task]:
     window = shot.window.whole
     found: dict[str, Task] = {}
     for scale in sweep.scales:
-        for method, enlarge in BASELINES.items():
+        for method in BASELINES:
             name = network_name(Config(method, 1, scale=scale))
-            found[name] = _baseline(enlarge, window, scale)
+            found[name] = _baseline(ENLARGEMENTS[method], window, scale)
     for network in sweep.networks:
         preset, scale, guides = network
         name = network_name(Config("xrds", 1, "", scale, preset, guides))
@@ -59,7 +53,8 @@ def plain_job() -> RenderJob:
 def frame(shot: Shot, job: RenderJob) -> tuple[Picture, Run]:
     """Render a whole frame as a user does, from a freshly opened file.
 
-    `other` is what no stage holds; weights are loaded before.
+    Every frame pays for its own guides. `other` is what no stage holds; weights
+    are loaded before.
     """
     from ..layer import load_upscaler
     from ..render import render
@@ -68,7 +63,8 @@ def frame(shot: Shot, job: RenderJob) -> tuple[Picture, Run]:
     if not job.is_picked and not job.is_plain:
         load_upscaler(job)
     pictures: list[Picture] = []
-    run = clocked(lambda: pictures.append(render(scene, **vars(job))))
+    choices = vars(job) | {"keep": (*job.keep, "guide cache")}
+    run = clocked(lambda: pictures.append(render(scene, **choices)))
     stages = {k: s for k, s in pictures[0].seconds.items() if k != "total"}
     return pictures[0], run | {"other": run["seconds"] - sum(stages.values())}
 
@@ -81,10 +77,10 @@ def noise(window: Window, scale: int) -> Arrays:
     return random.random(low, np.float32), random.random(full, np.float32)
 
 
-def _baseline(enlarge: Enlarge, window: Window, scale: int) -> Task:
+def _baseline(enlarge: Enlargement, window: Window, scale: int) -> Task:
     def task() -> Run:
         low, full = noise(window, scale)
-        return clocked(lambda: enlarge(low, full, scale))
+        return clocked(lambda: enlarge(low, full, full, scale))
 
     return task
 
