@@ -163,7 +163,20 @@ def _upscale_lines(told: dict[str, Any]) -> list[str]:
 def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
     _need_blender("evaluate")
     from .bench.evaluate import evaluate
+    from .bench.samples import samples_table
 
+    if options.table == "samples":
+        return samples_table(
+            options.scenes,
+            windows=options.windows,
+            references=options.references,
+            cache=options.cache,
+            scale=options.scale[0],
+            preset=options.preset[0],
+            out=options.out,
+            weights=options.weights,
+            progress=_progress,
+        )
     return evaluate(
         options.scenes,
         windows=options.windows,
@@ -175,6 +188,7 @@ def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
         timing=options.timing,
         timing_scenes=options.timing_scenes,
         out=options.out,
+        sheets=options.sheets,
         weights=options.weights,
         progress=_progress,
     )
@@ -267,6 +281,21 @@ def _train(options: argparse.Namespace) -> dict[str, Any] | None:
     return train(read_config(options.config, options.changes), folder)
 
 
+def _ablate(options: argparse.Namespace) -> dict[str, Any]:
+    from xrds_core.training.ablations import ablate
+
+    seeds, changes = options.seeds, options.changes
+    return ablate(
+        options.config, options.table, options.out, seeds=seeds, changes=changes
+    )
+
+
+def _ablate_lines(told: dict[str, Any]) -> list[str]:
+    from xrds_core.training.ablations import lines
+
+    return lines(told)
+
+
 def _train_lines(told: dict[str, Any]) -> list[str]:
     best = told["best"]
     return [
@@ -310,6 +339,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_bench,
         _add_dataset,
         _add_train,
+        _add_ablate,
     ):
         command = add(commands)
         command.add_argument(
@@ -406,10 +436,12 @@ def _add_evaluate(commands: Any) -> argparse.ArgumentParser:
     add("--scale", type=_integers, default=(2, 4), help="as 2,4")
     add("--preset", type=_names(PRESETS), default=("fast",), help="as fast,balanced")
     add("--guides", type=_names(GUIDES), default=("fast",), help="as fast,full")
+    add("--table", choices=("standard", "samples"), default="standard")
     add("--timing", action="store_true", help="also time whole frames")
     add("--timing-scenes", type=_parts, help="of these alone, as bmw27,house")
     add("--weights", type=Path, help="folder of weights files")
     add("--out", type=Path, help="folder for results.json")
+    add("--sheets", type=Path, help="folder for a JPEG of crops for each scene")
     command.set_defaults(work=_evaluate, lines=lambda _: ())
     return command
 
@@ -485,6 +517,26 @@ def _add_train(commands: Any) -> argparse.ArgumentParser:
     command = commands.add_parser("train", help="train or resume a network")
     command.add_argument("config", type=Path, metavar="CONFIG.toml")
     command.add_argument("--out", type=Path, metavar="RUN", help="runs/CONFIG")
+    _add_changes(command)
+    command.set_defaults(work=_train, lines=_train_lines)
+    return command
+
+
+def _add_ablate(commands: Any) -> argparse.ArgumentParser:
+    command = commands.add_parser(
+        "ablate", help="train networks that differ in one thing, for a table"
+    )
+    add = command.add_argument
+    add("config", type=Path, metavar="CONFIG.toml")
+    add("--table", required=True, help="base, guides, blocks, rival, loss, input")
+    add("--out", type=Path, required=True, help="folder of TABLE.json and its runs")
+    add("--seeds", type=_positive, default=3, help="runs of each variant")
+    _add_changes(command)
+    command.set_defaults(work=_ablate, lines=_ablate_lines)
+    return command
+
+
+def _add_changes(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--set",
         action="append",
@@ -493,8 +545,6 @@ def _add_train(commands: Any) -> argparse.ArgumentParser:
         metavar="KEY=VALUE",
         help="in the place of the file's, as scale=8 or 'start=\"a.safetensors\"'",
     )
-    command.set_defaults(work=_train, lines=_train_lines)
-    return command
 
 
 # --- values ---------------------------------------------------------------------------

@@ -11,7 +11,7 @@ import numpy as np
 
 from xrds_core.errors import Cancelled, XRDSError
 
-from . import cycles_session, low_camera, plan, status_bar
+from . import cycles_session, plan, status_bar
 from .borrowed import Borrowed
 from .colour import converted, to_rec709, working_space
 from .cycles_settings import set_denoising, set_sampling
@@ -105,7 +105,7 @@ def _enlarged(
     seconds: dict[str, float],
 ) -> Picture:
     name = depsgraph.view_layer_eval.name
-    with CyclesPasses(engine, depsgraph) as passes:
+    with CyclesPasses(engine, depsgraph, noisy=True) as passes:
         facts = find_facts(depsgraph, job)
         chosen = job.plan(facts)
         if not chosen.motion_blur:
@@ -242,6 +242,7 @@ def _upscale(
         seen(np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1)),
         placed(seen(guides.albedo)),
         placed(guides.normal),
+        noisy=seen(beauty.noisy),
         guide_radiance=placed(seen(guides.radiance)),
         guide_alpha=placed(guides.alpha),
         exposure=exposure,
@@ -275,10 +276,11 @@ def _bilinear(
     low: Array, scale: int, offset: tuple[int, int], shape: tuple[int, ...]
 ) -> Array:
     """Enlarge (h, w, channels) and cut the region out."""
-    for axis in (0, 1):
-        centres = np.arange(shape[axis]) + offset[axis] + 0.5
-        low = low_camera.interpolate(low, centres / scale - 0.5, axis)
-    return low
+    from xrds_core.baselines import bilinear
+
+    rows, columns = offset
+    large = bilinear(low, scale)
+    return large[rows : rows + shape[0], columns : columns + shape[1]]
 
 
 def _stop_if_cancelled(engine: Any) -> None:

@@ -82,10 +82,13 @@ class CyclesPasses:
 
     Any number of `beauty` and `guides` calls, in any order. Raises Cancelled when the
     user stops the render and SceneError when this Blender keeps its render settings
-    in an unknown way. On exit every setting is as before.
+    in an unknown way. On exit every setting is as before. `noisy` and `depth` ask for
+    what the file's own passes may not give.
     """
 
-    def __init__(self, engine: Any, depsgraph: Any, *, extra: bool = False) -> None:
+    def __init__(
+        self, engine: Any, depsgraph: Any, *, noisy: bool = False, depth: bool = False
+    ) -> None:
         self._engine, self._depsgraph = engine, depsgraph
         self._scene = depsgraph.scene_eval
         self._layer_eval = depsgraph.view_layer_eval
@@ -93,7 +96,7 @@ class CyclesPasses:
         # The method of this name hides the property, so it is asked for by path.
         self._render = engine.path_resolve("render")
         self._borrowed = Borrowed()
-        self._extra = extra
+        self._extra = [(DEPTH, "Z")] * depth + [(NOISY, "RGBA")] * noisy
         self.peak_memory = 0
         render, result = self._render, engine.get_result()
         percentage = render.resolution_percentage
@@ -144,7 +147,7 @@ class CyclesPasses:
 
     def _wanted_passes(self) -> list[tuple[str, str]]:
         wanted = [(name, letters) for name, letters, _ in GUIDE_PASSES]
-        return wanted + [(DEPTH, "Z"), (NOISY, "RGBA")] * self._extra
+        return wanted + self._extra
 
     def _layer(self) -> Any:
         return self._engine.get_result().layers[self._layer_name]

@@ -64,7 +64,7 @@ def run_job(
     """
 
     def work(engine: Any, depsgraph: Any) -> T:
-        with CyclesPasses(engine, depsgraph, extra=True) as passes:
+        with CyclesPasses(engine, depsgraph, noisy=True, depth=True) as passes:
             return job(passes)
 
     return _run(scene, work, layer)

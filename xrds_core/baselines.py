@@ -14,6 +14,7 @@ import torch
 from torch.nn import functional
 
 from .errors import PictureError
+from .front_end import upsample_bilinear
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,6 +26,11 @@ SPATIAL_SIGMA = 0.5  # of a low-resolution pixel
 ALBEDO_SIGMA = 0.1
 NORMAL_SIGMA = 0.15
 RADIUS = 2
+
+
+def bilinear(picture: Array, scale: int) -> Array:
+    """Enlarge (h, w, C) to (scale h, scale w, C): half-pixel centres, edges held."""
+    return _picture(upsample_bilinear(_planes(picture), scale))
 
 
 def bicubic(radiance: Array, scale: int) -> Array:

@@ -50,6 +50,8 @@ class Beauty:
     """(h, w, 3), premultiplied."""
     alpha: Array | None
     """(h, w)"""
+    noisy: Array | None
+    """(h, w, 3), before denoising."""
 
     @property
     def picture(self) -> Array:
@@ -72,10 +74,13 @@ class Guides:
 def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
     """Read the picture: the pass ``names.beauty``, or plain R, G, B.
 
-    Raises PictureError if the file cannot be read or has no such pass.
+    With it, where there is one, the noisy pass. Raises PictureError if the file cannot
+    be read or has no such pass.
     """
     file = _File(path)
-    return Beauty(file.colour(names.beauty, plain=True), file.alpha(names.beauty))
+    radiance = file.colour(names.beauty, plain=True)
+    noisy = file.colour(names.noisy) if file.has(names.noisy) else None
+    return Beauty(radiance, file.alpha(names.beauty), noisy)
 
 
 def read_guides(

@@ -35,7 +35,8 @@ def upscale_file(
     """Enlarge a low-resolution EXR under full-resolution passes; write an EXR.
 
     Args:
-        beauty: the low-resolution render, denoised, with alpha or without.
+        beauty: the low-resolution render, denoised, with alpha or without; the noisy
+            picture, where the file has one too, tells what the denoiser took away.
         guide_file: albedo and normal; for ``full`` guides also a noisy picture.
         output: gets R, G, B, scene-linear, and A where ``beauty`` has alpha.
         weights: a folder of presets, or a file, in place of the shipped ones.
@@ -59,6 +60,7 @@ def upscale_file(
         low.picture,
         passes.albedo,
         passes.normal,
+        noisy=low.noisy,
         guide_radiance=passes.radiance,
         guide_alpha=None if low.alpha is None else passes.alpha,
         exposure=exposure,

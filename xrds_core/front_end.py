@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from .regression import ALBEDO_EPSILON, regress
+from .regression import ALBEDO_EPSILON, find_grain, regress
 
 Picture = NDArray[np.float32]
 ArrayOrTensor = TypeVar("ArrayOrTensor", NDArray[np.float32], Tensor)
@@ -194,17 +194,19 @@ def demodulated_base(radiance: Picture, albedo: Picture, scale: int) -> Picture:
 
 
 def regressed_base(
-    radiance: Picture, albedo: Picture, normal: Picture, scale: int
+    radiance: Picture, noisy: Picture, albedo: Picture, normal: Picture, scale: int
 ) -> Picture:
     """Return up(L / down(E)) E with E what the guides explain of L around every pixel.
 
-    As `demodulated_base`, but the picture itself decides how much of the albedo and of
-    the normal's shading goes into E: see `regression.regress`.
+    As `demodulated_base`, but the picture itself, with what it was before denoising,
+    decides how much of the albedo and of the normal's shading goes into E: see
+    `regression.regress`.
     """
     gain = _gain(auto_exposure(radiance))
     low = _to_tensor(radiance * gain)
+    grain = find_grain(low, _to_tensor(noisy * gain))
     guides = torch.cat((_to_tensor(albedo), _to_tensor(normal)), dim=1)
-    explained, _ = regress(low, guides, scale)
+    explained, _ = regress(low, grain, guides, scale)
     return _to_picture(_modulated(low, explained, scale)) / gain
 
 

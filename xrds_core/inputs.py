@@ -27,6 +27,8 @@ class Inputs:
     scale: int
     low: Picture
     """Radiance (h, w, 3), or (h, w, 4) with alpha."""
+    noisy: Picture | None
+    """Radiance (h, w, 3) before denoising."""
     albedo: Picture
     """(H, W, 3), as the normal; scale (h - 1) < H <= scale h, and so W."""
     normal: Picture
@@ -48,9 +50,11 @@ class Inputs:
 
     def radiance_tensor(self, tile: Tile, exposure: float) -> Tensor:
         """Return the radiance of a tile in the transfer domain, (1, 3, h, w)."""
-        rows, columns = tile.rows, tile.columns
-        cut = self.low[rows.start : rows.stop, columns.start : columns.stop, :3]
-        return transfer(_planes(cut), exposure)
+        return _low_tensor(self.low, tile, exposure)
+
+    def noisy_tensor(self, tile: Tile, exposure: float) -> Tensor | None:
+        """Return the same before denoising, or None."""
+        return None if self.noisy is None else _low_tensor(self.noisy, tile, exposure)
 
     def guide_tensor(self, tile: Tile, exposure: float) -> Tensor:
         """Return the guides of a tile as the network takes them, (1, 6 or 9, H, W).
@@ -80,6 +84,13 @@ class Inputs:
         return np.pad(cut, (*missing, (0, 0)), "edge")
 
 
+def _low_tensor(low: Picture, tile: Tile, exposure: float) -> Tensor:
+    """(h, w, C) -> tensor of a tile, (1, 3, h, w), in the transfer domain."""
+    rows, columns = tile.rows, tile.columns
+    cut = low[rows.start : rows.stop, columns.start : columns.stop, :3]
+    return transfer(_planes(cut), exposure)
+
+
 def _planes(x: Picture) -> Tensor:
     """(H, W, C) array -> (1, C, H, W) tensor."""
     return torch.from_numpy(np.ascontiguousarray(x)).permute(2, 0, 1)[None]
@@ -92,6 +103,7 @@ def check(
     normal: Any,
     guide_radiance: Any = None,
     guide_alpha: Any = None,
+    noisy: Any = None,
 ) -> Inputs:
     """Return the arrays, cleaned; float32 ones without a fault are not copied.
 
@@ -113,8 +125,9 @@ def check(
         name: (clean_radiance if name == "guide_radiance" else fill_holes)(guide)
         for name, guide in guides.items()
     }
+    before, faults = (None, 0) if noisy is None else _noisy(noisy, low)
     low, bad_pixels = clean_radiance(low)
-    bad_pixels += sum(count for _, count in cleaned.values())
+    bad_pixels += faults + sum(count for _, count in cleaned.values())
     light, _ = cleaned.get("guide_radiance", (None, 0))
     cover, _ = cleaned.get("guide_alpha", (None, 0))
     if cover is not None and low.shape[2] == 3:
@@ -122,12 +135,24 @@ def check(
     return Inputs(
         scale,
         low,
+        before,
         cleaned["albedo"][0],
         cleaned["normal"][0],
         light,
         None if cover is None else cover[..., 0],
         bad_pixels,
     )
+
+
+def _noisy(value: Any, low: Picture) -> tuple[Picture, int]:
+    """Return the radiance before denoising, cleaned, and its bad pixels."""
+    noisy = _array("noisy", value, (3,))
+    if noisy.shape[:2] != low.shape[:2]:
+        raise PictureError(
+            f"noisy is {_size(noisy)} pixels, but radiance is {_size(low)}: "
+            "give both of one render"
+        )
+    return clean_radiance(noisy)
 
 
 def _low_alpha(cover: Picture, low: Picture, scale: int) -> Picture:

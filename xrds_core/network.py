@@ -23,8 +23,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from .kernels import KernelTail, Sources, find_sources
-from .regression import FEATURES
+from .kernels import FACTS, KernelTail, Sources, find_sources
 
 # Channels of the guide stack: albedo 0-2, normal 3-5, full-resolution radiance 6-8.
 GUIDE_CHANNELS: dict[str, tuple[int, ...]] = {
@@ -101,7 +100,7 @@ class NetworkConfig:
     @property
     def radiance_count(self) -> int:
         """Channels that the radiance branch is given: see `find_sources`."""
-        return 3 * self.source_count + (FEATURES if self.base else 0)
+        return 3 * self.source_count + (FACTS if self.base else 0)
 
     @property
     def low_multiple(self) -> int:
@@ -436,7 +435,9 @@ class XRDS(nn.Module):
         else:
             self.tail = PixelTail(config)
 
-    def forward(self, radiance: Tensor, guides: Tensor) -> Tensor:
+    def forward(
+        self, radiance: Tensor, guides: Tensor, noisy: Tensor | None = None
+    ) -> Tensor:
         """Enlarge one batch.
 
         Args:
@@ -444,6 +445,8 @@ class XRDS(nn.Module):
             guides: (B, 6, s*h, s*w), albedo in [0, 1] and camera-space normal; with
                 `full` guides (B, 9, s*h, s*w), the full-resolution radiance in the
                 transfer domain behind them.
+            noisy: as `radiance`, but before denoising; None where it was not denoised
+                or that is lost. Of use to networks with a base alone.
 
         Returns:
             (B, 3, s*h, s*w) radiance in the transfer domain.
@@ -453,12 +456,14 @@ class XRDS(nn.Module):
         expected = (self.config.guide_count, s * h, s * w)
         if guides.shape[1:] != expected:
             raise ValueError(f"guides are {tuple(guides.shape[1:])}, not {expected}")
-        radiance, guides = self.pad(radiance, 1), self.pad(guides, s)
+        noisy = radiance if noisy is None else noisy
+        radiance, noisy = self.pad(radiance, 1), self.pad(noisy, 1)
+        guides = self.pad(guides, s)
         sources: Sources = []
         if self.config.base:
-            sources, slopes = find_sources(radiance, guides, s)
+            sources, facts = find_sources(radiance, noisy, guides, s)
             logs = [torch.log1p(x.low) for x in sources]
-            radiance = torch.cat((*logs, slopes), dim=1)
+            radiance = torch.cat((*logs, facts), dim=1)
         features = self.features(radiance, guides)
         return self.tail(features, guides, sources)[..., : s * h, : s * w]
 

@@ -20,10 +20,10 @@ from torch.nn import functional as F
 ALBEDO_EPSILON = 0.02
 # Added to radiance, in units of k e x, before its logarithm.
 RADIANCE_FLOOR = 0.02
-# Variance of the log radiance, unexplained by a fit, that doubles its ridge.
-NOISE = 0.01
-# Added to variances under a correlation: where nothing varies there is none.
-LEAST_VARIANCE = 0.002
+# Variance of the log radiance, unexplained by a fit, that doubles its ridge; by scale.
+NOISE = 0.0125
+# What a denoiser took away, of what it left, counts up to this: fireflies are not fit.
+GRAIN_LIMIT = 1.0
 
 
 class Feature(NamedTuple):
@@ -49,15 +49,31 @@ def find_features(guides: Tensor, scale: int) -> list[Feature]:
     ]
 
 
-def regress(radiance: Tensor, guides: Tensor, scale: int) -> tuple[Tensor, Tensor]:
+def find_grain(radiance: Tensor, noisy: Tensor) -> Tensor:
+    """What a denoiser took from `noisy`, relative to what it left, within bounds.
+
+    Both (B, 3, h, w), linear, in units of k e x.
+    """
+    ratio = (noisy + RADIANCE_FLOOR) / (radiance + RADIANCE_FLOOR)
+    return (ratio - 1).clamp(-1.0, GRAIN_LIMIT)
+
+
+def regress(
+    radiance: Tensor, grain: Tensor, guides: Tensor, scale: int
+) -> tuple[Tensor, Tensor]:
     """What the guides explain of the radiance, as a factor, and the fit's slopes.
 
     The factor (B, 3, H, W), positive, is albedo^a exp(n . w) with the slopes a and w of
     a fit (B, 4, h, w) to `radiance` (B, 3, h, w), which is linear, in units of k e x.
     The slopes are common to the colour channels, so grey stays grey.
+
+    A denoiser at low resolution takes fine texture for noise; in its `grain` (see
+    `find_grain`) the texture still is. To first order log radiance and grain add up to
+    the log of the noisy radiance, without the bias of a logarithm of noise.
     """
     features = find_features(guides, scale)
-    slopes = blur(fit(radiance, features, scale))
+    target = (radiance + RADIANCE_FLOOR).log() + grain
+    slopes = blur(fit(target, features, NOISE * scale))
     enlarged = F.interpolate(slopes, scale_factor=scale, mode="bilinear")
     terms = (
         slope * feature.full
@@ -66,17 +82,15 @@ def regress(radiance: Tensor, guides: Tensor, scale: int) -> tuple[Tensor, Tenso
     return sum(terms, torch.zeros_like(enlarged[:, :1])).exp(), slopes
 
 
-def fit(radiance: Tensor, features: list[Feature], scale: int) -> Tensor:
-    """Slopes of the log radiance by each feature, albedo first: (B, features, h, w).
+def fit(target: Tensor, features: list[Feature], noise: float) -> Tensor:
+    """Slopes of `target` (B, 3, h, w) by each feature: (B, features, h, w).
 
     Where a feature has three channels, they are samples of one variable: each channel
-    of the radiance goes with its own. A denoiser at low resolution takes contrast from
-    fine texture but leaves it in its place, so the correlation with the albedo, too,
-    says how much of it is in the radiance: the more, the coarser the pixels are.
+    of the target goes with its own. `noise` is the unexplained variance that doubles
+    the ridge.
     """
     count = len(features)
-    x = [feature.low for feature in features]
-    x.append((radiance + RADIANCE_FLOOR).log())
+    x = [*(feature.low for feature in features), target]
     pairs = [(i, j) for i in range(count + 1) for j in range(i, count + 1)]
     moments = [mean(x[i] * x[j]) for i, j in pairs]
     sums = blur(torch.cat([*moments, *x], dim=1))
@@ -88,7 +102,7 @@ def fit(radiance: Tensor, features: list[Feature], scale: int) -> Tensor:
 
     def ridged(unexplained: Tensor | float) -> list[Tensor]:
         diagonal = {
-            (i, i): covariance[i, i] + feature.ridge * (1 + unexplained / NOISE)
+            (i, i): covariance[i, i] + feature.ridge * (1 + unexplained / noise)
             for i, feature in enumerate(features)
         }
         return solve(covariance | diagonal, count)
@@ -97,9 +111,6 @@ def fit(radiance: Tensor, features: list[Feature], scale: int) -> Tensor:
     terms = (slope * covariance[i, count] for i, slope in enumerate(ridged(0.0)))
     variance = covariance[count, count]
     slopes = ridged((variance - sum(terms, torch.zeros_like(variance))).clamp(min=0))
-    variances = (covariance[0, 0] + LEAST_VARIANCE) * (variance + LEAST_VARIANCE)
-    missing = covariance[0, count] / variances.clamp(min=1e-12).sqrt() - slopes[0]
-    slopes[0] = slopes[0] + min(1.0, scale / 4) * missing.clamp(min=0)
     clamped = (
         slope.clamp(*feature.slope)
         for slope, feature in zip(slopes, features, strict=True)

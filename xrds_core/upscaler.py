@@ -101,6 +101,7 @@ class Upscaler:
         albedo: Picture,
         normal: Picture,
         *,
+        noisy: Picture | None = None,
         guide_radiance: Picture | None = None,
         guide_alpha: Picture | None = None,
         exposure: float | None = None,
@@ -115,6 +116,8 @@ class Upscaler:
             radiance: (h, w, 3), or (h, w, 4) premultiplied; scene-linear.
             albedo: (H, W, 3), where h = ceil(H / scale) and w = ceil(W / scale).
             normal: (H, W, 3), in camera space.
+            noisy: (h, w, 3), the radiance before it was denoised: tells how much of
+                the guides' texture is in the light. None where it never was, or lost.
             guide_radiance: (H, W, 3), for ``full`` guides and only for them.
             guide_alpha: (H, W), the alpha of the guides' render; in place of the
                 picture's own, too, where ``radiance`` has none.
@@ -129,7 +132,7 @@ class Upscaler:
             Cancelled: ``progress`` returned False.
         """
         inputs = check(
-            self.scale, radiance, albedo, normal, guide_radiance, guide_alpha
+            self.scale, radiance, albedo, normal, guide_radiance, guide_alpha, noisy
         )
         self._check_guides(inputs)
         exposure = _exposure(exposure, inputs)
@@ -244,9 +247,11 @@ class Upscaler:
                 torch.inference_mode(),
                 torch.autocast(self.device.type, torch.bfloat16, enabled=bf16),
             ):
+                noisy = inputs.noisy_tensor(tile, exposure)
                 t = self.network(
                     inputs.radiance_tensor(tile, exposure).to(self.device),
                     inputs.guide_tensor(tile, exposure).to(self.device),
+                    None if noisy is None else noisy.to(self.device),
                 )
                 result = inverse_transfer(t, exposure).clamp_(min=0.0)
         except torch.OutOfMemoryError as error:
@@ -296,6 +301,7 @@ def upscale(
     *,
     scale: int = 2,
     preset: str = "fast",
+    noisy: Picture | None = None,
     guide_radiance: Picture | None = None,
     alpha: Picture | None = None,
     exposure: float | None = None,
@@ -316,6 +322,7 @@ def upscale(
         radiance,
         albedo,
         normal,
+        noisy=noisy,
         guide_radiance=guide_radiance,
         guide_alpha=alpha,
         exposure=exposure,

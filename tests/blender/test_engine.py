@@ -125,6 +125,18 @@ def test_persistent_data_changes_no_pixel(
         np.testing.assert_array_equal(kept, fresh)
 
 
+def test_the_network_sees_the_picture_before_denoising(life: Any, network: Any) -> None:
+    render(life, 2, samples=2, seed=1)
+    rough, smooth = run_job(
+        life,
+        lambda passes: [passes.beauty(2, 2, denoise=d, seed=1) for d in (False, True)],
+    )
+    (call,) = network[0].calls
+    np.testing.assert_array_equal(call["noisy"], rough.radiance)
+    np.testing.assert_array_equal(call["radiance"][..., :3], smooth.radiance)
+    assert np.abs(rough.radiance - smooth.radiance).max() > 0.01
+
+
 def multilayer(scene: Any, path: Path) -> dict[str, np.ndarray]:
     """Every channel of a multilayer EXR, over all its parts."""
     openexr = pytest.importorskip("OpenEXR")
@@ -168,6 +180,8 @@ def test_two_view_layers_with_their_passes(
     (diffuse,) = [v for k, v in channels.items() if is_diffuse(k, "A", "R")]
     assert diffuse.shape == (33, 45)
     assert diffuse[22:].mean() > 0.01  # no bounce is missing: it is the low picture's
+    noisy = channels["A.Noisy Image.R"]  # likewise, enlarged
+    assert abs(noisy.mean() / channels["A.Combined.R"].mean() - 1) < 0.1
 
 
 def is_diffuse(name: str, layer: str, channel: str) -> bool:

@@ -10,9 +10,11 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from PIL import Image
 
 from xrds_blender.bench import contenders, inputs, windows
 from xrds_blender.bench.evaluate import evaluate
+from xrds_blender.bench.samples import samples_table
 from xrds_core import exr, metrics, weights
 from xrds_core.errors import UsageError
 from xrds_core.network import XRDS, preset_config
@@ -154,7 +156,11 @@ def test_weights_and_whole_frames(world: World) -> None:
     network = XRDS(preset_config("fast", 2))
     weights.save(network, world.folder / "fast_x2.safetensors", {})
     report = world.run(
-        weights=world.folder, timing=True, timing_rounds=1, timing_scenes=["floor"]
+        weights=world.folder,
+        timing=True,
+        timing_rounds=1,
+        timing_scenes=["floor"],
+        sheets=world.folder / "sheets",
     )
     (record,) = report["scenes"]
     assert next(iter(record["methods"])) == "xrds"
@@ -165,6 +171,9 @@ def test_weights_and_whole_frames(world: World) -> None:
     assert 0 < parts <= stages["total"]
     assert record["methods"]["xrds"]["seconds"] == stages["total"]
     assert record["frame_seconds"]["oidn_equal_time"]["samples"] >= 1
+    with Image.open(world.folder / "sheets" / "floor.jpg") as sheet:
+        assert sheet.width == 5 * (WINDOW[2] * 4 + 2)
+        assert sheet.height == 2 * (WINDOW[3] * 4 + 2 * 18)
 
 
 def test_unknown_names_are_refused(world: World) -> None:
@@ -172,3 +181,43 @@ def test_unknown_names_are_refused(world: World) -> None:
         world.run(guides=["noisy"])
     with pytest.raises(UsageError, match="boat"):
         world.run(timing=True, timing_scenes=["floor", "boat"])
+
+
+def test_table_of_samples(world: World, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = world.folder / "networks"
+    folder.mkdir()
+    for guides in ("fast", "full"):
+        network = XRDS(preset_config("fast", 2, guides))
+        weights.save(network, folder / weights.file_name("fast", 2, guides), {})
+    report = samples_table(
+        [world.scene],
+        windows=world.windows,
+        references=world.folder,
+        cache=world.cache,
+        weights=folder,
+        out=world.folder,
+    )
+    assert json.loads((world.folder / "samples.json").read_text()) == report
+    rows = {
+        (r["method"], r["guides"], r["samples"], r["denoiser"]): r
+        for r in report["records"]
+    }
+    assert len(rows) == 5 + 3 + 2 * 4  # fast and full guides, two modes of OIDN
+    assert all(row["seconds"] > 0 for row in rows.values())
+    told = report["summary"]
+    ours = rows["xrds", "fast", 16, "HIGH-ACCURATE"]
+    for mode, denoiser in (("default", "HIGH-ACCURATE"), ("fast", "FAST-FAST")):
+        theirs = rows["oidn", "", 4, denoiser]
+        found = told["over_oidn"][mode]["4"]
+        assert found["gain"] == {"floor": ours["psnr"] - theirs["psnr"]}
+        assert found["seconds"] == {"floor": ours["seconds"] / theirs["seconds"]}
+        full = rows["xrds", "full", 16, "HIGH-ACCURATE"]
+        assert full["guide_samples"] == 4  # eight on the average, half of them each
+        eight = rows["oidn", "", 8, denoiser]
+        gain = told["full_over_oidn"][mode]["8"]["mean_gain"]
+        assert gain == full["psnr"] - eight["psnr"]
+    few, some, many = told["more_samples"]["floor"]
+    assert few < some < many + 1
+    shown = capsys.readouterr().err
+    assert f"{many - some:+.2f}" in shown or f"{some - few:+.2f}" in shown
+    assert "full guides" in shown

@@ -74,6 +74,7 @@ def test_passes_are_found_under_any_prefix(path: Path, layout: str) -> None:
     np.testing.assert_array_equal(beauty.radiance, stacked("Combined"))
     np.testing.assert_array_equal(beauty.alpha, PASSES["Combined"]["A"])
     np.testing.assert_array_equal(beauty.picture, stacked("Combined", "RGBA"))
+    np.testing.assert_array_equal(beauty.noisy, stacked("Noisy Image"))
     guides = read_guides(path, full=True)
     np.testing.assert_array_equal(guides.albedo, stacked("Denoising Albedo"))
     np.testing.assert_array_equal(guides.normal, stacked("Denoising Normal", "XYZ"))
@@ -89,6 +90,7 @@ def test_a_plain_picture_with_and_without_alpha(path: Path) -> None:
         np.testing.assert_array_equal(beauty.radiance[..., 1], channels["G"])
         assert beauty.picture.shape == (4, 6, len(letters))
         assert (beauty.alpha is None) == (letters == "RGB")
+        assert beauty.noisy is None
 
 
 def test_full_guides_of_an_undenoised_render_are_the_picture(path: Path) -> None:

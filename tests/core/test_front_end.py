@@ -223,14 +223,14 @@ def test_regressed_base_keeps_texture_and_leaves_what_guides_do_not_say() -> Non
     lit = 3.0 * (albedo + front_end.ALBEDO_EPSILON)
     low = lit.reshape(12, 4, 16, 4, 3).mean(axis=(1, 3))
     plain = low.repeat(4, axis=0).repeat(4, axis=1)
-    error = np.abs(regressed_base(low, albedo, normal, 4) - lit).mean()
+    error = np.abs(regressed_base(low, low, albedo, normal, 4) - lit).mean()
     assert error < 0.3 * np.abs(plain - lit).mean()
     even = np.full((12, 16, 3), 0.7, np.float32)
-    base = regressed_base(even, albedo, normal, 4)
+    base = regressed_base(even, even, albedo, normal, 4)
     np.testing.assert_allclose(base, 0.7, rtol=1e-3)
-    brighter = regressed_base(low * 1e6, albedo, normal, 4)
+    brighter = regressed_base(low * 1e6, low * 1e6, albedo, normal, 4)
     np.testing.assert_allclose(
-        brighter, regressed_base(low, albedo, normal, 4) * 1e6, rtol=1e-4
+        brighter, regressed_base(low, low, albedo, normal, 4) * 1e6, rtol=1e-4
     )
 
 

@@ -7,16 +7,26 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from xrds_core.regression import ALBEDO_EPSILON, blur, regress, solve
+from xrds_core.regression import (
+    ALBEDO_EPSILON,
+    GRAIN_LIMIT,
+    blur,
+    find_grain,
+    regress,
+    solve,
+)
 
 
 def smooth(*shape: int) -> Tensor:
     return blur(blur(blur(torch.rand(*shape))))
 
 
-def explained(radiance: Tensor, guides: Tensor, scale: int) -> Tensor:
+def explained(
+    radiance: Tensor, guides: Tensor, scale: int, noisy: Tensor | None = None
+) -> Tensor:
     """The radiance over what the guides explain of it, enlarged, times that again."""
-    factor, _ = regress(radiance, guides, scale)
+    grain = find_grain(radiance, radiance if noisy is None else noisy)
+    factor, _ = regress(radiance, grain, guides, scale)
     rest = radiance / F.avg_pool2d(factor, scale)
     return F.interpolate(rest, scale_factor=scale, mode="bilinear") * factor
 
@@ -49,14 +59,38 @@ def test_shading_by_the_normal_is_found() -> None:
     assert error(result, reference) < 0.7 * error(plain, reference)
 
 
+def test_texture_that_a_denoiser_took_away_comes_back() -> None:
+    torch.manual_seed(4)
+    albedo = torch.rand(1, 3, 128, 128).round() * 0.6 + 0.2
+    reference = albedo * (0.5 + smooth(1, 1, 128, 128))
+    low = F.avg_pool2d(reference, 4)
+    denoised = blur(low)
+    noisy = low * (0.5 + torch.rand_like(low))
+    guides = torch.cat((albedo, torch.zeros_like(albedo)), dim=1)
+    without = explained(denoised, guides, 4)
+    result = explained(denoised, guides, 4, noisy)
+    assert error(result, reference) < 0.6 * error(without, reference)
+
+
+def test_fireflies_leave_a_bounded_grain() -> None:
+    low = torch.full((1, 3, 4, 4), 0.5)
+    noisy = low.clone()
+    noisy[..., 0, 0], noisy[..., 1, 1] = 1e30, 0.0
+    grain = find_grain(low, noisy)
+    assert grain[..., 0, 0].max() == GRAIN_LIMIT
+    assert -1 <= grain[..., 1, 1].min() < -0.9
+    assert grain.count_nonzero() == 6
+
+
 def test_guides_that_say_nothing_are_left_out() -> None:
     torch.manual_seed(2)
     low = 0.3 + smooth(1, 3, 24, 24)
     guides = torch.rand(1, 6, 48, 48)
     guides[:, 3:] = 0
-    _, slopes = regress(low, guides, 2)
+    none = torch.zeros_like(low)
+    _, slopes = regress(low, none, guides, 2)
     lying = F.interpolate(low, scale_factor=2) * (guides[:, :3] + ALBEDO_EPSILON)
-    _, believed = regress(F.avg_pool2d(lying, 2), guides, 2)
+    _, believed = regress(F.avg_pool2d(lying, 2), none, guides, 2)
     assert slopes[:, 0].mean() < 0.1
     assert believed[:, 0].mean() > 0.5
 
@@ -64,14 +98,15 @@ def test_guides_that_say_nothing_are_left_out() -> None:
 def test_grey_stays_grey_and_channels_may_be_exchanged() -> None:
     torch.manual_seed(3)
     low, guides = torch.rand(1, 3, 16, 16), torch.rand(1, 6, 32, 32)
-    factor, slopes = regress(low, guides, 2)
+    grain = find_grain(low, torch.rand(1, 3, 16, 16))
+    factor, slopes = regress(low, grain, guides, 2)
     order = [2, 0, 1]
     exchanged = torch.cat((guides[:, order], guides[:, 3:]), dim=1)
-    other, other_slopes = regress(low[:, order], exchanged, 2)
+    other, other_slopes = regress(low[:, order], grain[:, order], exchanged, 2)
     torch.testing.assert_close(other, factor[:, order])
     torch.testing.assert_close(other_slopes, slopes)
     grey = torch.cat((guides[:, :1].expand(-1, 3, -1, -1), guides[:, 3:]), dim=1)
-    factor, _ = regress(low, grey, 2)
+    factor, _ = regress(low, grain, grey, 2)
     torch.testing.assert_close(factor, factor[:, :1].expand_as(factor))
 
 
@@ -82,7 +117,8 @@ def test_factors_stay_finite_and_bounded(scale: float, spread: float) -> None:
     low = scale * 10 ** (spread * (torch.rand(1, 3, 16, 16) - 0.5))
     guides = torch.rand(1, 6, 32, 32) * 2 - 1
     guides[:, :3] = guides[:, :3].clamp(min=0)
-    factor, slopes = regress(low, guides, 2)
+    noisy = scale * 10 ** (spread * (torch.rand(1, 3, 16, 16) - 0.5))
+    factor, slopes = regress(low, find_grain(low, noisy), guides, 2)
     assert factor.isfinite().all()
     assert slopes.isfinite().all()
     assert factor.min() > 1e-6

@@ -20,6 +20,7 @@ from PIL import Image
 
 from xrds_core import weights
 from xrds_core.errors import Cancelled, UsageError, WeightsError
+from xrds_core.training.ablations import TABLES, ablate, lines
 from xrds_core.training.config import TrainingConfig, read_config, to_toml
 from xrds_core.training.data import Variation
 from xrds_core.training.interruption import Interruption
@@ -342,6 +343,15 @@ def test_command_stops_on_ctrl_c_and_keeps_its_steps(
     assert "the same command goes on" in errors
 
 
+@pytest.fixture
+def _ctrl_c() -> Iterator[None]:
+    """Ctrl-C raises, also where a shell started the tests in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("_ctrl_c")
 def test_later_signal_acts_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     with Interruption() as stop:
         signal.raise_signal(signal.SIGINT)
@@ -391,7 +401,7 @@ def test_batch_that_processes_cannot_share_is_said() -> None:
 
 def test_validation_knows_where_demodulation_is_exact(config: TrainingConfig) -> None:
     paths = sorted((Path(config.data[0]) / "train").glob("*.npz"))
-    windows = WindowSet(paths, 2, "fast", noisy=False, memory=0)
+    windows = WindowSet(paths, 2, "fast", memory=0)
     validation = Validation(windows, 2, 2, "fast")
 
     def scores() -> list[Score]:
@@ -423,3 +433,44 @@ def test_gain_is_over_the_better_enlargement_of_each_window() -> None:
     assert told["gains"] == {"rendered": -0.5, "shaded": -2.0}
     assert told["worst"] == {"rendered": -2.0, "shaded": -3.0}
     assert told["psnr"]["rendered"]["demodulated"] == 21.5
+
+
+# --- ablations ------------------------------------------------------------------------
+
+
+@undrawn
+def test_table_of_runs_that_differ_in_one_thing(
+    config: TrainingConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "run.toml").write_text(to_toml(config))
+    steps = ["steps = 2", "validate_every = 2"]
+    out = tmp_path / "tables"
+    told = ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps)
+    assert json.loads((out / "base.json").read_text()) == told
+    assert told["steps"] == 2
+    (pixels, kernels) = told["rows"].values()
+    for row in (pixels, kernels):
+        assert row["mean"] == pytest.approx(sum(row["psnr"]) / 2)
+        assert row["spread"] == abs(row["psnr"][0] - row["psnr"][1]) > 0
+    assert kernels["mean"] > pixels["mean"] + 3  # two steps teach nobody to paint
+    assert kernels["parameters"] != pixels["parameters"]
+    assert "kernels over" in "\n".join(lines(told))
+    monkeypatch.setattr("xrds_core.training.train.Run.train_step", pytest.fail)
+    assert ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps) == told
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_every_variant_of_a_table_is_a_configuration(
+    config: TrainingConfig, tmp_path: Path, table: str
+) -> None:
+    (tmp_path / "run.toml").write_text(to_toml(config))
+    found = [
+        read_config(tmp_path / "run.toml", changes)
+        for changes in TABLES[table].values()
+    ]
+    assert len({to_toml(variant) for variant in found}) == len(found)
+
+
+def test_unknown_table_is_named(config: TrainingConfig, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no table 'colours'; there are base, guides"):
+        ablate(tmp_path / "run.toml", "colours", tmp_path)

@@ -61,7 +61,7 @@ def test_normals_turn_with_the_picture() -> None:
     for seed in range(64):
         random = np.random.default_rng(seed)
         marked = np.arange(64, dtype=np.float32).reshape(8, 8, 1)
-        whole = Crop(marked, marked, marked, dome, None, 1.0)
+        whole = Crop(marked, marked, marked, marked, dome, None, 1.0)
         turned = transpose_and_flip(whole, random)
         np.testing.assert_allclose(turned.normal, dome, atol=1e-6)
         seen.add(turned.low.tobytes())
@@ -143,7 +143,7 @@ def test_loader_draws_each_step_once_and_in_order() -> None:
     def crop(step: int, place: int) -> Batch:
         drawn.append((step, place))
         marked = torch.full((1, 3, 2, 2), float(10 * step + place))
-        return Batch(marked, marked, marked)
+        return Batch(marked, marked, marked, marked)
 
     loader = CropLoader(crop, range(1, 4, 2))
     for step in (4, 5, 6):
@@ -164,8 +164,8 @@ def test_loader_tells_what_went_wrong() -> None:
 
 def test_windows_beyond_the_memory_are_read_again(config: TrainingConfig) -> None:
     paths = sorted((Path(config.data[0]) / "train").glob("*.npz"))
-    size = read_window(paths[0], 2, "fast", noisy=False).size
-    windows = WindowSet(paths, 2, "fast", noisy=False, memory=2.5 * size)
+    size = read_window(paths[0], 2, "fast").size
+    windows = WindowSet(paths, 2, "fast", memory=2.5 * size)
     kept = [windows[i] is windows[i] for i in range(len(paths))]
     assert kept == [True, True, False]
     again = windows[2]
@@ -174,13 +174,27 @@ def test_windows_beyond_the_memory_are_read_again(config: TrainingConfig) -> Non
     )
 
 
-def test_noisy_renders_are_read_only_where_crops_use_them(
+def test_radiance_before_denoising_comes_with_its_render(
     config: TrainingConfig,
 ) -> None:
-    path = first_window(config)
-    quiet, all_ = (read_window(path, 2, "fast", noisy) for noisy in (False, True))
-    assert {*all_.arrays} - {*quiet.arrays} == {"low2_0_noisy", "low2_1_noisy"}
-    assert quiet.size < all_.size
+    window = read_window(first_window(config), 2, "fast")
+    rough = {f"low2_{i}_noisy": window.arrays[f"low2_{i}"] * i for i in range(2)}
+    window = replace(window, arrays=window.arrays | rough)
+
+    def drawn(variation: Variation) -> list[float]:
+        """Of each crop, how bright the noisy radiance is beside the denoised."""
+        crops = [
+            draw(window, 2, "fast", variation, np.random.default_rng(seed))
+            for seed in range(12)
+        ]
+        means = [(torch.expm1(x).mean() for x in (b.noisy, b.radiance)) for b in crops]
+        return [round(float(noisy / low), 2) for noisy, low in means]
+
+    assert set(drawn(Variation())) == {0.0, 1.0}
+    assert set(drawn(Variation(denoised_only=1.0))) == {1.0}
+    lit_anew = drawn(Variation(shaded=1.0))
+    assert min(lit_anew) < 0.2
+    assert max(lit_anew) == pytest.approx(1.0)
 
 
 def test_windows_without_the_scale_are_left_out(

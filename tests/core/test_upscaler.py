@@ -104,6 +104,21 @@ def test_full_guides_are_seen() -> None:
     assert not np.allclose(first, second, rtol=0.01)
 
 
+def test_radiance_before_denoising_is_seen(fast: Upscaler) -> None:
+    low, *guides = picture(12, 12)
+    grain = 2.0 * textured(12, 12, 3, seed=6)
+    plain = fast(low, *guides).radiance
+    np.testing.assert_array_equal(fast(low, *guides, noisy=low).radiance, plain)
+    rough = fast(low, *guides, noisy=low * grain).radiance
+    assert not np.allclose(rough, plain, rtol=0.01)
+    grain[5, 5] = np.nan
+    spoilt = fast(low, *guides, noisy=low * grain)
+    assert spoilt.bad_pixels == 1
+    assert np.isfinite(spoilt.radiance).all()
+    with pytest.raises(PictureError, match="noisy is 11x12 pixels, but radiance is 12"):
+        fast(low, *guides, noisy=low[:, :11])
+
+
 def test_flipped_views_and_other_floats_are_taken(fast: Upscaler) -> None:
     inputs = picture(8, 8)
     expected = fast(*inputs).radiance

@@ -20,17 +20,22 @@ if TYPE_CHECKING:
     from .inputs import Arrays, Say
     from .windows import Shot
 
-    Enlargement = Callable[[np.ndarray, np.ndarray, np.ndarray, int], np.ndarray]
+    Enlargement = Callable[
+        [np.ndarray, np.ndarray, np.ndarray, np.ndarray, int], np.ndarray
+    ]
 
 GUIDES = ("fast", "full")
 
-# By the method's name in every report: (radiance, albedo, normal, scale) -> picture.
+# By the method's name in every report:
+# (radiance, the same before denoising, albedo, normal, scale) -> picture.
 ENLARGEMENTS: dict[str, Enlargement] = {
-    "bicubic": lambda low, albedo, normal, s: baselines.bicubic(low, s),
-    "demodulated_bilinear": lambda low, albedo, normal, s: front_end.demodulated_base(
-        low, albedo, s
+    "bicubic": lambda low, noisy, albedo, normal, s: baselines.bicubic(low, s),
+    "demodulated_bilinear": lambda low, noisy, albedo, normal, s: (
+        front_end.demodulated_base(low, albedo, s)
     ),
-    "joint_bilateral": baselines.joint_bilateral,
+    "joint_bilateral": lambda low, noisy, *guides: baselines.joint_bilateral(
+        low, *guides
+    ),
     "regressed": front_end.regressed_base,
 }
 
@@ -80,6 +85,7 @@ class Inputs:
     """Arrays of one case, cleaned as the product cleans them."""
 
     radiance: np.ndarray
+    noisy: np.ndarray
     albedo: np.ndarray
     normal: np.ndarray
     guide_radiance: np.ndarray | None
@@ -110,10 +116,13 @@ class Contenders:
         upscaler = self.upscaler(case)
         if upscaler is not None:
             result["xrds"] = upscaler(
-                inputs.radiance, *guides, guide_radiance=inputs.guide_radiance
+                inputs.radiance,
+                *guides,
+                noisy=inputs.noisy,
+                guide_radiance=inputs.guide_radiance,
             ).radiance[..., :3]
         for name, enlarge in ENLARGEMENTS.items():
-            result[name] = enlarge(inputs.radiance, *guides, case.scale)
+            result[name] = enlarge(inputs.radiance, inputs.noisy, *guides, case.scale)
         samples = self.settings.equal_samples(case.scale)
         result["oidn_equal_spp"] = self.plain(shot, samples)
         return result, inputs.exposure_stops
@@ -130,6 +139,7 @@ class Contenders:
         radiance = guides.get("radiance")
         return Inputs(
             front_end.clean_radiance(low["radiance"])[0],
+            front_end.clean_radiance(low.get("noisy", low["radiance"]))[0],
             front_end.clean_albedo(guides["albedo"])[0],
             front_end.clean_normal(guides["normal"])[0],
             None if radiance is None else front_end.clean_radiance(radiance)[0],

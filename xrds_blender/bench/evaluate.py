@@ -19,6 +19,7 @@ from . import table
 from .contenders import Contenders, Settings
 from .frames import FrameSeconds
 from .inputs import Folder
+from .sheets import Sheet
 from .timing import ROUNDS
 from .windows import find_shots
 
@@ -42,6 +43,7 @@ def evaluate(
     guides: Sequence[str] = ("fast",),
     timing: bool = False,
     out: Path | None = None,
+    sheets: Path | None = None,
     weights: Path | None = None,
     progress: Say | None = None,
     timing_scenes: Sequence[str] | None = None,
@@ -55,7 +57,8 @@ def evaluate(
     adds whole frames' seconds and OIDN at equal time, for the scenes named in
     ``timing_scenes`` or for all. Presets without weights stand in the table without
     the product. ``progress`` is given lines of text; ``settings`` are further fields
-    of Settings. The table is printed on stderr; ``out`` gets results.json.
+    of Settings. The table is printed on stderr; ``out`` gets results.json, ``sheets``
+    a JPEG of enlarged crops for each scene.
     Raises UsageError for missing files and unknown names.
     """
     chosen = Settings(tuple(scales), tuple(presets), tuple(guides), **settings)
@@ -68,9 +71,12 @@ def evaluate(
     for shot in shots:
         timed = timing and (timing_scenes is None or shot.name in timing_scenes)
         frame = FrameSeconds(shot, contenders, timing_rounds) if timed else None
+        sheet = Sheet()
         for case in chosen.cases:
-            records.append(_record(shot, case, contenders, frame))
+            records.append(_record(shot, case, contenders, frame, sheet))
             contenders.say(table.line(records[-1]))
+        if sheets is not None:
+            sheet.write(sheets / f"{shot.name}.jpg")
     report = {
         "settings": _settings(chosen, timing),
         "scenes": records,
@@ -84,9 +90,13 @@ def evaluate(
 
 
 def _record(
-    shot: Shot, case: Case, contenders: Contenders, frame: FrameSeconds | None
+    shot: Shot,
+    case: Case,
+    contenders: Contenders,
+    frame: FrameSeconds | None,
+    sheet: Sheet,
 ) -> dict[str, Any]:
-    """One entry of ``scenes``."""
+    """One entry of ``scenes``; its pictures go into the sheet."""
     record = {
         "scene": shot.name,
         "scale": case.scale,
@@ -100,6 +110,7 @@ def _record(
         pictures["oidn_equal_time"] = contenders.plain(shot, samples)
         stages["oidn_equal_time"] = frame.plain(samples)
     reference = exr.read_beauty(shot.reference).radiance[..., :3]
+    sheet.add(f"{shot.name} x{case.scale} {case.label}", pictures, reference, stops)
     methods = {
         name: metrics.all_metrics(picture, reference, stops)
         | {"seconds": stages.get(name, {}).get("total")}

@@ -76,14 +76,14 @@ class FrameSeconds:
         for method, enlarge in ENLARGEMENTS.items():
             self.times.add(
                 f"{method} x{case.scale}",
-                lambda enlarge=enlarge: enlarge(low, guide, guide, case.scale),
+                lambda enlarge=enlarge: enlarge(low, low, guide, guide, case.scale),
             )
         upscaler = self.contenders.upscaler(case)
         if upscaler is not None:
             extra = guide if case.guides == "full" else None
             self.times.add(
                 self._network_name(case),
-                lambda: upscaler(low, guide, guide, guide_radiance=extra),
+                lambda: upscaler(low, guide, guide, noisy=low, guide_radiance=extra),
                 warm=True,
             )
 

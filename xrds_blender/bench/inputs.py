@@ -36,9 +36,10 @@ SEEDS = {"low": 101, "guides": 202, "full": 303, "plain": 404}
 class Request:
     """One rendered input.
 
-    low: denoised beauty at 1/scale; guides: albedo and normal; full: the same with
-    the radiance of all bounces; plain: denoised full-resolution Cycles. ``denoiser``
-    is one of budget.DENOISERS or OFF; None is what the standard measure takes.
+    low: beauty at 1/scale, denoised and before; guides: albedo and normal; full: the
+    same with the radiance of all bounces; plain: denoised full-resolution Cycles.
+    ``denoiser`` is one of budget.DENOISERS or OFF; None is what the standard measure
+    takes.
     """
 
     kind: str
@@ -75,7 +76,7 @@ class Request:
                 f"move it by {tuple(beauty.offset)}"
             )
         arrays = {"radiance": beauty.radiance}
-        if beauty.noisy is not None and self.denoiser is None:
+        if beauty.noisy is not None and self.kind == "low":
             arrays["noisy"] = beauty.noisy
         return arrays, beauty.seconds
 

@@ -80,7 +80,7 @@ def noise(window: Window, scale: int) -> Arrays:
 def _baseline(enlarge: Enlargement, window: Window, scale: int) -> Task:
     def task() -> Run:
         low, full = noise(window, scale)
-        return clocked(lambda: enlarge(low, full, full, scale))
+        return clocked(lambda: enlarge(low, low, full, full, scale))
 
     return task
 

@@ -78,11 +78,6 @@ class TrainingConfig:
         shape = preset_config(self.preset, self.scale, self.guides)
         return replace(shape, **self.network)
 
-    @property
-    def noisy(self) -> bool:
-        """Whether any crop takes a low-resolution render that is not denoised."""
-        return self.variation.noisy > 0
-
     def learning_rate_at(self, step: int) -> float:
         """The learning rate of the step that follows `step` others."""
         if step < self.warmup:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import torch
@@ -18,6 +18,8 @@ class Crop:
     """Pictures of one place, float32 (height, width, 3), scene-linear."""
 
     low: Array
+    noisy: Array
+    """As `low`, before denoising; the same where it was not denoised."""
     reference: Array
     albedo: Array
     normal: Array
@@ -28,8 +30,13 @@ class Crop:
     def with_light(self, change: Callable[[Array], Array]) -> Crop:
         """Change the radiance."""
         guide = None if self.guide_radiance is None else change(self.guide_radiance)
-        low, reference = change(self.low), change(self.reference)
-        return replace(self, low=low, reference=reference, guide_radiance=guide)
+        return replace(
+            self,
+            low=change(self.low),
+            noisy=change(self.noisy),
+            reference=change(self.reference),
+            guide_radiance=guide,
+        )
 
     def with_colours(self, change: Callable[[Array], Array]) -> Crop:
         """Change radiance and albedo alike."""
@@ -46,6 +53,7 @@ class Crop:
             guides.append(transfer(self.guide_radiance, self.exposure))
         return Batch(
             to_tensor(transfer(self.low, self.exposure)),
+            to_tensor(transfer(self.noisy, self.exposure)),
             to_tensor(np.concatenate(guides, axis=-1)),
             to_tensor(transfer(self.reference, self.exposure)),
         )
@@ -56,6 +64,7 @@ class Batch:
     """What `XRDS.forward` takes and should give, radiance in the transfer domain."""
 
     radiance: Tensor  # (B, 3, h, w)
+    noisy: Tensor  # (B, 3, h, w)
     guides: Tensor  # (B, 6 or 9, H, W)
     reference: Tensor  # (B, 3, H, W)
 
@@ -63,14 +72,15 @@ class Batch:
     def stack(batches: Sequence[Batch]) -> Batch:
         """Concatenate along B."""
         return Batch(
-            torch.cat([b.radiance for b in batches]),
-            torch.cat([b.guides for b in batches]),
-            torch.cat([b.reference for b in batches]),
+            *(
+                torch.cat([getattr(b, field.name) for b in batches])
+                for field in fields(Batch)
+            )
         )
 
     def to(self, device: torch.device) -> Batch:
         """The same on a device."""
-        tensors = self.radiance, self.guides, self.reference
+        tensors = (getattr(self, field.name) for field in fields(self))
         return Batch(*(x.to(device, non_blocking=True) for x in tensors))
 
 

@@ -29,6 +29,8 @@ class Variation:
 
     noisy: float = 0.0
     """Share of crops whose low-resolution radiance is not denoised."""
+    denoised_only: float = 0.0
+    """Share of the other crops that come without their radiance before denoising."""
     exposure_stops: float = 0.0
     """Standard deviation of the exposure around the automatic one, in stops."""
     tint_stops: float = 0.0
@@ -85,26 +87,33 @@ def cut(
     size: int | None,
 ) -> Crop:
     """One crop of one low-resolution render and one quality of guides."""
-    noisy = random.random() < variation.noisy
-    name = low_name(scale, int(random.integers(LOW_RENDERS)), bool(noisy))
+    index = int(random.integers(LOW_RENDERS))
+    name, noisy_name = (low_name(scale, index, kind) for kind in (False, True))
+    if random.random() < variation.noisy:
+        name = noisy_name
+    elif random.random() < variation.denoised_only:
+        noisy_name = name
     stops = random.normal(0, variation.exposure_stops)
     exposure = window.exposures[name] * float(2**stops)
     if size is not None and size > min(window.arrays["reference"].shape[:2]):
         raise PictureError(f"{window.path} is smaller than a crop of {size} pixels")
     low_box, box = boxes(window.arrays[name].shape, scale, size, random)
-    low, _ = clean_radiance(window.array(name, low_box))
+    low, noisy = (
+        clean_radiance(window.array(n, low_box))[0] for n in (name, noisy_name)
+    )
     reference, _ = clean_radiance(window.array("reference", box))
     albedo, normal = mix_guides(window, box, random)
     lit_anew = random.random() < variation.shaded
     full = noisy_radiance(window, box, random) if guides == "full" else None
     if lit_anew:
-        rendered = reference
+        rendered, denoised = reference, low
         low, reference = shade(mean_albedo(window, box), scale, exposure, random)
+        noisy = with_noise_of(noisy, denoised, low, exposure)
         if random.random() < variation.over_denoised:
             low = over_denoised(low, random)
         if full is not None:
             full = with_noise_of(full, rendered, reference, exposure)
-    return Crop(low, reference, albedo, normal, full, exposure)
+    return Crop(low, noisy, reference, albedo, normal, full, exposure)
 
 
 def boxes(

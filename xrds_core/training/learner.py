@@ -40,7 +40,8 @@ class Learner:
         batch = batch.to(self.device)
         mixed = self.precision != torch.float32
         with torch.autocast(self.device.type, self.precision, enabled=mixed):
-            return (network or self.network)(batch.radiance, batch.guides).float()
+            inputs = batch.radiance, batch.guides, batch.noisy
+            return (network or self.network)(*inputs).float()
 
     def learn(self, batch: Batch, step: int) -> float:
         """Take one step, the `step`-th from 0; returns the loss before it."""

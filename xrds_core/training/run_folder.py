@@ -33,7 +33,7 @@ FREE = {
 
 def find_files(config: TrainingConfig) -> dict[str, Files]:
     """The window files that a run can use, by split and folder."""
-    low, high = array_names(config.scale, config.guides, config.noisy)
+    low, high = array_names(config.scale, config.guides)
     folders = [Path(folder) for folder in config.data]
     return {split: find_windows(folders, split, low + high) for split in SPLITS}
 
@@ -81,7 +81,7 @@ class RunFolder:
         """The run's windows, by split."""
         files = json.loads(self.files.read_text())
         folders = [Path(folder) for folder in config.data]
-        what = config.scale, config.guides, config.noisy
+        what = config.scale, config.guides
         memory = config.cache_gigabytes * 1e9
         return {
             split: WindowSet(paths_of(folders, split, files[split]), *what, memory)

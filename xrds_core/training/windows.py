@@ -65,9 +65,9 @@ def low_name(scale: int, index: int, noisy: bool = False) -> str:
     return f"low{scale}_{index}{'_noisy' if noisy else ''}"
 
 
-def array_names(scale: int, guides: str, noisy: bool) -> tuple[list[str], list[str]]:
+def array_names(scale: int, guides: str) -> tuple[list[str], list[str]]:
     """What training at one scale reads: low-resolution renders, and the rest."""
-    kinds = (False, True) if noisy else (False,)
+    kinds = (False, True)
     low = [low_name(scale, i, kind) for i in range(LOW_RENDERS) for kind in kinds]
     high = ["reference", "guides_a", "guides_b"]
     if guides == "full":
@@ -75,13 +75,13 @@ def array_names(scale: int, guides: str, noisy: bool) -> tuple[list[str], list[s
     return low, high
 
 
-def read_window(path: Path, scale: int, guides: str, noisy: bool = True) -> Window:
-    """Read what training at one scale needs, with the noisy renders or without.
+def read_window(path: Path, scale: int, guides: str) -> Window:
+    """Read what training at one scale needs.
 
     Raises:
         PictureError: the file is damaged or was rendered without that scale.
     """
-    low, high = array_names(scale, guides, noisy)
+    low, high = array_names(scale, guides)
     try:
         with np.load(path, allow_pickle=False) as file:
             arrays = {name: file[name] for name in low + high}
@@ -116,11 +116,10 @@ class WindowSet:
         paths: Sequence[Path],
         scale: int,
         guides: str,
-        noisy: bool,
         memory: float,
     ) -> None:
         self.paths = paths
-        self._what = (scale, guides, noisy)
+        self._what = (scale, guides)
         self._free = memory
         self._kept: dict[int, Window] = {}
 

@@ -15,7 +15,7 @@ from xrds_core import metrics
 from xrds_core.atomic import replacing
 
 from .measured import Measured
-from .stiff import GUIDE_SAMPLES, SAMPLES, SCALES, equal_samples
+from .stiff import GUIDE_SAMPLES, SAMPLES, SCALES, before_denoising, equal_samples
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     Arrays = dict[str, Array]
 
-GENERATION = 1
+GENERATION = 2
 FRAMES = 24
 SHOTS = ("turntable", "flickering")
 _STILL = 0.03  # of guides: pixels that change more are taken for moving
@@ -68,10 +68,10 @@ def _rendered(name: str, side: int) -> Arrays:
 
 def _frame(passes: Any, frame: int) -> Arrays:
     """Every frame has its own noise, as users are told to have it."""
-    found = {
-        f"low{scale}": passes.beauty(scale, SAMPLES, seed=100 + frame).radiance
-        for scale in SCALES
-    }
+    found = {}
+    for scale in SCALES:
+        low = passes.beauty(scale, SAMPLES, seed=100 + frame)
+        found |= {f"low{scale}": low.radiance, f"noisy{scale}": before_denoising(low)}
     guides = passes.guides(GUIDE_SAMPLES, seed=200 + frame)
     found |= {"albedo": guides.albedo, "normal": guides.normal}
     for scale in SCALES:
@@ -106,13 +106,8 @@ def flicker(clip: Array, still: Array) -> float:
 def shot(subject: Subject, name: str, arrays: Arrays) -> Iterator[Measured]:
     """Flicker of one shot over OIDN's, and how far its exposure wanders."""
     results = [
-        subject.upscaler(*inputs)
-        for inputs in zip(
-            arrays[f"low{subject.scale}"],
-            arrays["albedo"],
-            arrays["normal"],
-            strict=True,
-        )
+        subject.upscaler(*inputs, noisy=noisy)
+        for *inputs, noisy in _frames(subject, arrays)
     ]
     clip = np.stack([x.radiance for x in results])
     exposures = np.log2([x.exposure for x in results])
@@ -123,14 +118,18 @@ def shot(subject: Subject, name: str, arrays: Arrays) -> Iterator[Measured]:
     yield Measured(f"shot.{name}.exposure", float(np.ptp(exposures)), curve)
 
 
+def _frames(subject: Subject, arrays: Arrays) -> Iterator[tuple[Array, ...]]:
+    """Yield radiance, albedo, normal and noisy radiance of each frame."""
+    names = (f"low{subject.scale}", "albedo", "normal", f"noisy{subject.scale}")
+    return zip(*(arrays[name] for name in names), strict=True)
+
+
 def held(subject: Subject, arrays: Arrays) -> Iterator[Measured]:
     """The flickering shot with one exposure, as an animation is rendered."""
     first = None
     clip = []
-    for inputs in zip(
-        arrays[f"low{subject.scale}"], arrays["albedo"], arrays["normal"], strict=True
-    ):
-        result = subject.upscaler(*inputs, exposure=first)
+    for *inputs, noisy in _frames(subject, arrays):
+        result = subject.upscaler(*inputs, noisy=noisy, exposure=first)
         first = result.exposure
         clip.append(result.radiance)
     still = still_pixels(arrays)

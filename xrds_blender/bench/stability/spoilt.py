@@ -23,7 +23,7 @@ RECEPTIVE_FIELD = 160
 FIREFLIES = (1e2, 1e4, 1e6, 1e8)
 FAR = 3  # low-resolution pixels beyond a firefly's own
 
-_FIELDS = ("radiance", "albedo", "normal")
+_FIELDS = ("radiance", "noisy", "albedo", "normal")
 _PLACES: dict[str, Callable[[int], slice | tuple[slice, slice]]] = {
     "pixel": lambda side: np.s_[side // 3 : side // 3 + 1, side // 4 : side // 4 + 1],
     "row": lambda side: np.s_[side // 3 : side // 3 + 1],
@@ -40,8 +40,11 @@ def invalid(subject: Subject) -> Iterator[Measured]:
     curve = {}
     cases = product(values, fields, _PLACES.values())
     for number, (value, spoilt, place) in enumerate(cases):
-        inputs = _poisoned(textured(subject.side, subject.scale), value, spoilt, place)
-        curve[number] = faults(subject(inputs)) + faults(subject(inputs, exposure=1.0))
+        inputs, noisy = _poisoned(
+            textured(subject.side, subject.scale), value, spoilt, place
+        )
+        found = (subject(inputs, noisy=noisy, exposure=e) for e in (None, 1.0))
+        curve[number] = sum(map(faults, found))
     yield worst("invalid.faults", curve)
 
 
@@ -53,8 +56,8 @@ def reach(subject: Subject) -> Iterator[Measured]:
     expected = subject(clean, exposure=0.1)
     changed, near = 0, []
     for value in (np.nan, -100.0, 3.4e38):
-        spoilt = _poisoned(clean, value, _FIELDS, lambda _: np.s_[2:4, 2:4])
-        found = subject(spoilt, exposure=0.1)
+        spoilt, noisy = _poisoned(clean, value, _FIELDS, lambda _: np.s_[2:4, 2:4])
+        found = subject(spoilt, noisy=noisy, exposure=0.1)
         beyond = np.s_[:, (RECEPTIVE_FIELD + 4) * scale :]
         changed += int((found[beyond] != expected[beyond]).sum())
         near.append(_disturbed(found, expected, 0.01) / scale)
@@ -73,13 +76,14 @@ def _poisoned(
     value: float,
     fields: tuple[str, ...],
     place: Callable[[int], slice | tuple[slice, slice]],
-) -> Inputs:
-    spoilt = {}
+) -> tuple[Inputs, Array]:
+    """The inputs and the radiance before denoising, which was as clean as after it."""
+    arrays = inputs._asdict() | {"noisy": inputs.radiance}
     for name in fields:
-        array = getattr(inputs, name).copy()
-        array[place(array.shape[0])] = value
-        spoilt[name] = array
-    return inputs._replace(**spoilt)
+        arrays[name] = arrays[name].copy()
+        arrays[name][place(arrays[name].shape[0])] = value
+    noisy = arrays.pop("noisy")
+    return inputs._replace(**arrays), noisy
 
 
 def fireflies(subject: Subject) -> Iterator[Measured]:

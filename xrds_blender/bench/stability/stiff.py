@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     Arrays = dict[str, Array]
     Say = Callable[[str], object]
 
-GENERATION = 1  # counts up whenever scenes or settings change
+GENERATION = 2  # counts up whenever scenes or settings change
 SAMPLES, GUIDE_SAMPLES, REFERENCE_SAMPLES = 16, 4, 64
 SCALES = (2, 4)
 RISING = (1, 4, 16, 64)  # samples over which the error must fall
@@ -74,10 +74,12 @@ def render(name: str, side: int) -> Arrays:
         for scale in SCALES:
             low = passes.beauty(scale, samples, seed=_SEEDS["low"])
             found[f"low{scale}"] = np.dstack((low.radiance, low.alpha))
+            found[f"noisy{scale}"] = before_denoising(low)
             found[f"low{scale}_seconds"] = sum(low.seconds.values())
         for count in RISING if name == "caustics" else ():
             low = passes.beauty(2, count, seed=_SEEDS["low"])
             found[f"rising{count}"] = low.radiance
+            found[f"rising{count}_noisy"] = before_denoising(low)
         guides = passes.guides(GUIDE_SAMPLES, seed=_SEEDS["guides"])
         found |= {"albedo": guides.albedo, "normal": guides.normal}
         found["alpha"] = guides.alpha
@@ -93,6 +95,11 @@ def render(name: str, side: int) -> Arrays:
     return run_job(scene, job)
 
 
+def before_denoising(beauty: Any) -> Array:
+    """Return the noisy radiance (h, w, 3); in a Blender without OIDN it is all."""
+    return beauty.radiance if beauty.noisy is None else beauty.noisy
+
+
 def enlarged(subject: Subject, arrays: Arrays) -> Array:
     """Return the product's picture (H, W, 4) of a scene."""
     low = arrays[f"low{subject.scale}"]
@@ -102,7 +109,12 @@ def enlarged(subject: Subject, arrays: Arrays) -> Array:
     cover = arrays["alpha"] if low[..., 3].min() < 1.0 else None
     low = low if cover is not None else low[..., :3]
     return subject.upscaler(
-        low, arrays["albedo"], arrays["normal"], guide_alpha=cover, **extra
+        low,
+        arrays["albedo"],
+        arrays["normal"],
+        noisy=arrays[f"noisy{subject.scale}"],
+        guide_alpha=cover,
+        **extra,
     ).radiance
 
 
@@ -143,7 +155,10 @@ def rising(subject: Subject, arrays: Arrays) -> Iterator[Measured]:
     curve = {}
     for count in RISING:
         found = subject.upscaler(
-            arrays[f"rising{count}"], arrays["albedo"], arrays["normal"]
+            arrays[f"rising{count}"],
+            arrays["albedo"],
+            arrays["normal"],
+            noisy=arrays[f"rising{count}_noisy"],
         ).radiance
         curve[count] = metrics.psnr(found, truth, stops(truth))
     values = list(curve.values())
