@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from .regression import ALBEDO_EPSILON, find_grain, regress
+from .regression import ALBEDO_EPSILON, explain
 
 Picture = NDArray[np.float32]
 ArrayOrTensor = TypeVar("ArrayOrTensor", NDArray[np.float32], Tensor)
@@ -199,15 +199,14 @@ def regressed_base(
     """Return up(L / down(E)) E with E what the guides explain of L around every pixel.
 
     As `demodulated_base`, but the picture itself, with what it was before denoising,
-    decides how much of the albedo and of the normal's shading goes into E: see
-    `regression.regress`.
+    decides how much of the albedo and of the normal's shading goes into E, and gets
+    back into L what denoising took of these: see `regression.explain`.
     """
     gain = _gain(auto_exposure(radiance))
-    low = _to_tensor(radiance * gain)
-    grain = find_grain(low, _to_tensor(noisy * gain))
     guides = torch.cat((_to_tensor(albedo), _to_tensor(normal)), dim=1)
-    explained, _ = regress(low, grain, guides, scale)
-    return _to_picture(_modulated(low, explained, scale)) / gain
+    low, before = _to_tensor(radiance * gain), _to_tensor(noisy * gain)
+    found = explain(low, before, guides, scale)
+    return _to_picture(_modulated(found.low, found.factor, scale)) / gain
 
 
 def _modulated(low: Tensor, modulator: Tensor, scale: int) -> Tensor:

@@ -74,7 +74,7 @@ def _idle(inputs: Inputs, block: int) -> NDArray[np.bool_]:
 def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
     """Return the blocks whose radiance is their albedo, as of a background."""
     low, scale = inputs.low[..., :3], inputs.scale
-    albedo = inputs.albedo
+    albedo = np.minimum(inputs.albedo, 2.0)  # above 1 is no background anyway
     for axis in (0, 1):
         starts = range(0, albedo.shape[axis], scale)
         ends = np.append(starts[1:], albedo.shape[axis])

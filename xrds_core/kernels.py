@@ -12,7 +12,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from .regression import ALBEDO_EPSILON, FEATURES, find_grain, regress
+from .regression import ALBEDO_EPSILON, FEATURES, explain
 
 # Added to the radiance of `full` guides, in units of k e x, before it divides.
 RADIANCE_EPSILON = 0.05
@@ -47,21 +47,22 @@ def find_sources(
     """The radiance as it is and demodulated in several ways, and facts (B, 5, h, w).
 
     By albedo, by the radiance of `full` guides, and last by what albedo and normal
-    explain of it around every pixel. The facts are the slopes of that
-    (`regression.regress`), and the mean over the colours of what denoising took away.
+    explain of it around every pixel; see `regression.explain`, which also restores
+    what denoising took away. The facts are the slopes found there, and the mean over
+    the colours of the grain.
 
     `radiance` and `noisy` (B, 3, h, w) are in the transfer domain. The division is by
     the area mean of the modulator, so that modulating again keeps the mean of the
     low-resolution pixel.
     """
-    low = torch.expm1(radiance.float())
-    grain = find_grain(low, torch.expm1(noisy.float()))
     guides = guides.float()
+    low, grain, explained, slopes = explain(
+        torch.expm1(radiance.float()), torch.expm1(noisy.float()), guides, scale
+    )
     plain = Source(low, torch.ones_like(guides[:, :1]))
     modulators = [guides[:, :3] + ALBEDO_EPSILON]
     if guides.shape[1] > 6:
         modulators.append(torch.expm1(guides[:, 6:9]) + RADIANCE_EPSILON)
-    explained, slopes = regress(low, grain, guides, scale)
     modulators.append(explained)
     demodulated = [Source(low / F.avg_pool2d(m, scale), m) for m in modulators]
     return [plain, *demodulated], torch.cat((slopes, grain.mean(1, True)), dim=1)

@@ -24,6 +24,9 @@ RADIANCE_FLOOR = 0.02
 NOISE = 0.0125
 # What a denoiser took away, of what it left, counts up to this: fireflies are not fit.
 GRAIN_LIMIT = 1.0
+# Log of the factor that a pixel may be changed by when its texture is restored.
+RESTORED_LIMIT = 1.5
+LEAST_MEAN = 1e-30  # so that black over black is black
 
 
 class Feature(NamedTuple):
@@ -36,6 +39,27 @@ class Feature(NamedTuple):
 
 
 FEATURES = 4
+
+
+class Explained(NamedTuple):
+    """Low-resolution radiance and what the guides explain of it."""
+
+    low: Tensor  # (B, 3, h, w), with the texture that a denoiser took away
+    grain: Tensor  # (B, 3, h, w), what is left of that: see `find_grain`
+    factor: Tensor  # (B, 3, H, W), positive
+    slopes: Tensor  # (B, 4, h, w)
+
+
+def explain(radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int) -> Explained:
+    """Restore the radiance and regress it on the guides.
+
+    `radiance` and `noisy`, the same before denoising, (B, 3, h, w), are linear, in
+    units of k e x; `guides` (B, 6 or more, H, W).
+    """
+    features = find_features(guides, scale)
+    low = restore(radiance, find_grain(radiance, noisy), features, scale)
+    grain = find_grain(low, noisy)
+    return Explained(low, grain, *regress(low, grain, features, scale))
 
 
 def find_features(guides: Tensor, scale: int) -> list[Feature]:
@@ -58,20 +82,35 @@ def find_grain(radiance: Tensor, noisy: Tensor) -> Tensor:
     return (ratio - 1).clamp(-1.0, GRAIN_LIMIT)
 
 
+def restore(
+    radiance: Tensor, grain: Tensor, features: list[Feature], scale: int
+) -> Tensor:
+    """The radiance (B, 3, h, w) with what the guides explain of its grain.
+
+    A denoiser at low resolution takes fine texture for noise; in the grain the texture
+    still is. The mean around every pixel stays.
+    """
+    slopes = blur(fit(grain, features, NOISE * scale)).split(1, dim=1)
+    terms = (
+        slope * (feature.low - blur(feature.low))
+        for slope, feature in zip(slopes, features, strict=True)
+    )
+    texture = sum(terms, torch.zeros_like(radiance))
+    restored = radiance * texture.clamp(-RESTORED_LIMIT, RESTORED_LIMIT).exp()
+    return restored * (blur(radiance) / blur(restored).clamp(min=LEAST_MEAN))
+
+
 def regress(
-    radiance: Tensor, grain: Tensor, guides: Tensor, scale: int
+    radiance: Tensor, grain: Tensor, features: list[Feature], scale: int
 ) -> tuple[Tensor, Tensor]:
     """What the guides explain of the radiance, as a factor, and the fit's slopes.
 
     The factor (B, 3, H, W), positive, is albedo^a exp(n . w) with the slopes a and w of
     a fit (B, 4, h, w) to `radiance` (B, 3, h, w), which is linear, in units of k e x.
-    The slopes are common to the colour channels, so grey stays grey.
-
-    A denoiser at low resolution takes fine texture for noise; in its `grain` (see
-    `find_grain`) the texture still is. To first order log radiance and grain add up to
-    the log of the noisy radiance, without the bias of a logarithm of noise.
+    The slopes are common to the colour channels, so grey stays grey. To first order
+    log radiance and `grain` add up to the log of the noisy radiance, without the bias
+    of a logarithm of noise.
     """
-    features = find_features(guides, scale)
     target = (radiance + RADIANCE_FLOOR).log() + grain
     slopes = blur(fit(target, features, NOISE * scale))
     enlarged = F.interpolate(slopes, scale_factor=scale, mode="bilinear")

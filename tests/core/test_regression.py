@@ -10,9 +10,10 @@ from torch.nn import functional as F
 from xrds_core.regression import (
     ALBEDO_EPSILON,
     GRAIN_LIMIT,
+    RESTORED_LIMIT,
     blur,
+    explain,
     find_grain,
-    regress,
     solve,
 )
 
@@ -25,10 +26,9 @@ def explained(
     radiance: Tensor, guides: Tensor, scale: int, noisy: Tensor | None = None
 ) -> Tensor:
     """The radiance over what the guides explain of it, enlarged, times that again."""
-    grain = find_grain(radiance, radiance if noisy is None else noisy)
-    factor, _ = regress(radiance, grain, guides, scale)
-    rest = radiance / F.avg_pool2d(factor, scale)
-    return F.interpolate(rest, scale_factor=scale, mode="bilinear") * factor
+    found = explain(radiance, radiance if noisy is None else noisy, guides, scale)
+    rest = found.low / F.avg_pool2d(found.factor, scale)
+    return F.interpolate(rest, scale_factor=scale, mode="bilinear") * found.factor
 
 
 def error(picture: Tensor, reference: Tensor) -> float:
@@ -87,42 +87,57 @@ def test_guides_that_say_nothing_are_left_out() -> None:
     low = 0.3 + smooth(1, 3, 24, 24)
     guides = torch.rand(1, 6, 48, 48)
     guides[:, 3:] = 0
-    none = torch.zeros_like(low)
-    _, slopes = regress(low, none, guides, 2)
+    slopes = explain(low, low, guides, 2).slopes
     lying = F.interpolate(low, scale_factor=2) * (guides[:, :3] + ALBEDO_EPSILON)
-    _, believed = regress(F.avg_pool2d(lying, 2), none, guides, 2)
+    lying = F.avg_pool2d(lying, 2)
+    believed = explain(lying, lying, guides, 2).slopes
     assert slopes[:, 0].mean() < 0.1
     assert believed[:, 0].mean() > 0.5
 
 
 def test_grey_stays_grey_and_channels_may_be_exchanged() -> None:
     torch.manual_seed(3)
-    low, guides = torch.rand(1, 3, 16, 16), torch.rand(1, 6, 32, 32)
-    grain = find_grain(low, torch.rand(1, 3, 16, 16))
-    factor, slopes = regress(low, grain, guides, 2)
+    low, noisy = torch.rand(2, 1, 3, 16, 16)
+    guides = torch.rand(1, 6, 32, 32)
+    found = explain(low, noisy, guides, 2)
     order = [2, 0, 1]
     exchanged = torch.cat((guides[:, order], guides[:, 3:]), dim=1)
-    other, other_slopes = regress(low[:, order], grain[:, order], exchanged, 2)
-    torch.testing.assert_close(other, factor[:, order])
-    torch.testing.assert_close(other_slopes, slopes)
+    other = explain(low[:, order], noisy[:, order], exchanged, 2)
+    torch.testing.assert_close(other.low, found.low[:, order])
+    torch.testing.assert_close(other.factor, found.factor[:, order])
+    torch.testing.assert_close(other.slopes, found.slopes)
     grey = torch.cat((guides[:, :1].expand(-1, 3, -1, -1), guides[:, 3:]), dim=1)
-    factor, _ = regress(low, grain, grey, 2)
-    torch.testing.assert_close(factor, factor[:, :1].expand_as(factor))
+    found = explain(*(x[:, :1].expand(-1, 3, -1, -1) for x in (low, noisy)), grey, 2)
+    for x in (found.low, found.factor):
+        torch.testing.assert_close(x, x[:, :1].expand_as(x))
 
 
 @pytest.mark.parametrize("scale", [2.0**-40, 1.0, 2.0**40])
 @pytest.mark.parametrize("spread", [0.0, 12.0])
 def test_factors_stay_finite_and_bounded(scale: float, spread: float) -> None:
     torch.manual_seed(5)
-    low = scale * 10 ** (spread * (torch.rand(1, 3, 16, 16) - 0.5))
+    low, noisy = scale * 10 ** (spread * (torch.rand(2, 1, 3, 16, 16) - 0.5))
+    low[..., :8, :8] = 0
     guides = torch.rand(1, 6, 32, 32) * 2 - 1
     guides[:, :3] = guides[:, :3].clamp(min=0)
-    noisy = scale * 10 ** (spread * (torch.rand(1, 3, 16, 16) - 0.5))
-    factor, slopes = regress(low, find_grain(low, noisy), guides, 2)
-    assert factor.isfinite().all()
-    assert slopes.isfinite().all()
-    assert factor.min() > 1e-6
-    assert factor.max() < 1e6
+    found = explain(low, noisy, guides, 2)
+    assert all(x.isfinite().all() for x in found)
+    assert found.factor.min() > 1e-6
+    assert found.factor.max() < 1e6
+    assert not found.low[..., :8, :8].any()  # what is black stays black
+    lit = low > 0
+    assert (found.low[lit] / low[lit]).log().abs().max() <= 2 * RESTORED_LIMIT + 1e-3
+
+
+def test_restored_radiance_keeps_its_means_and_what_was_not_denoised() -> None:
+    torch.manual_seed(7)
+    low = 0.3 + smooth(1, 3, 24, 24)
+    guides = torch.cat((torch.rand(1, 3, 96, 96), torch.zeros(1, 3, 96, 96)), dim=1)
+    torch.testing.assert_close(explain(low, low, guides, 4).low, low)
+    texture = F.avg_pool2d(guides[:, :3], 4) + 0.1
+    found = explain(low, low * texture / texture.mean(), guides, 4)
+    assert (found.low / low - 1).abs().mean() > 0.02
+    torch.testing.assert_close(blur(found.low), blur(low), rtol=0.03, atol=0)
 
 
 def test_solver_agrees_with_lapack() -> None:

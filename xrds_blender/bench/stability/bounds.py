@@ -127,8 +127,8 @@ EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
     ),
     "energy.smooth": (
         Exemption(
-            "fast x4 *",
-            1.5e-2,
+            "fast x[48] *",
+            2e-2,
             "texture that OIDN has smoothed away is put back, which brightens a little",
         ),
     ),
