@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NoReturn
 
+from xrds_core import atomic
 from xrds_core.errors import Cancelled, UsageError, XRDSError
 
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
@@ -93,7 +94,7 @@ def interrupt_at_once() -> None:
 
     Python runs its own signal handlers only between bytecodes of the main thread,
     which a render keeps waiting for minutes; a thread that reads the wake-up pipe
-    does not wait. Unfinished files carry a name of their own and never replace one.
+    does not wait. Files that are being written are removed.
     """
     woken, wake = os.pipe()
     os.set_blocking(wake, False)
@@ -103,6 +104,7 @@ def interrupt_at_once() -> None:
     def wait() -> None:
         while os.read(woken, 1) != bytes([signal.SIGINT]):
             pass
+        atomic.abandon()
         os.write(2, b"xrds: interrupted\n")
         os._exit(INTERRUPTED)
 

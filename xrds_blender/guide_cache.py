@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import zipfile
 from collections import OrderedDict
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xrds_core.atomic import replacing
+from xrds_core.atomic import replacing, sweep
 
 from .pass_names import ALBEDO, NORMAL
 
@@ -89,7 +90,10 @@ class GuideCache:
         return None
 
     def put(self, key: str, guides: CachedGuides, folder: Path | None = None) -> None:
-        """Keep guides in place of what the key had; raises OSError from the folder."""
+        """Keep guides in place of what the key had.
+
+        Raises OSError where the folder does not take them; memory then has them.
+        """
         self._keep(key, guides.copy())
         if folder is not None and guides.nbytes <= self.folder_limit:
             folder.mkdir(parents=True, exist_ok=True)
@@ -137,7 +141,11 @@ def _read(path: Path) -> CachedGuides | None:
 
 def _make_room(folder: Path, limit: int) -> None:
     """Remove the files that were used longest ago until at most `limit` bytes stay."""
-    files = [(path.stat(), path) for path in folder.glob("*.npz")]
+    sweep(folder)
+    files = []
+    for path in folder.glob("*.npz"):
+        with suppress(FileNotFoundError):  # another render has made room too
+            files.append((path.stat(), path))
     files.sort(key=lambda each: each[0].st_mtime_ns, reverse=True)
     total = 0
     for told, path in files:

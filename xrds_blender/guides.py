@@ -134,8 +134,11 @@ class GuideSource:
             self._passes.put_back(guides.passes)
             reason = f"{samples} samples more for the same view"
             value = f"added up to {guides.samples} samples"
+        try:
+            guide_cache.CACHE.put(key, guides, self._folder)
+        except OSError as error:  # the picture is worth more than the guides kept
+            reason = f"in memory alone: {self._folder} takes no file ({error.strerror})"
         self.decision = Decision(_NAME, value, reason)
-        guide_cache.CACHE.put(key, guides, self._folder)
         return _guides(guides, seconds)
 
     def _tell_hit(self, samples: int, looked: float) -> None:

@@ -2,26 +2,55 @@
 
 from __future__ import annotations
 
-import os
-from contextlib import contextmanager
+import secrets
+import time
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+_SUFFIX = ".unfinished"
+_DEAD = 3600.0  # seconds without a byte written, after which nobody is writing any more
+_unfinished: set[Path] = set()
+
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """Yield a path beside ``path`` to write to; it takes ``path``'s place at the end.
 
-    On an error nothing is left of it and ``path`` is as it was. The folder must exist.
+    On an error nothing is left of it and ``path`` is as it was. Any number of threads,
+    processes and machines may replace one path at once: it is whole at any time. The
+    folder must exist.
     """
     # not from tempfile: its files are readable by their owner alone
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.unfinished")
+    unfinished = path.with_name(f".{path.name}.{secrets.token_hex(6)}{_SUFFIX}")
+    _unfinished.add(unfinished)
     try:
         yield unfinished
         unfinished.replace(path)
     except BaseException:
-        unfinished.unlink(missing_ok=True)
+        _remove(unfinished)
         raise
+    finally:
+        _unfinished.discard(unfinished)
+
+
+def abandon() -> None:
+    """Remove what this process is writing now: it is about to end on the spot."""
+    for path in list(_unfinished):
+        _remove(path)
+
+
+def sweep(folder: Path) -> None:
+    """Remove from ``folder`` what processes left that were killed while they wrote."""
+    for path in folder.glob(f".*{_SUFFIX}"):
+        with suppress(OSError):  # another sweep may be at it
+            if time.time() - path.stat().st_mtime > _DEAD:
+                path.unlink()
+
+
+def _remove(path: Path) -> None:
+    with suppress(OSError):  # what was written to may have vanished
+        path.unlink()

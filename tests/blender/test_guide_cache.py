@@ -153,6 +153,14 @@ def test_a_folder_serves_another_process(tmp_path: Path) -> None:
     assert told(shot(scene, guide_cache=tmp_path)) == "kept 2 samples"
 
 
+def test_a_folder_that_takes_no_file_costs_no_picture(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    picture = shot(traps.trap("texture", 48, 36), guide_cache=tmp_path / "file")
+    (decision,) = [d for d in picture.plan if d.decision == "guide cache"]
+    assert decision.value == "kept 2 samples"
+    assert decision.reason.startswith("in memory alone")
+
+
 # --- the cache alone ------------------------------------------------------------------
 
 

@@ -180,16 +180,20 @@ def test_info_json_fields() -> None:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send")
-def test_interrupt_does_not_wait_for_c() -> None:
+def test_interrupt_does_not_wait_for_c(tmp_path: Path) -> None:
     # The C call holds the main thread as a render does, its lock released.
-    code = """
+    code = f"""
     import ctypes
+    from pathlib import Path
     from xrds_blender import console
+    from xrds_core.atomic import replacing
     console.interrupt_at_once()
-    print("ready", flush=True)
     libc = ctypes.CDLL(None)
-    for _ in range(100):
-        libc.usleep(900_000)
+    with replacing(Path({str(tmp_path)!r}) / "frame.exr") as part:
+        part.write_text("half")
+        print("ready", flush=True)
+        for _ in range(100):
+            libc.usleep(900_000)
     """
     with subprocess.Popen(
         [sys.executable, "-c", textwrap.dedent(code)],
@@ -205,3 +209,4 @@ def test_interrupt_does_not_wait_for_c() -> None:
     assert child.returncode == 130
     assert err == "xrds: interrupted\n"
     assert time.perf_counter() - start < 10
+    assert not list(tmp_path.iterdir())
