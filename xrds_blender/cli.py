@@ -19,7 +19,7 @@ from . import console
 
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
-STABILITY = ("arrays", "large", "scenes", "shots")
+STABILITY = ("arrays", "large", "scenes", "shots", "load")
 Work = Callable[[argparse.Namespace], dict[str, Any] | None]
 
 
@@ -52,9 +52,9 @@ def _show(options: argparse.Namespace) -> None:
 
 
 def _info(options: argparse.Namespace) -> dict[str, Any]:
-    from xrds_core import info
+    from .torch_folder import load
 
-    return info.info(_blender_version(), options.weights)
+    return load("info").info(_blender_version(), options.weights)
 
 
 def _info_lines(told: dict[str, Any]) -> list[str]:
@@ -85,6 +85,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
         _job(options),
         frames=options.frames,
         resolution=options.resolution,
+        resume=options.resume,
     )
 
 
@@ -132,7 +133,8 @@ def _decision_line(told: dict[str, Any]) -> str:
 def _render_lines(told: dict[str, Any]) -> list[str]:
     if "decisions" in told:
         return _plan_lines(told)
-    lines = [
+    lines = [f"frame {number}: was there" for number in told["kept"]]
+    lines += [
         f"{frame['output']}: {frame['seconds']['total']:.1f} s"
         for frame in told["frames"]
     ]
@@ -140,9 +142,9 @@ def _render_lines(told: dict[str, Any]) -> list[str]:
 
 
 def _upscale(options: argparse.Namespace) -> dict[str, Any]:
-    from xrds_core import upscale_file
+    from .torch_folder import load
 
-    return upscale_file(
+    return load("exr_upscale").upscale_file(
         options.beauty,
         options.guide_file,
         options.output,
@@ -228,7 +230,7 @@ def _progress(line: str) -> None:
 
 
 def _stability(options: argparse.Namespace) -> dict[str, Any]:
-    if {"scenes", "shots"} & set(options.parts):
+    if {"scenes", "shots", "load"} & set(options.parts):
         _need_blender("stability")
     from .bench.stability.suite import stability
 
@@ -361,6 +363,7 @@ def _add_render(commands: Any) -> argparse.ArgumentParser:
     _add_job(command)
     add("-o", "--output", help=".exr or .png; # for frame numbers")
     add("--explain", action="store_true", help="tell the plan and render nothing")
+    add("--resume", action="store_true", help="only frames that are not there, whole")
     which = command.add_mutually_exclusive_group()
     which.add_argument("--frame", type=_frame, dest="frames", metavar="F")
     which.add_argument("--frames", type=_frames, help="first-last", metavar="A-B")

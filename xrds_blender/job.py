@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.errors import UsageError
+from xrds_core.errors import UsageError, XRDSError
 
 from .budget import DENOISERS
 from .plan import OMISSIONS, Decision, Facts, Plan, decide, plain
@@ -116,6 +116,18 @@ class RenderJob:
             weights=here.weights,
             threads=here.threads,
         )
+
+
+class NetworkFailed(XRDSError):
+    """The network gave no picture; what Cycles rendered for it is kept.
+
+    `radiance` (h, w, 3), premultiplied, and `alpha` (h, w): low resolution, as
+    `Picture.low_resolution`.
+    """
+
+    def __init__(self, message: str, radiance: Array, alpha: Array) -> None:
+        super().__init__(message)
+        self.radiance, self.alpha = radiance, alpha
 
 
 @dataclass(frozen=True)

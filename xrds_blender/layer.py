@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_core.errors import Cancelled, XRDSError
+from xrds_core.errors import Cancelled, OutOfMemory
 
-from . import cycles_session, plan, status_bar
+from . import cycles_session, plan, status_bar, torch_folder
 from .borrowed import Borrowed
 from .colour import converted, to_rec709, working_space
 from .cycles_settings import set_denoising, set_sampling
 from .explain import find_facts
 from .guides import GuideSource
-from .job import STAGES, Picture, RenderJob
+from .job import STAGES, NetworkFailed, Picture, RenderJob
 from .pass_names import COMBINED
 from .passes import Beauty, CyclesPasses, Guides
 from .picking import pick
@@ -35,7 +35,8 @@ def render_layer(
 
     `start`, a reading of perf_counter, is where a time budget and the total begin.
     Raises Cancelled when the user stops it and XRDSError where it cannot be done, then
-    with nothing written.
+    with nothing written; but NetworkFailed, as for too little memory, with the
+    low-resolution picture in the result, enlarged.
     """
     start = time.perf_counter() if start is None else start
     if job.is_picked:
@@ -122,12 +123,23 @@ def _enlarged(
         decisions += plan.after(syncs[1], syncs[0])
     started = time.perf_counter()
     status_bar.begin(engine, status_bar.NETWORK, 3)
-    pictures = {
-        view: _upscale(
-            engine, upscaler, job, chosen, exposure, beauties[view], guides[view]
-        )
-        for view in passes.views
-    }
+    try:
+        pictures = {
+            view: _upscale(
+                engine, upscaler, job, chosen, exposure, beauties[view], guides[view]
+            )
+            for view in passes.views
+        }
+    except (OutOfMemory, RuntimeError, MemoryError) as error:  # as torch raises them
+        low = _bilinear_pictures(job.scale, beauties, guides)
+        _write(engine, name, job.scale, low, beauties)
+        told = str(error).partition("\n")[0] or "out of memory"
+        kept = beauties[first]
+        raise NetworkFailed(
+            f"the network failed ({told}); the picture is the low-resolution one",
+            kept.radiance,
+            kept.alpha,
+        ) from error
     _stop_if_cancelled(engine)
     seconds["network"] = time.perf_counter() - started
     started = time.perf_counter()
@@ -197,14 +209,8 @@ def load_upscaler(job: RenderJob) -> Upscaler:
 def _load(
     preset: str, scale: int, guides: str, device: str, weights: str | None
 ) -> Upscaler:
-    try:
-        from xrds_core import Upscaler
-    except ImportError as error:
-        raise XRDSError(
-            f"XRDS needs PyTorch, which Blender's Python does not find ({error}): "
-            "the add-on's preferences tell where from; or render plain"
-        ) from error
-    return Upscaler(preset, scale, guides, device, weights=weights)
+    made: type[Upscaler] = torch_folder.load("upscaler").Upscaler
+    return made(preset, scale, guides, device, weights=weights)
 
 
 def _upscale(
@@ -270,6 +276,21 @@ def _write(
             large = _bilinear(low, scale, beauties[view].offset, picture.shape)
             cycles_session.write_pass(layer, other, view, large)
     engine.update_result(result)
+
+
+def _bilinear_pictures(
+    scale: int, beauties: dict[str, Beauty], guides: dict[str, Guides]
+) -> dict[str, Array]:
+    """By view, the region's radiance and alpha without a network, (H, W, 4)."""
+    return {
+        view: _bilinear(
+            np.dstack((low.radiance, low.alpha)),
+            scale,
+            low.offset,
+            guides[view].alpha.shape,
+        )
+        for view, low in beauties.items()
+    }
 
 
 def _bilinear(

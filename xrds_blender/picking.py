@@ -12,7 +12,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from . import budget
+from xrds_core.errors import XRDSError
+
+from . import budget, torch_folder
 from .cycles_session import has_denoiser
 
 if TYPE_CHECKING:
@@ -140,8 +142,8 @@ def known_networks(job: RenderJob) -> list[Network]:
     if job.plain:
         return []
     try:
-        from xrds_core import weights
-    except ImportError:
+        weights = torch_folder.load("weights")
+    except XRDSError:
         return []
     if job.weights is not None and not Path(job.weights).is_dir():
         return [(job.preset, job.scale, job.guides)]

@@ -13,6 +13,8 @@ import numpy as np
 from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
 
+from .whole_file import png_size
+
 SUFFIXES = (".exr", ".png")
 
 
@@ -58,7 +60,7 @@ def check_output(pattern: str, frames: int) -> None:
 
 
 def save(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> None:
-    """Write one frame, all at once or not at all.
+    """Write one frame, all at once or not at all; raises PictureError if it cannot.
 
     Args:
         path: ends in .exr or .png.
@@ -68,8 +70,7 @@ def save(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> Non
             hold alpha.
     """
     if path.suffix.lower() == ".png":
-        with replacing(path) as unfinished:
-            _save_png(unfinished, radiance, alpha, scene)
+        _write_png(path, radiance, alpha, scene)
         return
     from xrds_core import exr
 
@@ -77,6 +78,18 @@ def save(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> Non
     if scene.render.film_transparent:
         channels["A"] = alpha
     exr.write_picture(path, channels)
+
+
+def _write_png(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> None:
+    if not path.parent.is_dir():  # Blender would make it anew, wherever that is by now
+        raise PictureError(f"cannot write {path}: its folder is gone")
+    try:
+        with replacing(path) as unfinished:
+            _save_png(unfinished, radiance, alpha, scene)
+            if png_size(unfinished) != alpha.shape[::-1]:
+                raise PictureError(f"cannot write {path}: is the disk full?")
+    except OSError as error:
+        raise PictureError(f"cannot write {path}: {error.strerror}") from error
 
 
 def _save_png(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> None:

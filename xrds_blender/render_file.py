@@ -3,15 +3,22 @@
 from __future__ import annotations
 
 import dataclasses
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.errors import SceneError
+import numpy as np
+
+from xrds_core.atomic import sweep
+from xrds_core.errors import PictureError, SceneError, XRDSError
 
 from . import picture_file
+from .job import NetworkFailed
+from .layer import load_upscaler
 from .picking import known_networks
+from .whole_file import is_whole
 
 if TYPE_CHECKING:
     from .job import Picture, RenderJob
@@ -24,6 +31,7 @@ def render_file(
     *,
     frames: Sequence[int] | None = None,
     resolution: tuple[int, int] | None = None,
+    resume: bool = False,
 ) -> dict[str, Any]:
     """Render frames of a .blend file and return what `xrds render --json` prints.
 
@@ -33,30 +41,42 @@ def render_file(
         job: scale, samples and the rest.
         frames: numbers of the frames; the file's current one by default.
         resolution: width and height in pixels instead of the file's.
+        resume: leave frames as they are that lie there whole and of their size.
 
     Raises:
         UsageError, SceneError, PictureError, WeightsError: before anything is
-            rendered, if it could not succeed.
+            rendered, if it could not succeed. Later: PictureError for a frame that
+            cannot be written, NetworkFailed; both tell where what was rendered is
+            kept, and the frames before are there.
     """
     picture_file.check_output(output, len(frames or [0]))
     scene = open_scene(path)
     if resolution:
         scene.render.resolution_x, scene.render.resolution_y = resolution
         scene.render.resolution_percentage = 100
-    _check_weights(job)
+    _check_network(job)
     numbers = list(frames or [scene.frame_current])
-    told = [_frame(scene, job, output, number) for number in numbers]
-    last = told[-1][1]
-    job = last.job or job
-    height, width = last.alpha.shape
+    if resume:
+        sweep(Path(output).parent)
+    kept, told, last = [], [], None
+    size = _frame_size(scene)
+    for number in numbers:
+        # asked anew for each: another render may be writing the same frames
+        if resume and is_whole(picture_file.frame_path(output, number), size):
+            kept.append(number)
+            continue
+        entry, last = _frame(scene, job, output, number)
+        told.append(entry)
+    job = (last and last.job) or job
     return {
         "output": output,
-        "resolution": [width, height],
+        "resolution": list(size),
         "scale": 1 if job.is_plain else job.scale,
         "preset": None if job.is_plain else job.preset,
-        "device": job.device,
-        "frames": [frame for frame, _ in told],
-        "plan": [dataclasses.asdict(decision) for decision in last.plan],
+        "device": last.device if last else "",
+        "frames": told,
+        "kept": kept,
+        "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
     }
 
 
@@ -81,14 +101,31 @@ def open_scene(path: Path) -> Any:
     return scene
 
 
-def _check_weights(job: RenderJob) -> None:
-    """Raise WeightsError now rather than after the Cycles renders."""
+def _check_network(job: RenderJob) -> None:
+    """Raise XRDSError now rather than after the Cycles renders."""
     if job.is_picked:
         known_networks(job)  # and PyTorch is loaded before the budget begins
     elif not job.is_plain:
-        from xrds_core import Upscaler
+        load_upscaler(job)
 
-        Upscaler(job.preset, job.scale, job.guides, job.device, weights=job.weights)
+
+def _frame_size(scene: Any) -> tuple[int, int]:
+    """Width and height of a picture, or of its border, as Blender rounds them."""
+    render = scene.render
+    share = render.resolution_percentage / 100
+    width, height = int(render.resolution_x * share), int(render.resolution_y * share)
+    if not render.use_border:
+        return width, height
+    left, right, bottom, top = (
+        int(np.float32(edge) * np.float32(side))
+        for edge, side in (
+            (render.border_min_x, width),
+            (render.border_max_x, width),
+            (render.border_min_y, height),
+            (render.border_max_y, height),
+        )
+    )
+    return right - left, top - bottom
 
 
 def _frame(
@@ -98,10 +135,19 @@ def _frame(
     from .render import render
 
     scene.frame_set(number)
-    picture = render(scene, **vars(job))
     target = picture_file.frame_path(output, number)
+    try:
+        picture = render(scene, **vars(job))
+    except NetworkFailed as error:
+        low = target.with_stem(f"{target.stem}_low")
+        place = _keep(low, error.radiance, error.alpha, scene)
+        raise XRDSError(f"frame {number}: {error}, {place}") from error
     start = time.perf_counter()
-    picture_file.save(target, picture.radiance, picture.alpha, scene)
+    try:
+        picture_file.save(target, picture.radiance, picture.alpha, scene)
+    except PictureError as error:
+        place = _keep_elsewhere(target, picture.radiance, picture.alpha, scene)
+        raise PictureError(f"{error}; the frame is {place}") from error
     written = time.perf_counter() - start
     seconds = dict(picture.seconds)
     seconds["write"] += written
@@ -113,3 +159,22 @@ def _frame(
         "peak_memory": picture.peak_memory,
     }
     return told, picture
+
+
+def _keep(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
+    """Write what was rendered and tell where it is."""
+    try:
+        picture_file.save(target, radiance, alpha, scene)
+    except PictureError:
+        return _keep_elsewhere(target, radiance, alpha, scene)
+    return f"kept as {target}"
+
+
+def _keep_elsewhere(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
+    """Write into the machine's own folder what its place does not take."""
+    try:
+        place = Path(tempfile.mkdtemp(prefix="xrds-")) / target.name
+        picture_file.save(place, radiance, alpha, scene)
+    except (OSError, PictureError):
+        return "lost: the folder for temporary files takes no file either"
+    return f"kept as {place}"

@@ -1,7 +1,7 @@
 """Which PyTorch renders: the bundled one, Python's own, or that of a folder.
 
-The folder is one that `pip install --target FOLDER torch safetensors` filled. Nothing
-here imports torch: a folder is judged by its files, before anything of it is loaded.
+The folder is one that `pip install --target FOLDER torch safetensors` filled. It is
+judged by its files, before anything of it is loaded; only `load` imports torch.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ import sys
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
 from pathlib import Path
+from typing import Any
 
-from xrds_core.errors import UsageError
+from xrds_core.errors import UsageError, XRDSError
 
 NEEDED = ("torch", "safetensors")
 
@@ -132,3 +133,18 @@ def _where(name: str) -> Path | None:
     if found is None or not found.origin:
         return None
     return Path(found.origin).parents[1]
+
+
+def load(module: str) -> Any:
+    """Import a module of xrds_core that needs torch.
+
+    Raises XRDSError, in one line, whatever a missing or broken torch raises.
+    """
+    try:
+        return importlib.import_module(f"xrds_core.{module}")
+    except Exception as error:  # OSError, AttributeError: a broken one raises all
+        told = " ".join(str(error).split()) or type(error).__name__
+        raise XRDSError(
+            f"XRDS needs PyTorch, which does not load here ({told}): the add-on's "
+            "preferences tell where from; or render plain"
+        ) from error

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .errors import (
     Cancelled,
+    OutOfMemory,
     PictureError,
     SceneError,
     UsageError,
@@ -39,6 +40,7 @@ __all__ = [
     "XRDS",
     "Cancelled",
     "NetworkConfig",
+    "OutOfMemory",
     "PictureError",
     "SceneError",
     "Upscaled",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import torch
 
 from .errors import UsageError
@@ -40,3 +42,41 @@ def choose_precision(name: str, device: torch.device) -> torch.dtype:
     if name not in PRECISIONS:
         raise UsageError(f"precision {name!r} is not among auto, fp32, bf16")
     return PRECISIONS[name]
+
+
+# What torch says in a plain RuntimeError where an allocation fails on a processor
+# (Linux, Windows, oneDNN, C++) or under MPS.
+_OUT_OF_MEMORY = (
+    "can't allocate memory",
+    "not enough memory",
+    "could not create a memory object",
+    "bad_alloc",
+    "out of memory",
+)
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Tell whether smaller tiles may help."""
+    if isinstance(error, (MemoryError, torch.OutOfMemoryError)):
+        return True
+    told = str(error).lower()
+    return isinstance(error, RuntimeError) and any(x in told for x in _OUT_OF_MEMORY)
+
+
+def free_memory(device: torch.device) -> float:
+    """Return the bytes that can be taken on ``device``, infinity where not known.
+
+    Linux lets a process take more than there is and then kills it, so it is asked.
+    """
+    if device.type == "cuda":
+        return torch.cuda.mem_get_info(device)[0]
+    found = [float("inf")]
+    try:
+        lines = [x.split() for x in Path("/proc/meminfo").read_text().splitlines()]
+        found += [1024.0 * int(x[1]) for x in lines if x[0] == "MemAvailable:"]
+        group = Path("/sys/fs/cgroup")  # of a container
+        most = float((group / "memory.max").read_text())  # ValueError for "max"
+        found.append(most - float((group / "memory.current").read_text()))
+    except (OSError, ValueError):
+        pass
+    return max(0.0, min(found))

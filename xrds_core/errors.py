@@ -27,6 +27,10 @@ class UsageError(XRDSError):
     """Options that contradict each other or lie outside their range (exit 2)."""
 
 
+class OutOfMemory(XRDSError):
+    """A device has too little memory even for the smallest tiles."""
+
+
 class Cancelled(XRDSError):
     """The user, or a progress callback returning False, stopped the work."""
 

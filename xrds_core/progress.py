@@ -23,10 +23,15 @@ _NEARLY = 0.999  # 1 is told once, when all is done
 
 
 class Progress:
-    """Counts work and tells the fraction of ``total``; raises Cancelled."""
+    """Counts work and tells the fraction done; raises Cancelled."""
 
-    def __init__(self, callback: Callback | None, total: float) -> None:
+    def __init__(self, callback: Callback | None) -> None:
         self._callback = callback
+        self._told = 0.0
+        self.begin(1.0)
+
+    def begin(self, total: float) -> None:
+        """Begin with work of ``total``, or begin anew; what was told stays told."""
         self._total = total
         self._done = 0.0
 
@@ -35,7 +40,8 @@ class Progress:
         self.tell(min(self._done / self._total, _NEARLY))
 
     def tell(self, fraction: float) -> None:
-        if self._callback is not None and self._callback(fraction) is False:
+        self._told = max(self._told, fraction)
+        if self._callback is not None and self._callback(self._told) is False:
             raise Cancelled
 
 

@@ -14,8 +14,8 @@ import torch
 from . import tiling
 from .alpha import finish
 from .cost import Cost, measure
-from .devices import choose_device, choose_precision
-from .errors import PictureError, UsageError, WeightsError, XRDSError
+from .devices import choose_device, choose_precision, free_memory, is_out_of_memory
+from .errors import OutOfMemory, PictureError, UsageError, WeightsError
 from .front_end import EXPOSURE_RANGE, auto_exposure, inverse_transfer
 from .idle import base_picture, busy_area
 from .inputs import Inputs, check
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from .idle import Area
 
 DEFAULT_MEMORY = 4 << 30
-"""Bytes that an upscale may take on the CPU where no limit is given."""
+"""Bytes that an upscale takes on the CPU at most where no limit is given."""
 
 # Tiles overlap by so many attention windows; the tests hold the seams to a bound.
 _OVERLAP_WINDOWS = 5
@@ -129,6 +129,7 @@ class Upscaler:
 
         Raises:
             PictureError: the arrays do not fit each other or this network.
+            OutOfMemory: the device has no room even for the smallest tiles.
             Cancelled: ``progress`` returned False.
         """
         inputs = check(
@@ -138,8 +139,16 @@ class Upscaler:
         exposure = _exposure(exposure, inputs)
         area = self._area(inputs, skip_idle)
         plan = self._tiles(inputs, area, memory_limit, tile)
-        picture = self._picture(inputs, area, exposure, plan, progress)
-        return Upscaled(picture, exposure, inputs.bad_pixels, len(plan))
+        told = Progress(progress)
+        while True:
+            try:
+                picture = self._picture(inputs, area, exposure, plan, told)
+                return Upscaled(picture, exposure, inputs.bad_pixels, len(plan))
+            except OutOfMemory:
+                smaller = self._smaller(inputs, area, plan)
+                if smaller is None:
+                    raise
+                plan = smaller
 
     def _check_guides(self, inputs: Inputs) -> None:
         full = self.network.config.guides == "full"
@@ -174,12 +183,19 @@ class Upscaler:
         found = tiling.tiles(height, width, size, overlap, multiple)
         return [tile.moved(area[0].start, area[1].start) for tile in found]
 
+    def _smaller(
+        self, inputs: Inputs, area: Area | None, plan: list[tiling.Tile]
+    ) -> list[tiling.Tile] | None:
+        """Return tiles of half the size, None where there are no smaller ones."""
+        largest = _largest(plan)
+        smaller = self._tiles(inputs, area, None, math.isqrt(largest // 2))
+        return smaller if _largest(smaller) < largest else None
+
     def _memory(self, limit: int | None) -> float:
         if limit is not None:
             return limit
-        if self.device.type == "cuda":
-            return 0.8 * torch.cuda.mem_get_info(self.device)[0]
-        return DEFAULT_MEMORY
+        free = 0.8 * free_memory(self.device)
+        return free if self.device.type == "cuda" else min(DEFAULT_MEMORY, free)
 
     def bytes_per_pixel(self) -> float:
         """Return the memory that one output pixel of a tile takes at the most."""
@@ -192,11 +208,11 @@ class Upscaler:
         area: Area | None,
         exposure: float,
         plan: list[tiling.Tile],
-        callback: Callback | None,
+        progress: Progress,
     ) -> Picture:
         picture = np.zeros((*inputs.shape, inputs.low.shape[2]), np.float32)
         self._fill_idle(picture, inputs, area)
-        progress = Progress(callback, self._work(plan))
+        progress.begin(self._work(plan))
         progress.tell(0.0)
         if not inputs.is_black():
             with watched(self.network, progress):
@@ -254,13 +270,21 @@ class Upscaler:
                     None if noisy is None else noisy.to(self.device),
                 )
                 result = inverse_transfer(t, exposure).clamp_(min=0.0)
-        except torch.OutOfMemoryError as error:
-            raise XRDSError(
-                f"{self.device} has too little memory for a tile of "
-                f"{tile.columns.size}x{tile.rows.size} pixels: give a memory limit"
+        except (RuntimeError, MemoryError) as error:
+            if not is_out_of_memory(error):
+                raise
+            size = f"{tile.columns.size}x{tile.rows.size}"
+            raise OutOfMemory(
+                f"{self.device} has too little memory for a tile of {size} pixels: end "
+                "other programs, or take a smaller preset or another device"
             ) from error
         array: Picture = result[0].permute(1, 2, 0).cpu().numpy()
         return array
+
+
+def _largest(plan: list[tiling.Tile]) -> int:
+    """Return the low-resolution pixels of the largest tile."""
+    return max((tile.rows.size * tile.columns.size for tile in plan), default=0)
 
 
 def _size(area: Area) -> tuple[int, ...]:

@@ -10,8 +10,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import cycles_session, ensure_registered  # noqa: E402
+from xrds_blender.job import NetworkFailed  # noqa: E402
 from xrds_blender.render import render, run_job  # noqa: E402
-from xrds_core.errors import Cancelled  # noqa: E402
+from xrds_core.errors import Cancelled, OutOfMemory  # noqa: E402
 
 
 def properties(struct: Any) -> dict[str, Any]:
@@ -131,6 +132,17 @@ def test_after_an_error_inside_cycles(
 
     monkeypatch.setattr(cycles_session.functions(), "render", broken)
     with pytest.raises(MemoryError):
+        render(life, 4)
+
+
+def test_after_too_little_memory_for_the_network(
+    life: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: Any, **__: Any) -> None:
+        raise OutOfMemory("on purpose")
+
+    monkeypatch.setattr("xrds_blender.layer._load", lambda *_: fail)
+    with pytest.raises(NetworkFailed):
         render(life, 4)
 
 

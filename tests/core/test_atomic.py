@@ -87,7 +87,11 @@ with replacing(Path({str(tmp_path)!r}) / "frame.exr") as part:
 
 
 def test_a_process_that_ends_on_the_spot_leaves_nothing(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError), replacing(tmp_path / "frame.exr") as part:
-        part.write_text("half")
-        atomic.abandon()
-        assert not names(tmp_path)
+    def write() -> None:
+        with replacing(tmp_path / "frame.exr") as part:
+            part.write_text("half")
+            atomic.abandon()
+
+    with pytest.raises(FileNotFoundError):
+        write()
+    assert not names(tmp_path)

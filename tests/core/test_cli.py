@@ -80,12 +80,13 @@ def test_help_is_0(capfd: pytest.CaptureFixture[str]) -> None:
 def test_render_options() -> None:
     told = parse(
         "render a.blend -o f_####.png --frames=-2-3 --resolution 640x360 "
-        "--scale 4 --samples 9 --memory-limit 2G --exposure 0.5 --seed 7"
+        "--scale 4 --samples 9 --memory-limit 2G --exposure 0.5 --seed 7 --resume"
     )
     assert told.scene == Path("a.blend")
     assert told.frames == [-2, -1, 0, 1, 2, 3]
     assert told.resolution == (640, 360)
     assert told.memory_limit == 2 << 30
+    assert told.resume
     assert (told.scale, told.samples, told.exposure, told.seed) == (4, 9, 0.5, 7)
     assert (told.guides, told.preset, told.plain, told.json) == (
         "fast",

@@ -114,6 +114,13 @@ BOUNDS |= {
     "samples.falling_psnr": Bound(
         0, "dB lost from 1 to 4, 16 and 64 samples, at the worst step"
     ),
+    "load.memory": Bound(
+        16, "KiB that memory grows by with each of 200 frames in one process"
+    ),
+    "load.data_blocks": Bound(0, "data-blocks and images that stay behind over them"),
+    "load.slowing": Bound(
+        1.1, "processor seconds of a later frame, of an earlier one's"
+    ),
 }
 
 EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {

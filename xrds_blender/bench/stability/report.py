@@ -20,6 +20,7 @@ PLOTS = (
     ("constant.value", "Error of a constant picture", "albedo", ""),
     ("samples.falling_psnr", "PSNR against samples", "samples", "x"),
     ("shot.turntable.exposure", "Exposure over the turntable, stops", "frame", ""),
+    ("load.memory", "Memory over 200 frames, KiB", "frame", ""),
 )
 
 

@@ -32,8 +32,8 @@ GROUPS: dict[str, tuple[Work, ...]] = {
     "shapes": shapes.CHECKS,
     "sameness": sameness.CHECKS,
 }
-# Arrays alone; 8192 x 8192; scenes and shots that Blender renders.
-PARTS = ("arrays", "large", "scenes", "shots")
+# Arrays alone; 8192 x 8192; scenes, shots and a long shot that Blender renders.
+PARTS = ("arrays", "large", "scenes", "shots", "load")
 SIDE = 256  # pixels of rendered scenes along one side; shots are half as wide
 ARRAY_SIDE = 128
 
@@ -86,7 +86,7 @@ def stability(
         raise UsageError(f"{sorted(unknown)} is none of {', '.join(PARTS)}")
     out.mkdir(parents=True, exist_ok=True)
     say = progress or (lambda _: None)
-    works = list(_works(parts, cache or out / "rendered", side, say))
+    works = list(_works(parts, cache or out / "rendered", side, weights, say))
     there = available(weights)
     found, curves = _earlier(out / "results.json", there)
     told: dict[str, Any] = {}
@@ -137,7 +137,7 @@ def _earlier(
 
 
 def _works(
-    parts: Sequence[str], folder: Path, side: int, say: Say
+    parts: Sequence[str], folder: Path, side: int, weights: Path | None, say: Say
 ) -> Iterator[tuple[str, Work]]:
     if "arrays" in parts:
         for group in GROUPS.values():
@@ -150,6 +150,10 @@ def _works(
         yield from _scenes(folder, side, say)
     if "shots" in parts:
         yield from _shots(folder, side, say)
+    if "load" in parts:
+        from .load import load
+
+        yield "load", partial(load, weights=weights)
 
 
 def _scenes(folder: Path, side: int, say: Say) -> Iterator[tuple[str, Work]]:
