@@ -305,6 +305,28 @@ def test_a_killed_animation_resumes_at_the_first_missing_frame(
     assert other["kept"] == []  # of another size
 
 
+def test_what_another_render_has_finished_meanwhile_is_left(
+    blend: Path, tmp_path: Path
+) -> None:
+    folder = tmp_path / "f"
+
+    @bpy.app.handlers.persistent
+    def finish(scene: Any, *_: Any) -> None:
+        if scene.frame_current == 2:
+            (folder / "3.exr").write_bytes((folder / "1.exr").read_bytes())
+
+    bpy.app.handlers.render_complete.append(finish)
+    job = RenderJob(plain=True, samples=1)
+    try:
+        told = render_file(
+            blend, f"{folder}/#.exr", job, frames=range(1, 4), resume=True
+        )
+    finally:
+        bpy.app.handlers.render_complete.remove(finish)
+    assert told["kept"] == [3]
+    assert names(folder) == ["1.exr", "2.exr", "3.exr"]
+
+
 def test_a_border_resumes_too(blend: Path, tmp_path: Path) -> None:
     edges = bpy.context.scene.render
     edges.use_border, edges.use_crop_to_border = True, True
