@@ -25,6 +25,7 @@ _EVEN = 2e-3
 _ALIKE = 0.05
 # Below this share of idle pixels, finding the base costs what it saves.
 _WORTH = 0.1
+_BAND = 64  # low-resolution rows that the base is found for at once
 
 
 def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
@@ -51,12 +52,18 @@ def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
     return (rows, columns) if kept < (1 - _WORTH) * height * width else whole
 
 
-def base_picture(inputs: Inputs) -> Picture:
-    """Return the demodulated base at full size, (H, W, 3)."""
-    height, width = inputs.shape
-    low = inputs.low[..., :3]
-    albedo = pad_guide(inputs.albedo.clip(0.0, 1.0), low, inputs.scale)
-    return demodulated_base(low, albedo, inputs.scale)[:height, :width]
+def write_base(picture: Picture, inputs: Inputs) -> None:
+    """Write the demodulated base into ``picture`` (H, W, 3), a band at a time."""
+    height, scale = inputs.low.shape[0], inputs.scale
+    for top in range(0, height, _BAND):
+        # one more row at each end: as far as interpolation looks
+        first, last = max(top - 1, 0), min(top + _BAND + 1, height)
+        low = inputs.low[first:last, :, :3]
+        albedo = inputs.albedo[first * scale : last * scale].clip(0.0, 1.0)
+        base = demodulated_base(low, pad_guide(albedo, low, scale), scale)
+        target = picture[top * scale : (top + _BAND) * scale]
+        above = (top - first) * scale
+        target[...] = base[above : above + len(target), : target.shape[1]]
 
 
 def _idle(inputs: Inputs, block: int) -> NDArray[np.bool_]:

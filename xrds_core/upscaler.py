@@ -17,7 +17,7 @@ from .cost import Cost, measure
 from .devices import choose_device, choose_precision, free_memory, is_out_of_memory
 from .errors import OutOfMemory, PictureError, UsageError, WeightsError
 from .front_end import EXPOSURE_RANGE, auto_exposure, inverse_transfer
-from .idle import base_picture, busy_area
+from .idle import busy_area, write_base
 from .inputs import Inputs, check
 from .network import XRDS
 from .progress import Callback, Progress, watched
@@ -227,7 +227,7 @@ class Upscaler:
         """Write the base outside of ``area``, which stays 0."""
         if area is not None and _size(area) == inputs.low.shape[:2]:
             return
-        picture[..., :3] = base_picture(inputs)
+        write_base(picture[..., :3], inputs)
         if area is not None:
             rows, columns = (
                 slice(s.start * self.scale, s.stop * self.scale) for s in area

@@ -8,6 +8,8 @@ import torch
 from numpy.typing import NDArray
 
 from xrds_core.front_end import demodulated_base
+from xrds_core.idle import write_base
+from xrds_core.inputs import check
 from xrds_core.network import XRDS, preset_config
 from xrds_core.upscaler import Upscaler
 
@@ -64,6 +66,17 @@ def test_a_background_is_the_base_and_the_thing_is_as_before(
     base = demodulated_base(low, albedo, SCALE)
     np.testing.assert_array_equal(short[:32], base[:32])  # rows that are idle
     assert seen[-1] == 1.0
+
+
+def test_bands_of_the_base_meet() -> None:
+    rng = np.random.default_rng(3)
+    low = rng.random((150, 7, 3), np.float32)
+    albedo, normal = rng.random((2, 299, 13, 3), np.float32)
+    found = np.empty_like(albedo)
+    write_base(found, check(SCALE, low, albedo, normal))
+    padded = np.pad(albedo, ((0, 1), (0, 1), (0, 0)), "edge")
+    expected = demodulated_base(low, padded, SCALE)[:299, :13]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
 def test_what_fills_the_picture_is_all_computed(fast: Upscaler) -> None:

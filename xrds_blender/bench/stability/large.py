@@ -37,6 +37,7 @@ random = np.random.default_rng(0)
 low = random.random((side // scale, side // scale, 3), np.float32)
 albedo = random.random((side, side, 3), np.float32)
 normal = random.random((side, side, 3), np.float32)
+low[side // scale // 2 :], albedo[side // 2 :], normal[side // 2 :] = 0.5, 0.5, 0.0
 made(low[:8, :8], albedo[: 8 * scale, : 8 * scale], normal[: 8 * scale, : 8 * scale])
 open("/proc/self/clear_refs", "w").write("5")
 before = status("VmRSS")
@@ -53,6 +54,7 @@ print("REPORT" + json.dumps({"peak": peak, "bad": bad, "tiles": result.tiles}))
 def large(subject: Subject, side: int = SIDE) -> Iterator[Measured]:
     """Bytes beside the arrays given and returned, with a limit of 2 GiB.
 
+    The lower half is background, which the network does not see: both ways count.
     Only in fp32: tiles are planned for it, whatever the layers then take.
     """
     if subject.precision != "fp32":
