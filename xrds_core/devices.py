@@ -45,11 +45,12 @@ def choose_precision(name: str, device: torch.device) -> torch.dtype:
 
 
 # What torch says in a plain RuntimeError where an allocation fails on a processor
-# (Linux, Windows, oneDNN, C++) or under MPS.
+# (Linux, Windows, oneDNN twice, which tells no reason, C++) or under MPS.
 _OUT_OF_MEMORY = (
     "can't allocate memory",
     "not enough memory",
-    "could not create a memory object",
+    "could not create a ",
+    "could not execute a primitive",
     "bad_alloc",
     "out of memory",
 )

@@ -7,6 +7,7 @@ long shot is.
 
 from __future__ import annotations
 
+import os
 import sys
 import tempfile
 import time
@@ -78,6 +79,7 @@ def load(
     """Growth over a shot; only in fp32, for its network is the same for Blender."""
     if subject.precision != "fp32":
         return
+    from ...console import stdout_to
     from .stiff_scenes import build
 
     scene = build("one_sample", SIDE)
@@ -86,8 +88,8 @@ def load(
         thing.rotation_euler[2] = angle
         thing.keyframe_insert("rotation_euler", frame=frame)
     guides = subject.upscaler.network.config.guides
-    frames = settled(
-        drive(
+    with stdout_to(Path(os.devnull)):  # Blender tells of every sample
+        frames = drive(
             scene,
             count,
             scale=subject.scale,
@@ -97,7 +99,7 @@ def load(
             device=str(subject.upscaler.device),
             weights=weights,
         )
-    )
+    frames = settled(frames)
     memory = [frame.memory / 2**10 for frame in frames]
     numbers = range(count - len(frames) + 1, count + 1)
     above = dict(zip(numbers, (x - memory[0] for x in memory), strict=True))
