@@ -7,7 +7,6 @@ holds the JSON alone.
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any, NoReturn
 
 from xrds_core.errors import UsageError, XRDSError
 
-from . import console
+from . import arguments, console
 
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
@@ -365,8 +364,10 @@ def _add_render(commands: Any) -> argparse.ArgumentParser:
     add("--explain", action="store_true", help="tell the plan and render nothing")
     add("--resume", action="store_true", help="only frames that are not there, whole")
     which = command.add_mutually_exclusive_group()
-    which.add_argument("--frame", type=_frame, dest="frames", metavar="F")
-    which.add_argument("--frames", type=_frames, help="first-last", metavar="A-B")
+    which.add_argument("--frame", type=arguments.frame, dest="frames", metavar="F")
+    which.add_argument(
+        "--frames", type=arguments.frames, help="first-last", metavar="A-B"
+    )
     command.set_defaults(work=_render, lines=_render_lines)
     return command
 
@@ -387,22 +388,22 @@ def _add_job(command: argparse.ArgumentParser) -> None:
     size.add_argument("--plain", action="store_true", help="Cycles as the file has it")
     size.add_argument(
         "--time-budget",
-        type=_factor,
+        type=arguments.factor,
         metavar="SECONDS",
         help="of a frame; chooses scale, samples, guides, network and denoiser",
     )
     size.add_argument(
         "--quality",
-        type=_factor,
+        type=arguments.factor,
         metavar="DB",
         help="expected PSNR; chooses the same for the least seconds",
     )
-    add("--samples", type=_positive, help="of the low-resolution render")
-    add("--guide-samples", type=_positive, default=4)
+    add("--samples", type=arguments.positive, help="of the low-resolution render")
+    add("--guide-samples", type=arguments.positive, default=4)
     add("--guide-cache", type=Path, metavar="DIR", help="folder that keeps guides")
     add("--guide-limit", type=int, default=0, help="samples that kept guides gather")
     add("--keep-all", action="store_true", help="leave nothing out")
-    add("--resolution", type=_size, metavar="WxH")
+    add("--resolution", type=arguments.size, metavar="WxH")
     add("--seed", type=int)
     _add_network(command)
 
@@ -423,9 +424,15 @@ def _add_network(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     add("--guides", choices=GUIDES, default="fast")
     add("--preset", choices=PRESETS, default="fast")
-    add("--exposure", type=_factor, help="hold it for an animation or a border")
+    add(
+        "--exposure", type=arguments.factor, help="hold it for an animation or a border"
+    )
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
-    add("--memory-limit", type=_bytes, help="of the network, as 500M or 4G")
+    add(
+        "--memory-limit",
+        type=arguments.size_in_bytes,
+        help="of the network, as 500M or 4G",
+    )
     add("--weights", type=Path, help="weights file, or folder of such")
 
 
@@ -436,12 +443,19 @@ def _add_evaluate(commands: Any) -> argparse.ArgumentParser:
     add("--windows", type=Path, required=True, help="JSON file of windows")
     add("--references", type=Path, required=True, help="folder of NAME.exr")
     add("--cache", type=Path, help="folder that keeps rendered inputs")
-    add("--scale", type=_integers, default=(2, 4), help="as 2,4")
-    add("--preset", type=_names(PRESETS), default=("fast",), help="as fast,balanced")
-    add("--guides", type=_names(GUIDES), default=("fast",), help="as fast,full")
+    add("--scale", type=arguments.integers, default=(2, 4), help="as 2,4")
+    add(
+        "--preset",
+        type=arguments.names(PRESETS),
+        default=("fast",),
+        help="as fast,balanced",
+    )
+    add(
+        "--guides", type=arguments.names(GUIDES), default=("fast",), help="as fast,full"
+    )
     add("--table", choices=("standard", "samples"), default="standard")
     add("--timing", action="store_true", help="also time whole frames")
-    add("--timing-scenes", type=_parts, help="of these alone, as bmw27,house")
+    add("--timing-scenes", type=arguments.words, help="of these alone, as bmw27,house")
     add("--weights", type=Path, help="folder of weights files")
     add("--out", type=Path, help="folder for results.json")
     add("--sheets", type=Path, help="folder for a JPEG of crops for each scene")
@@ -453,7 +467,12 @@ def _add_stability(commands: Any) -> argparse.ArgumentParser:
     command = commands.add_parser("stability", help="measure stiff and extreme cases")
     add = command.add_argument
     add("--out", type=Path, required=True, help="folder for results.json and report")
-    add("--parts", type=_names(STABILITY), default=STABILITY, help="as arrays,large")
+    add(
+        "--parts",
+        type=arguments.names(STABILITY),
+        default=STABILITY,
+        help="as arrays,large",
+    )
     add("--cache", type=Path, help="folder that keeps rendered pictures")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
     add("--weights", type=Path, help="folder of weights files")
@@ -466,12 +485,17 @@ def _add_plan_report(commands: Any) -> argparse.ArgumentParser:
     add = command.add_argument
     add("scenes", nargs="+", help="SCENE.blend, or a scene of studio/traps.py")
     kinds = ("still", "animation", "look-dev")
-    add("--kind", type=_names(kinds), default=("still",), help="as still,look-dev")
+    add(
+        "--kind",
+        type=arguments.names(kinds),
+        default=("still",),
+        help="as still,look-dev",
+    )
     add("--scale", type=int, choices=(2, 4, 8), default=2)
-    add("--samples", type=_positive, default=16)
-    add("--guide-samples", type=_positive, default=4)
-    add("--resolution", type=_size, metavar="WxH", default=(960, 540))
-    add("--rounds", type=_positive, default=1, help="pairs of runs")
+    add("--samples", type=arguments.positive, default=16)
+    add("--guide-samples", type=arguments.positive, default=4)
+    add("--resolution", type=arguments.size, metavar="WxH", default=(960, 540))
+    add("--rounds", type=arguments.positive, default=1, help="pairs of runs")
     add("--out", type=Path, required=True, help="path of the .json and .md")
     command.set_defaults(work=_plan_report, lines=lambda _: ())
     return command
@@ -484,19 +508,35 @@ def _add_bench(commands: Any) -> argparse.ArgumentParser:
     add("--out", type=Path, required=True, help="folder; an unfinished run resumes")
     add(
         "--budgets",
-        type=_factors,
+        type=arguments.factors,
         default=(0.5, 1.0, 2.0, 4.0, 8.0),
         help="multiples of each scene's 1 spp + OIDN, as 0.5,1,2",
     )
-    add("--resolution", type=_size, metavar="WxH", help="in place of the files' own")
-    add("--reference-samples", type=_positive, default=128, help="of each half")
+    add(
+        "--resolution",
+        type=arguments.size,
+        metavar="WxH",
+        help="in place of the files' own",
+    )
+    add(
+        "--reference-samples", type=arguments.positive, default=128, help="of each half"
+    )
     add("--windows", type=Path, help="JSON file of windows that errors are taken on")
     add("--references", type=Path, help="folder of NAME.exr, for the windows")
     add("--cache", type=Path, help="folder of rendered inputs; OUT/cache")
-    add("--preset", type=_names(PRESETS), help="as fast,balanced; all with weights")
-    add("--rounds", type=_positive, default=3, help="runs of each timed stage")
+    add(
+        "--preset",
+        type=arguments.names(PRESETS),
+        help="as fast,balanced; all with weights",
+    )
+    add("--rounds", type=arguments.positive, default=3, help="runs of each timed stage")
     add("--errors-only", action="store_true", help="time nothing")
-    add("--growth", type=_sizes, default=(), help="frames, as 512x512,1920x1080")
+    add(
+        "--growth",
+        type=arguments.sizes,
+        default=(),
+        help="frames, as 512x512,1920x1080",
+    )
     add("--model", type=Path, help="where to write what --time-budget goes by")
     add("--device", default="auto", help="auto, cpu, cuda, cuda:1, mps")
     add("--weights", type=Path, help="folder of weights files")
@@ -509,9 +549,9 @@ def _add_dataset(commands: Any) -> argparse.ArgumentParser:
     add = command.add_argument
     add("--out", type=Path, required=True)
     add("--seed", type=int, default=0, help="first scene's seed")
-    add("--count", type=_positive, default=1, help="number of scenes")
+    add("--count", type=arguments.positive, default=1, help="number of scenes")
     add("--assets", type=Path, help="folder of models, textures and skies")
-    add("--scales", type=_integers, default=(2, 4, 8), help="as 2,4,8")
+    add("--scales", type=arguments.integers, default=(2, 4, 8), help="as 2,4,8")
     command.set_defaults(work=_dataset, lines=lambda _: ())
     return command
 
@@ -533,7 +573,7 @@ def _add_ablate(commands: Any) -> argparse.ArgumentParser:
     add("config", type=Path, metavar="CONFIG.toml")
     add("--table", required=True, help="base, guides, blocks, rival, loss, input")
     add("--out", type=Path, required=True, help="folder of TABLE.json and its runs")
-    add("--seeds", type=_positive, default=3, help="runs of each variant")
+    add("--seeds", type=arguments.positive, default=3, help="runs of each variant")
     _add_changes(command)
     command.set_defaults(work=_ablate, lines=_ablate_lines)
     return command
@@ -548,77 +588,6 @@ def _add_changes(command: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="in the place of the file's, as scale=8 or 'start=\"a.safetensors\"'",
     )
-
-
-# --- values ---------------------------------------------------------------------------
-
-
-def _positive(text: str) -> int:
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{value} is below 1")
-    return value
-
-
-def _factor(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is no number above 0")
-    return value
-
-
-def _factors(text: str) -> tuple[float, ...]:
-    return tuple(_factor(part) for part in text.split(","))
-
-
-def _integers(text: str) -> tuple[int, ...]:
-    return tuple(int(part) for part in text.split(","))
-
-
-def _parts(text: str) -> tuple[str, ...]:
-    return tuple(text.split(","))
-
-
-def _names(known: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
-    def names(text: str) -> tuple[str, ...]:
-        found = tuple(text.split(","))
-        for name in found:
-            if name not in known:
-                raise argparse.ArgumentTypeError(
-                    f"{name!r} is none of {', '.join(known)}"
-                )
-        return found
-
-    return names
-
-
-def _frame(text: str) -> list[int]:
-    return [int(text)]
-
-
-def _frames(text: str) -> list[int]:
-    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
-    if not match or int(match[1]) > int(match[2]):
-        raise argparse.ArgumentTypeError(f"{text!r} is no range as 1-24")
-    return list(range(int(match[1]), int(match[2]) + 1))
-
-
-def _size(text: str) -> tuple[int, int]:
-    match = re.fullmatch(r"(\d+)x(\d+)", text)
-    if not match or "0" in match.groups():
-        raise argparse.ArgumentTypeError(f"{text!r} is no size as 1920x1080")
-    return int(match[1]), int(match[2])
-
-
-def _sizes(text: str) -> tuple[tuple[int, int], ...]:
-    return tuple(_size(part) for part in text.split(","))
-
-
-def _bytes(text: str) -> int:
-    match = re.fullmatch(r"(\d+)([KMG]?)", text.upper())
-    if not match:
-        raise argparse.ArgumentTypeError(f"{text!r} is no amount as 500M or 4G")
-    return int(match[1]) << {"": 0, "K": 10, "M": 20, "G": 30}[match[2]]
 
 
 if __name__ == "__main__":

@@ -1,0 +1,90 @@
+"""What the options of the commands take: text to values.
+
+Each raises ArgumentTypeError or ValueError for text that is none; argparse then tells.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Callable, Sequence
+
+
+def positive(text: str) -> int:
+    """A whole number above 0."""
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value} is below 1")
+    return value
+
+
+def factor(text: str) -> float:
+    """A number above 0."""
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is no number above 0")
+    return value
+
+
+def factors(text: str) -> tuple[float, ...]:
+    """Numbers above 0, as 0.5,2."""
+    return tuple(factor(part) for part in text.split(","))
+
+
+def integers(text: str) -> tuple[int, ...]:
+    """Whole numbers, as 2,4."""
+    return tuple(int(part) for part in text.split(","))
+
+
+def words(text: str) -> tuple[str, ...]:
+    """Any words, as bmw27,house."""
+    return tuple(text.split(","))
+
+
+def names(known: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
+    """Make the reader of names out of `known`, as fast,balanced."""
+
+    def read(text: str) -> tuple[str, ...]:
+        found = tuple(text.split(","))
+        for name in found:
+            if name not in known:
+                raise argparse.ArgumentTypeError(
+                    f"{name!r} is none of {', '.join(known)}"
+                )
+        return found
+
+    return read
+
+
+def frame(text: str) -> list[int]:
+    """One frame number, as a list."""
+    return [int(text)]
+
+
+def frames(text: str) -> list[int]:
+    """Frame numbers, as 1-24."""
+    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
+    if not match or int(match[1]) > int(match[2]):
+        raise argparse.ArgumentTypeError(f"{text!r} is no range as 1-24")
+    return list(range(int(match[1]), int(match[2]) + 1))
+
+
+def size(text: str) -> tuple[int, int]:
+    """Width and height, as 1920x1080."""
+    match = re.fullmatch(r"(\d+)x(\d+)", text)
+    if not match or "0" in match.groups():
+        raise argparse.ArgumentTypeError(f"{text!r} is no size as 1920x1080")
+    return int(match[1]), int(match[2])
+
+
+def sizes(text: str) -> tuple[tuple[int, int], ...]:
+    """Sizes, as 960x540,1920x1080."""
+    return tuple(size(part) for part in text.split(","))
+
+
+def size_in_bytes(text: str) -> int:
+    """Bytes, as 500M or 4G."""
+    match = re.fullmatch(r"(\d+)([KMG]?)", text.upper())
+    if not match:
+        raise argparse.ArgumentTypeError(f"{text!r} is no amount as 500M or 4G")
+    return int(match[1]) << {"": 0, "K": 10, "M": 20, "G": 30}[match[2]]
