@@ -146,6 +146,43 @@ def test_a_farm_can_ask_whether_the_engine_is_there(bare: Program) -> None:
     assert bare.run(*without).returncode == 3
 
 
+def test_the_command_renders_and_upscales_exr(bare: Program) -> None:
+    """Its EXR library is not the one that lies inside the program."""
+    openexr = pytest.importorskip("OpenEXR")
+    share = bare.share
+    code = f"""
+import bpy
+scene = bpy.context.scene
+scene.render.resolution_x = scene.render.resolution_y = 64
+scene.cycles.samples = 2
+scene.view_layers[0].cycles.denoising_store_passes = True
+bpy.ops.wm.save_as_mainfile(filepath={bare.seen(share / "scene.blend")!r})
+scene.render.engine, scene.render.filepath = 'CYCLES', {bare.seen(share / "guides")!r}
+if bpy.app.version >= (5, 0):
+    scene.render.image_settings.media_type = 'MULTI_LAYER_IMAGE'
+scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+scene.render.use_file_extension = True
+scene.cycles.use_denoising = False
+bpy.ops.render.render(write_still=True)
+scene.render.filepath = {bare.seen(share / "low")!r}
+scene.render.resolution_percentage = 50
+bpy.ops.render.render(write_still=True)
+"""
+    python(bare, code)
+    command = ("blender", "--command", "xrds")
+    seen = {name: bare.seen(share / name) for name in ("scene.blend", "whole.exr")}
+    done = bare.run(*command, "render", seen["scene.blend"], "-o", seen["whole.exr"])
+    assert done.returncode == 0, done.stdout
+    files = [bare.seen(share / name) for name in ("low.exr", "guides.exr", "up.exr")]
+    done = bare.run(*command, "upscale", *files[:2], "-o", files[2])
+    assert done.returncode == 0, done.stdout
+    for name in ("whole.exr", "up.exr"):
+        with openexr.File(str(share / name), separate_channels=True) as file:
+            red = file.channels()["R"].pixels
+        assert red.shape == (64, 64)
+        assert red.std() > 0.01
+
+
 def test_without_torch_it_loads_and_says_what_is_missing(bare: Program) -> None:
     code = """
 import sys
