@@ -62,10 +62,7 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
         settings = scene.xrds
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(settings, "use_time_budget")
-        row = layout.row()
-        row.active = settings.use_time_budget
-        row.prop(settings, "time_budget")
+        _switched(layout, settings, "use_time_budget", "time_budget")
         column = layout.column()
         column.active = not (settings.plain or settings.use_time_budget)
         column.prop(settings, "scale")
@@ -118,12 +115,10 @@ class XRDS_PT_advanced(_RenderPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.xrds
         layout.use_property_split = True
+        layout.use_property_decorate = False
         layout.active = not settings.plain
         layout.prop(settings, "device")
-        layout.prop(settings, "use_exposure")
-        row = layout.row()
-        row.active = settings.use_exposure
-        row.prop(settings, "exposure")
+        _switched(layout, settings, "use_exposure", "exposure")
 
 
 class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
@@ -141,6 +136,16 @@ class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
         for stage, name in STAGE_NAMES.items():
             if seconds[stage] > 0.0:
                 _row(self.layout, name, f"{seconds[stage]:.1f} s")
+
+
+def _switched(layout: Any, settings: Any, switch: str, name: str) -> None:
+    """A switch and the value it brings into force in one row, as Cycles has them."""
+    heading = settings.bl_rna.properties[switch].name
+    row = layout.column(heading=heading).row(align=True)
+    row.prop(settings, switch, text="")
+    value = row.row()
+    value.active = getattr(settings, switch)
+    value.prop(settings, name, text="")
 
 
 def _row(layout: Any, name: str, value: str) -> None:

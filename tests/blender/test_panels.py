@@ -51,7 +51,7 @@ def test_panel_draws_every_property_it_names() -> None:
         def __init__(self) -> None:
             self.drawn: list[str] = []
 
-        def prop(self, owner: object, name: str) -> None:
+        def prop(self, owner: object, name: str, **_: object) -> None:
             assert name in owner.bl_rna.properties
             self.drawn.append(name)
 
