@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from program import Window
 
-pytestmark = pytest.mark.timeout(1800)
+pytestmark = pytest.mark.timeout(3600)
 
 RENDER_MENU = (129, 34)
 RENDER_IMAGE, RENDER_ANIMATION = (175, 56), (175, 78)
