@@ -137,6 +137,33 @@ def test_self_test_tells_device_seconds_versions(bare: Program) -> None:
     assert "PyTorch" in text
 
 
+def test_a_folder_named_in_the_preferences_gives_torch(bare: Program) -> None:
+    """A folder for this Python with the three packages, as pip --target leaves it."""
+    folder = bare.seen(bare.share / "torch")
+    code = f"""
+import bpy, os
+from importlib.util import find_spec
+os.makedirs({folder!r}, exist_ok=True)
+for name in ("torch", "safetensors", "OpenEXR"):
+    origin = find_spec(name).origin
+    source = os.path.dirname(origin) if "__init__" in origin else origin
+    target = os.path.join({folder!r}, os.path.basename(source))
+    if not os.path.lexists(target):
+        os.symlink(source, target)
+preferences = bpy.context.preferences.addons[{MODULE!r}].preferences
+preferences.torch = {folder!r}
+bpy.ops.xrds.self_test()
+import torch
+from xrds_blender.preferences import torch_status
+print("used=" + torch.__file__)
+print("status=%s" % torch_status())
+"""
+    text = python(bare, code)
+    assert "XRDS works: 64 x 64 pixels on cpu" in text
+    assert told(text, "used").startswith(folder)
+    assert folder in told(text, "status")
+
+
 def test_a_farm_can_ask_whether_the_engine_is_there(bare: Program) -> None:
     """The line of docs/pipeline.md ends with success here, and not without XRDS."""
     line = f"import bpy, sys; {ENGINE} or sys.exit(3)"
