@@ -17,8 +17,10 @@ from . import (
     status_bar,
     support,
     torch_folder,
+    translations,
 )
 from .operators import ENGINE
+from .translations import CONTEXT
 
 if TYPE_CHECKING:
     from .explain import Glance
@@ -40,6 +42,7 @@ class _RenderPanel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
+    bl_translation_context = CONTEXT
     COMPAT_ENGINES = {ENGINE}
 
     @classmethod
@@ -141,7 +144,8 @@ class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
 def _switched(layout: Any, settings: Any, switch: str, name: str) -> None:
     """A switch and the value it brings into force in one row, as Cycles has them."""
     heading = settings.bl_rna.properties[switch].name
-    row = layout.column(heading=heading).row(align=True)
+    column = layout.column(heading=heading, heading_ctxt=CONTEXT)
+    row = column.row(align=True)
     row.prop(settings, switch, text="")
     value = row.row()
     value.active = getattr(settings, switch)
@@ -153,7 +157,7 @@ def _row(layout: Any, name: str, value: str) -> None:
     split = layout.split(factor=0.4)
     side = split.row()
     side.alignment = "RIGHT"
-    side.label(text=name)
+    side.label(text=name, text_ctxt=CONTEXT)
     split.label(text=value, translate=False)
 
 
@@ -242,6 +246,7 @@ def _changes() -> tuple[Any, ...]:
 
 def register() -> None:
     """Register the panels and show Cycles' own under XRDS."""
+    translations.register()
     presets.register()
     for panel in CLASSES:
         bpy.utils.register_class(panel)
@@ -260,3 +265,4 @@ def unregister() -> None:
     for panel in reversed(CLASSES):
         bpy.utils.unregister_class(panel)
     presets.unregister()
+    translations.unregister()

@@ -271,6 +271,11 @@ def test_the_interface_in_languages(window: Window, language: str) -> None:
         pytest.skip("this program was installed without translations")
     try:
         window.ask(OPEN_PANELS.format(language=language))
+        window.settle()  # a new editor learns its tabs when it is drawn
+        window.ask(
+            "area = max(window.screen.areas, key=lambda a: a.width * a.height)\n"
+            "area.spaces.active.context = 'RENDER'"
+        )
         samples = window.ask("bpy.app.translations.pgettext_iface('Samples')")
         assert (samples == "Samples") == (language == "en_US")
         window.settle()
@@ -296,7 +301,6 @@ for panel in panels.CLASSES:
     bpy.utils.register_class(panel)
 area = max(window.screen.areas, key=lambda a: a.width * a.height)
 area.type = 'PROPERTIES'
-area.spaces.active.context = 'RENDER'
 bpy.data.scenes[0].render.engine = 'XRDS'
 """
 PREFERENCES = """

@@ -16,6 +16,7 @@ from xrds_blender import (
     preferences,
     status_bar,
     torch_folder,
+    translations,
 )
 from xrds_blender.job import RenderJob
 
@@ -205,3 +206,23 @@ def test_status_bar_tells_the_stage() -> None:
     status_bar.end()
     status_bar.draw(Bar, None)
     assert told == ["XRDS 2/3: Guides"]
+
+
+def test_panels_use_their_own_words_for_guides() -> None:
+    """Blender's German calls guides lines on a ruler, and fast an insertion."""
+    translate = bpy.app.translations.pgettext_iface
+    view = bpy.context.preferences.view
+    language = view.language
+    if "de_DE" not in bpy.app.translations.locales:
+        pytest.skip("this Blender was built without translations")
+    try:
+        view.language, view.use_translate_interface = "de_DE", True
+        assert translate("Guides", translations.CONTEXT) == "Hilfsbilder"
+        view.language = "en_US"
+        assert translate("Guides", translations.CONTEXT) == "Guides"
+    finally:
+        view.language = language
+    settings = bpy.context.scene.xrds.bl_rna.properties
+    for name, item in settings.items():
+        if name not in {"rna_type", "name"}:
+            assert item.translation_context == translations.CONTEXT
