@@ -10,6 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from xrds_blender import cycles_session  # noqa: E402
 from xrds_blender.render import render, run_job  # noqa: E402
 from xrds_core import exr  # noqa: E402
 from xrds_core.errors import UsageError, WeightsError  # noqa: E402
@@ -127,6 +128,8 @@ def test_persistent_data_changes_no_pixel(
 
 
 def test_the_network_sees_the_picture_before_denoising(life: Any, network: Any) -> None:
+    if not cycles_session.has_denoiser():
+        pytest.skip("this Blender has no OpenImageDenoise")
     render(life, 2, samples=2, seed=1)
     rough, smooth = run_job(
         life,

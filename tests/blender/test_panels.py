@@ -97,6 +97,7 @@ def test_summary_tells_the_low_size(scale: str, low: str) -> None:
 
 def test_panel_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bpy.context.scene
+    monkeypatch.setattr(panels.cycles_session, "has_denoiser", lambda: True)
     assert panels.remarks(scene) == []
     monkeypatch.setattr(torch_folder, "is_there", lambda: False)
     monkeypatch.setattr(panels.cycles_session, "has_denoiser", lambda: False)
@@ -210,19 +211,19 @@ def test_status_bar_tells_the_stage() -> None:
 
 def test_panels_use_their_own_words_for_guides() -> None:
     """Blender's German calls guides lines on a ruler, and fast an insertion."""
-    translate = bpy.app.translations.pgettext_iface
-    view = bpy.context.preferences.view
-    language = view.language
     if "de_DE" not in bpy.app.translations.locales:
         pytest.skip("this Blender was built without translations")
+    translate = bpy.app.translations.pgettext_iface
+    view = bpy.context.preferences.view
     try:
         view.language, view.use_translate_interface = "de_DE", True
         assert translate("Guides", translations.CONTEXT) == "Hilfsbilder"
-        view.language = "en_US"
-        assert translate("Guides", translations.CONTEXT) == "Guides"
     finally:
-        view.language = language
+        view.language = "en_US"
+    assert translate("Guides", translations.CONTEXT) == "Guides"
+
+
+def test_settings_are_never_translated_as_blenders_own_words() -> None:
     settings = bpy.context.scene.xrds.bl_rna.properties
-    for name, item in settings.items():
-        if name not in {"rna_type", "name"}:
-            assert item.translation_context == translations.CONTEXT
+    for name in set(settings.keys()) - {"rna_type", "name"}:
+        assert settings[name].translation_context == translations.CONTEXT
