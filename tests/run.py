@@ -78,7 +78,7 @@ def run(name: str, paths: list[Path], options: list[str]) -> Verdict:
 def batches() -> list[tuple[str, list[Path]]]:
     """Name and files of every pytest process: one for all that needs no Blender."""
     blender = sorted((TESTS / "blender").glob("test_*.py"))
-    # tests/app needs a Blender program and a quarter of an hour: make test-app.
+    # tests/app needs a Blender program and half an hour: make test-app.
     app = set((TESTS / "app").glob("test_*.py"))
     plain = [p for p in TESTS.rglob("test_*.py") if p not in {*blender, *app}]
     found = [("core", sorted(plain))] if plain else []

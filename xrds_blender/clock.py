@@ -1,7 +1,9 @@
 """Seconds of the stages inside one Cycles render, read from its own status lines.
 
 Blender hands every status line of a background render to the `render_stats` handlers.
-A render in a window tells nothing there: its seconds then all count as rendering.
+In a window nobody listens, and all seconds count as rendering: Cycles tells its status
+with the scene locked, and the image editor, which holds Python, waits for that lock to
+draw (Blender 5.2 hangs).
 """
 
 from __future__ import annotations
@@ -30,7 +32,8 @@ class StageClock:
         import bpy
 
         self._start = self._status = time.perf_counter()
-        bpy.app.handlers.render_stats.append(self._hear)
+        if bpy.app.background:
+            bpy.app.handlers.render_stats.append(self._hear)
         return self
 
     def __exit__(
@@ -42,7 +45,8 @@ class StageClock:
         import bpy
 
         self._end = time.perf_counter()
-        bpy.app.handlers.render_stats.remove(self._hear)
+        if bpy.app.background:
+            bpy.app.handlers.render_stats.remove(self._hear)
 
     def _hear(self, line: str, *_: Any) -> None:
         """Add the time since the last line to what Cycles did until now.

@@ -17,8 +17,10 @@ from . import (
     status_bar,
     support,
     torch_folder,
+    translations,
 )
 from .operators import ENGINE
+from .translations import CONTEXT
 
 if TYPE_CHECKING:
     from .explain import Glance
@@ -40,6 +42,7 @@ class _RenderPanel:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
     bl_context = "render"
+    bl_translation_context = CONTEXT
     COMPAT_ENGINES = {ENGINE}
 
     @classmethod
@@ -62,10 +65,7 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
         settings = scene.xrds
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.prop(settings, "use_time_budget")
-        row = layout.row()
-        row.active = settings.use_time_budget
-        row.prop(settings, "time_budget")
+        _switched(layout, settings, "use_time_budget", "time_budget")
         column = layout.column()
         column.active = not (settings.plain or settings.use_time_budget)
         column.prop(settings, "scale")
@@ -118,12 +118,10 @@ class XRDS_PT_advanced(_RenderPanel, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.xrds
         layout.use_property_split = True
+        layout.use_property_decorate = False
         layout.active = not settings.plain
         layout.prop(settings, "device")
-        layout.prop(settings, "use_exposure")
-        row = layout.row()
-        row.active = settings.use_exposure
-        row.prop(settings, "exposure")
+        _switched(layout, settings, "use_exposure", "exposure")
 
 
 class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
@@ -143,12 +141,23 @@ class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
                 _row(self.layout, name, f"{seconds[stage]:.1f} s")
 
 
+def _switched(layout: Any, settings: Any, switch: str, name: str) -> None:
+    """A switch and the value it brings into force in one row, as Cycles has them."""
+    heading = settings.bl_rna.properties[switch].name
+    column = layout.column(heading=heading, heading_ctxt=CONTEXT)
+    row = column.row(align=True)
+    row.prop(settings, switch, text="")
+    value = row.row()
+    value.active = getattr(settings, switch)
+    value.prop(settings, name, text="")
+
+
 def _row(layout: Any, name: str, value: str) -> None:
     """A name at the left, a value at the right, as Blender's own statistics."""
     split = layout.split(factor=0.4)
     side = split.row()
     side.alignment = "RIGHT"
-    side.label(text=name)
+    side.label(text=name, text_ctxt=CONTEXT)
     split.label(text=value, translate=False)
 
 
@@ -237,6 +246,7 @@ def _changes() -> tuple[Any, ...]:
 
 def register() -> None:
     """Register the panels and show Cycles' own under XRDS."""
+    translations.register()
     presets.register()
     for panel in CLASSES:
         bpy.utils.register_class(panel)
@@ -255,3 +265,4 @@ def unregister() -> None:
     for panel in reversed(CLASSES):
         bpy.utils.unregister_class(panel)
     presets.unregister()
+    translations.unregister()

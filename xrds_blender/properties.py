@@ -7,6 +7,8 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from .translations import CONTEXT
+
 _SCALES = [
     ("2", "2×", "A quarter of the pixels are path traced"),
     ("4", "4×", "A sixteenth of the pixels are path traced"),
@@ -38,30 +40,45 @@ class XRDSSettings(bpy.types.PropertyGroup):
     """How the engine XRDS renders a scene."""
 
     scale: EnumProperty(
-        name="Scale", items=_SCALES, description="Enlargement along each side"
+        name="Scale",
+        translation_context=CONTEXT,
+        items=_SCALES,
+        description="Enlargement along each side",
     )
     preset: EnumProperty(
-        name="Quality", items=_PRESETS, description="Which network enlarges"
+        name="Quality",
+        translation_context=CONTEXT,
+        items=_PRESETS,
+        description="Which network enlarges",
     )
     guides: EnumProperty(
-        name="Guides", items=_GUIDES, description="What is rendered at full size"
+        name="Guides",
+        translation_context=CONTEXT,
+        items=_GUIDES,
+        description="What is rendered at full size",
     )
     guide_samples: IntProperty(
         name="Guide Samples",
+        translation_context=CONTEXT,
         default=4,
         min=1,
         soft_max=64,
         description="Samples per pixel of albedo and normal",
     )
     device: EnumProperty(
-        name="Device", items=_DEVICES, description="Where the network runs"
+        name="Device",
+        translation_context=CONTEXT,
+        items=_DEVICES,
+        description="Where the network runs",
     )
     use_exposure: BoolProperty(
         name="Fixed Exposure",
+        translation_context=CONTEXT,
         description="Hold the network's exposure, for animations and border renders",
     )
     exposure: FloatProperty(
         name="Exposure",
+        translation_context=CONTEXT,
         default=1.0,
         min=1e-12,
         soft_min=1e-3,
@@ -70,15 +87,18 @@ class XRDSSettings(bpy.types.PropertyGroup):
     )
     plain: BoolProperty(
         name="Plain Cycles",
+        translation_context=CONTEXT,
         description="Render with Cycles alone, as if the engine were Cycles",
         update=_ask_for_passes,
     )
     use_time_budget: BoolProperty(
         name="Time Budget",
+        translation_context=CONTEXT,
         description="Let XRDS choose scale, samples, guides, network and denoiser",
     )
     time_budget: FloatProperty(
         name="Time Budget",
+        translation_context=CONTEXT,
         default=60.0,
         min=0.1,
         soft_max=3600.0,

@@ -7,26 +7,25 @@ of the file's display window.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import redirect_stdout
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import OpenEXR
 
+from . import exr_library
 from .atomic import replacing
 from .errors import PictureError
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from .exr_library import Part
+
     Array = NDArray[np.float32]
 
 _COMPONENTS = ("RGB", "XYZ", "rgb", "xyz")
 _COMPOSITED = "Composite."  # Blender's layer of what its compositor made
-_LARGEST_SIDE = 1 << 16  # pixels; more is a damaged header
 
 
 @dataclass(frozen=True)
@@ -71,6 +70,15 @@ class Guides:
     alpha: Array | None
 
 
+def read_channels(path: str | Path) -> dict[str, Array]:
+    """Read every channel of all parts: full name, as ``ViewLayer.Depth.Z``, to (H, W).
+
+    Raises PictureError if the file cannot be read.
+    """
+    file = _File(path)
+    return {name: file.plane(name) for name in file.channels}
+
+
 def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
     """Read the picture: the pass ``names.beauty``, or plain R, G, B.
 
@@ -106,12 +114,11 @@ def write_picture(path: str | Path, channels: Mapping[str, Array]) -> None:
     Raises PictureError, and leaves ``path`` as it was, if it cannot be written.
     """
     path = Path(path)
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     planes = {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}
     try:
         with replacing(path) as unfinished:
-            OpenEXR.File(header, planes).write(str(unfinished))
-    except (OSError, RuntimeError, ValueError) as error:
+            exr_library.write(unfinished, planes)
+    except (OSError, PictureError) as error:
         raise PictureError(f"cannot write {path}: {error}") from error
 
 
@@ -134,14 +141,14 @@ class _File:
             raise PictureError(
                 f"{self.path} has no pass {wanted!r}; it holds {self._contents()}"
             )
-        planes = [self._plane(name) for name in self._components(prefix)]
+        planes = [self.plane(name) for name in self._components(prefix)]
         return np.stack(planes, axis=-1)
 
     def alpha(self, wanted: str) -> Array | None:
         """Return alpha (H, W) of a pass, or the plain one, or None."""
         prefix = self._prefix(wanted)
         name = "A" if prefix is None else f"{prefix}.A"
-        return self._plane(name) if name in self.channels else None
+        return self.plane(name) if name in self.channels else None
 
     def _prefix(self, wanted: str) -> str | None:
         """Return the full name of the one pass that is called so, or None."""
@@ -173,9 +180,9 @@ class _File:
         passes = {name.rpartition(".")[0] or name for name in self.channels}
         return ", ".join(sorted(passes)) or "nothing"
 
-    def _plane(self, name: str) -> Array:
+    def plane(self, name: str) -> Array:
         part, pixels = self.channels[name]
-        (left, top), (right, bottom) = part["dataWindow"]
+        (left, top), (right, bottom) = part.data_window
         size = (bottom - top + 1, right - left + 1)
         if pixels.dtype.kind not in "fu" or pixels.shape != size:
             raise PictureError(
@@ -185,50 +192,29 @@ class _File:
         return _placed(pixels, part)
 
 
-def _read(path: str | Path) -> Iterator[tuple[str, Any, Any]]:
-    """Yield (full channel name, header, pixels) of all parts of a file."""
+def _read(path: str | Path) -> Iterator[tuple[str, Part, Any]]:
+    """Yield (full channel name, its part, pixels) of all parts of a file."""
     if not Path(path).is_file():
         raise PictureError(f"no file {path}")
-    try:
-        headers = OpenEXR.File(str(path), header_only=True).parts
-        for part in headers:
-            _check_windows(path, part.header)
-        # OpenEXR leaves out a part that it cannot read and says why on stdout
-        with redirect_stdout(StringIO()) as told:
-            parts = OpenEXR.File(str(path), separate_channels=True).parts
-    except (RuntimeError, ValueError, TypeError, MemoryError) as error:
-        raise PictureError(f"{path} is not a whole OpenEXR file ({error})") from error
-    if not parts or len(parts) != len(headers):
-        reason = told.getvalue().strip().rpartition(" - ")[2]
-        raise PictureError(f"{path} is not a whole OpenEXR file ({reason})")
+    parts = exr_library.read(path)
     for part in parts:
-        layer = part.header.get("name", "") if len(parts) > 1 else ""
-        for name, channel in part.channels.items():
+        layer = part.name if len(parts) > 1 else ""
+        for name, pixels in part.channels.items():
             # Blender repeats the part's name in its channels, others do not
             full = f"{layer}.{name}" if layer and "." not in name else name
-            yield full, part.header, channel.pixels
+            yield full, part, pixels
 
 
-def _check_windows(path: str | Path, header: Any) -> None:
-    for window in ("dataWindow", "displayWindow"):
-        least, most = header[window]
-        sides = [int(b) - int(a) + 1 for a, b in zip(least, most, strict=True)]
-        if not all(0 < side <= _LARGEST_SIDE for side in sides):
-            raise PictureError(
-                f"{path} claims a {window} of {sides[0]}x{sides[1]} pixels: damaged"
-            )
-
-
-def _placed(pixels: Any, header: Any) -> Array:
+def _placed(pixels: Any, part: Part) -> Array:
     """Return ``pixels`` of the data window in the display window, zero around."""
-    (left, top), (right, bottom) = header["displayWindow"]
-    x, y = header["dataWindow"][0]
+    (left, top), (right, bottom) = part.display_window
+    x, y = part.data_window[0]
     size = (bottom - top + 1, right - left + 1)
     if (x, y) == (left, top) and pixels.shape == size:
         return np.asarray(pixels, np.float32)
     picture = np.zeros(size, np.float32)
-    rows, source_rows = _shared(int(y) - int(top), pixels.shape[0], size[0])
-    columns, source_columns = _shared(int(x) - int(left), pixels.shape[1], size[1])
+    rows, source_rows = _shared(y - top, pixels.shape[0], size[0])
+    columns, source_columns = _shared(x - left, pixels.shape[1], size[1])
     picture[rows, columns] = pixels[source_rows, source_columns]
     return picture
 

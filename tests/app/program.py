@@ -110,7 +110,7 @@ class Window:
         script = self.program.seen(self.program.share / "inside.py")
         asks = self.program.seen(self.folder)
         self._start("blender", *place, *self._options, "--python", script, "--", asks)
-        self.ask("1", patience=400)
+        self.ask("1")
         self.settle()
         return self
 
@@ -141,7 +141,7 @@ class Window:
         """All that Blender printed so far."""
         return (self.program.share / "blender.log").read_text(errors="replace")
 
-    def ask(self, text: str, patience: float = 300.0) -> Any:
+    def ask(self, text: str, patience: float = 900.0) -> Any:
         """Run Python in Blender and return the value of its last expression."""
         number = next(self._asked)
         written = self.folder / f"{number:05}.part"
@@ -163,12 +163,10 @@ class Window:
 
     def settle(self) -> None:
         """Wait until Blender has drawn its window, which takes long in software."""
-        self.ask(
-            "bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)", patience=240
-        )
+        self.ask("bpy.ops.wm.redraw_timer(type='DRAW_WIN_SWAP', iterations=1)")
         time.sleep(1.0)
 
-    def wait(self, text: str, patience: float = 240.0) -> None:
+    def wait(self, text: str, patience: float = 600.0) -> None:
         """Wait until an expression in Blender is true."""
         end = time.monotonic() + patience
         while not self.ask(text):

@@ -137,6 +137,33 @@ def test_self_test_tells_device_seconds_versions(bare: Program) -> None:
     assert "PyTorch" in text
 
 
+def test_a_folder_named_in_the_preferences_gives_torch(bare: Program) -> None:
+    """A folder for this Python with the three packages, as pip --target leaves it."""
+    folder = bare.seen(bare.share / "torch")
+    code = f"""
+import bpy, os
+from importlib.util import find_spec
+os.makedirs({folder!r}, exist_ok=True)
+for name in ("torch", "safetensors", "OpenEXR"):
+    origin = find_spec(name).origin
+    source = os.path.dirname(origin) if "__init__" in origin else origin
+    target = os.path.join({folder!r}, os.path.basename(source))
+    if not os.path.lexists(target):
+        os.symlink(source, target)
+preferences = bpy.context.preferences.addons[{MODULE!r}].preferences
+preferences.torch = {folder!r}
+bpy.ops.xrds.self_test()
+import torch
+from xrds_blender.preferences import torch_status
+print("used=" + torch.__file__)
+print("status=%s" % torch_status())
+"""
+    text = python(bare, code)
+    assert "XRDS works: 64 x 64 pixels on cpu" in text
+    assert told(text, "used").startswith(folder)
+    assert folder in told(text, "status")
+
+
 def test_a_farm_can_ask_whether_the_engine_is_there(bare: Program) -> None:
     """The line of docs/pipeline.md ends with success here, and not without XRDS."""
     line = f"import bpy, sys; {ENGINE} or sys.exit(3)"
@@ -144,6 +171,43 @@ def test_a_farm_can_ask_whether_the_engine_is_there(bare: Program) -> None:
     assert bare.run(*words).returncode == 0
     without = ("blender", "-b", "--factory-startup", *words[2:])
     assert bare.run(*without).returncode == 3
+
+
+def test_the_command_renders_and_upscales_exr(bare: Program) -> None:
+    """Its EXR library is not the one that lies inside the program."""
+    openexr = pytest.importorskip("OpenEXR")
+    share = bare.share
+    code = f"""
+import bpy
+scene = bpy.context.scene
+scene.render.resolution_x = scene.render.resolution_y = 64
+scene.cycles.samples = 2
+scene.view_layers[0].cycles.denoising_store_passes = True
+bpy.ops.wm.save_as_mainfile(filepath={bare.seen(share / "scene.blend")!r})
+scene.render.engine, scene.render.filepath = 'CYCLES', {bare.seen(share / "guides")!r}
+if bpy.app.version >= (5, 0):
+    scene.render.image_settings.media_type = 'MULTI_LAYER_IMAGE'
+scene.render.image_settings.file_format = 'OPEN_EXR_MULTILAYER'
+scene.render.use_file_extension = True
+scene.cycles.use_denoising = False
+bpy.ops.render.render(write_still=True)
+scene.render.filepath = {bare.seen(share / "low")!r}
+scene.render.resolution_percentage = 50
+bpy.ops.render.render(write_still=True)
+"""
+    python(bare, code)
+    command = ("blender", "--command", "xrds")
+    seen = {name: bare.seen(share / name) for name in ("scene.blend", "whole.exr")}
+    done = bare.run(*command, "render", seen["scene.blend"], "-o", seen["whole.exr"])
+    assert done.returncode == 0, done.stdout
+    files = [bare.seen(share / name) for name in ("low.exr", "guides.exr", "up.exr")]
+    done = bare.run(*command, "upscale", *files[:2], "-o", files[2])
+    assert done.returncode == 0, done.stdout
+    for name in ("whole.exr", "up.exr"):
+        with openexr.File(str(share / name), separate_channels=True) as file:
+            red = file.channels()["R"].pixels
+        assert red.shape == (64, 64)
+        assert red.std() > 0.01
 
 
 def test_without_torch_it_loads_and_says_what_is_missing(bare: Program) -> None:

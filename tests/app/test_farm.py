@@ -1,4 +1,4 @@
-"""Open Job Description's own runner over the template, with a real Blender."""
+"""The farm examples with a real Blender: Open Job Description, Flamenco."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from flamenco import compile_job
 from program import Program
 
 pytestmark = pytest.mark.timeout(1800)
@@ -32,14 +33,21 @@ def installed(program: Program) -> Program:
     return program
 
 
+def scene_file(program: Program, engine: str) -> Path:
+    """The default scene, small, saved for an engine."""
+    path = program.share / f"{engine}.blend"
+    script = program.share / "make_scene.py"
+    script.write_text(SCENE.format(engine=engine, path=program.seen(path)))
+    done = program.run("blender", "-b", "--python", program.seen(script))
+    assert path.exists(), done.stdout
+    return path
+
+
 def run(program: Program, engine: str) -> subprocess.CompletedProcess[str]:
     """Submit two frames of the default scene with `openjd run`."""
     pytest.importorskip("openjd.cli")
     share = program.share
-    blend = share / f"{engine}.blend"
-    script = share / "make_scene.py"
-    script.write_text(SCENE.format(engine=engine, path=program.seen(blend)))
-    program.run("blender", "-b", "--python", program.seen(script))
+    blend = scene_file(program, engine)
     wrapper = share / "worker.sh"
     # The runner's own files, the check among them, lie in its session folder.
     sessions = share / "sessions"
@@ -87,3 +95,30 @@ def test_a_file_of_another_engine_fails_at_once(installed: Program) -> None:
     assert done.returncode != 0
     assert "the file is not set to XRDS" in done.stdout
     assert not (installed.share / "farm_CYCLES").exists()
+
+
+@pytest.mark.parametrize("engine", ["XRDS", "CYCLES"])
+def test_a_flamenco_worker_renders_its_chunk(installed: Program, engine: str) -> None:
+    """The command line that Flamenco's worker makes of the task, run as it runs it."""
+    folder = installed.share / f"flamenco_{engine}"
+    settings = {
+        "frames": "1-2",
+        "chunk_size": 2,
+        "blendfile": installed.seen(scene_file(installed, engine)),
+        "render_output_path": f"{installed.seen(folder)}/######",
+        "format": "OPEN_EXR",
+    }
+    (task,) = compile_job(settings)
+    (command,) = task["commands"]
+    told = command["parameters"]
+    given = {"{blender}": ["blender"], "{blenderArgs}": ["-b", "-y"]}
+    words = [*given[told["exe"]], *given[told["exeArgs"]], *told["argsBefore"]]
+    done = installed.run(*words, told["blendfile"], *told["args"], timeout=900)
+    if engine == "XRDS":
+        assert done.returncode == 0, done.stdout
+        names = sorted(path.name for path in folder.iterdir())
+        assert names == ["000001.exr", "000002.exr"]
+    else:
+        assert done.returncode == 3
+        assert "not set to XRDS" in done.stdout
+        assert not folder.exists()

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from program import Window
 
-pytestmark = pytest.mark.timeout(1800)
+pytestmark = pytest.mark.timeout(3600)
 
 RENDER_MENU = (129, 34)
 RENDER_IMAGE, RENDER_ANIMATION = (175, 56), (175, 78)
@@ -91,14 +91,32 @@ def test_installs_by_dropping_the_zip(window: Window) -> None:
 
 def test_first_picture_from_the_render_menu(window: Window) -> None:
     small_scene(window, 16)
+    window.ask(
+        """
+bpy.context.preferences.view.render_display_type = 'AREA'
+render = bpy.data.scenes[0].render
+render.resolution_x, render.resolution_y = 320, 180
+"""
+    )
     engine = window.ask("bpy.data.scenes[0].render.engine")
     window.click(*RENDER_MENU)
     window.settle()
     window.shot("04_render_menu")
     window.click(*RENDER_WITH_XRDS)
     assert finished(window) == ["render_init", "render_complete"]
+    window.settle()
+    window.move(400, 620)  # Blender draws what the pointer goes over
+    window.settle()
+    window.shot("05_picture")
+    window.ask(
+        """
+for area in window.screen.areas:
+    if area.type == 'IMAGE_EDITOR':
+        area.type = 'VIEW_3D'
+"""
+    )
     picture = result(window, "first.png")
-    assert picture.shape == (64, 96, 3)
+    assert picture.shape == (180, 320, 3)
     parts = [half for row in np.split(picture, 2) for half in np.split(row, 2, axis=1)]
     assert min(part.std() for part in parts) > 1.0  # not in one corner alone
     window.wait(f"bpy.data.scenes[0].render.engine == {engine!r}", 20)
@@ -123,7 +141,7 @@ def test_the_engine_is_chosen_in_the_render_properties(window: Window) -> None:
     menu = left + width * 2 // 3, top + 57
     window.click(*menu)
     window.settle()
-    window.shot("05_engines")
+    window.shot("06_engines")
     window.key("x")  # the only engine with this letter first
     window.settle()
     if window.ask("bpy.data.scenes[0].render.engine") != "XRDS":
@@ -131,7 +149,7 @@ def test_the_engine_is_chosen_in_the_render_properties(window: Window) -> None:
         window.settle()
     window.move(400, 620)
     window.settle()
-    window.shot("06_panel")
+    window.shot("07_panel")
     assert window.ask("bpy.data.scenes[0].render.engine") == "XRDS"
 
 
@@ -142,7 +160,7 @@ def test_render_image_under_the_engine(window: Window) -> None:
     assert finished(window) == ["render_init", "render_complete"]
     assert settings(window) == before
     window.settle()
-    window.shot("07_after_render")
+    window.shot("08_after_render")
 
 
 def test_escape_cancels_at_once(window: Window) -> None:
@@ -152,7 +170,7 @@ def test_escape_cancels_at_once(window: Window) -> None:
     press(window, RENDER_IMAGE)
     window.wait("bpy.app.is_job_running('RENDER')", 60)
     time.sleep(5.0)
-    window.shot("08_rendering")
+    window.shot("09_rendering")
     start = window.ask("__import__('time').time()")
     window.move(400, 620)
     window.key("Escape")
@@ -161,7 +179,7 @@ def test_escape_cancels_at_once(window: Window) -> None:
     print(f"cancelled after {took:.1f} s, the drawing of the window included")
     assert settings(window) == before
     window.settle()
-    window.shot("09_cancelled")
+    window.shot("10_cancelled")
 
 
 def test_an_animation_of_three_frames(window: Window) -> None:
@@ -233,7 +251,7 @@ view.shading.type = {shading!r}
     )
     time.sleep(15.0)
     window.settle()
-    path = window.shot(f"10_viewport_{shading.lower()}")
+    path = window.shot(f"11_viewport_{shading.lower()}")
     window.ask(
         """
 view = next(a for a in window.screen.areas if a.type == 'VIEW_3D').spaces.active
@@ -244,6 +262,61 @@ view.shading.type = 'SOLID'
     seen = np.asarray(image.open(path).convert("L"))[150:650, 100:900]
     assert seen.std() > 4.0
     assert "Traceback" not in window.log
+
+
+@pytest.mark.parametrize("language", ["en_US", "de_DE", "ja_JP"])
+def test_the_interface_in_languages(window: Window, language: str) -> None:
+    """All panels and the preferences, in the place of the 3D view; to be looked at."""
+    if not window.ask(f"{language!r} in bpy.app.translations.locales"):
+        pytest.skip("this program was installed without translations")
+    try:
+        window.ask(OPEN_PANELS.format(language=language))
+        window.settle()  # a new editor learns its tabs when it is drawn
+        window.ask(
+            "area = max(window.screen.areas, key=lambda a: a.width * a.height)\n"
+            "area.spaces.active.context = 'RENDER'"
+        )
+        samples = window.ask("bpy.app.translations.pgettext_iface('Samples')")
+        assert (samples == "Samples") == (language == "en_US")
+        window.settle()
+        window.shot(f"12_panels_{language}")
+        window.ask(PREFERENCES)
+        window.settle()
+        window.shot(f"13_preferences_{language}")
+    finally:
+        window.ask(AS_BEFORE)
+        window.settle()
+    assert "Traceback" not in window.log
+
+
+OPEN_PANELS = """
+view = bpy.context.preferences.view
+view.language = {language!r}
+view.use_translate_interface = view.use_translate_tooltips = True
+from xrds_blender import panels
+for panel in reversed(panels.CLASSES):  # a new editor shows them open
+    bpy.utils.unregister_class(panel)
+    panel.bl_options = set()
+for panel in panels.CLASSES:
+    bpy.utils.register_class(panel)
+area = max(window.screen.areas, key=lambda a: a.width * a.height)
+area.type = 'PROPERTIES'
+bpy.data.scenes[0].render.engine = 'XRDS'
+"""
+PREFERENCES = """
+area = max(window.screen.areas, key=lambda a: a.width * a.height)
+area.type = 'PREFERENCES'
+bpy.context.preferences.active_section = 'ADDONS'
+bpy.context.window_manager.addon_search = 'XRDS'
+bpy.ops.preferences.addon_expand(module='bl_ext.user_default.xrds')
+"""
+AS_BEFORE = """
+area = max(window.screen.areas, key=lambda a: a.width * a.height)
+area.type = 'VIEW_3D'
+view = bpy.context.preferences.view
+view.use_translate_interface = view.use_translate_tooltips = False
+view.language = 'en_US'
+"""
 
 
 def test_nothing_went_wrong_on_the_way(window: Window) -> None:

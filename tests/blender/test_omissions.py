@@ -73,6 +73,8 @@ def test_the_plan_leaves_guides_as_they_are(name: str) -> None:
 )
 def test_the_traps_are_traps(name: str, omission: str) -> None:
     """What the plan keeps would be missed, and by more than noise."""
+    if bpy.app.version >= (5, 1) and name in {"gloss", "lacquer"}:
+        pytest.skip("guides of this Blender do not follow gloss and coats")
     scene = small(name)
 
     def job(passes: Any) -> Any:

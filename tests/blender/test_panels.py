@@ -16,6 +16,7 @@ from xrds_blender import (
     preferences,
     status_bar,
     torch_folder,
+    translations,
 )
 from xrds_blender.job import RenderJob
 
@@ -51,7 +52,7 @@ def test_panel_draws_every_property_it_names() -> None:
         def __init__(self) -> None:
             self.drawn: list[str] = []
 
-        def prop(self, owner: object, name: str) -> None:
+        def prop(self, owner: object, name: str, **_: object) -> None:
             assert name in owner.bl_rna.properties
             self.drawn.append(name)
 
@@ -96,6 +97,7 @@ def test_summary_tells_the_low_size(scale: str, low: str) -> None:
 
 def test_panel_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bpy.context.scene
+    monkeypatch.setattr(panels.cycles_session, "has_denoiser", lambda: True)
     assert panels.remarks(scene) == []
     monkeypatch.setattr(torch_folder, "is_there", lambda: False)
     monkeypatch.setattr(panels.cycles_session, "has_denoiser", lambda: False)
@@ -205,3 +207,23 @@ def test_status_bar_tells_the_stage() -> None:
     status_bar.end()
     status_bar.draw(Bar, None)
     assert told == ["XRDS 2/3: Guides"]
+
+
+def test_panels_use_their_own_words_for_guides() -> None:
+    """Blender's German calls guides lines on a ruler, and fast an insertion."""
+    if "de_DE" not in bpy.app.translations.locales:
+        pytest.skip("this Blender was built without translations")
+    translate = bpy.app.translations.pgettext_iface
+    view = bpy.context.preferences.view
+    try:
+        view.language, view.use_translate_interface = "de_DE", True
+        assert translate("Guides", translations.CONTEXT) == "Hilfsbilder"
+    finally:
+        view.language = "en_US"
+    assert translate("Guides", translations.CONTEXT) == "Guides"
+
+
+def test_settings_are_never_translated_as_blenders_own_words() -> None:
+    settings = bpy.context.scene.xrds.bl_rna.properties
+    for name in set(settings.keys()) - {"rna_type", "name"}:
+        assert settings[name].translation_context == translations.CONTEXT

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,8 +9,15 @@ import OpenEXR
 import pytest
 from numpy.typing import NDArray
 
+from xrds_core import exr_library
 from xrds_core.errors import PictureError
-from xrds_core.exr import Names, read_beauty, read_guides, write_picture
+from xrds_core.exr import (
+    Names,
+    read_beauty,
+    read_channels,
+    read_guides,
+    write_picture,
+)
 
 Array = NDArray[np.float32]
 LAYOUTS = ("flat", "layered", "parts", "named parts")
@@ -62,6 +70,52 @@ def write_passes(path: Path, passes: Any, layout: str) -> None:
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
     return tmp_path / "render.exr"
+
+
+@pytest.fixture
+def apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a program that has an OpenEXR of its own."""
+    monkeypatch.setattr(exr_library, "_is_shadowed", lambda: True)
+
+
+# --- in a process of its own ----------------------------------------------------------
+
+
+@pytest.mark.usefixtures("apart")
+def test_a_process_of_its_own_reads_what_this_one_would(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_passes(path, PASSES, "parts")
+    found = exr_library.read(path)
+    monkeypatch.setattr(exr_library, "_is_shadowed", lambda: False)
+    for part, expected in zip(found, exr_library.read(path), strict=True):
+        assert replace(part, channels={}) == replace(expected, channels={})
+        assert part.channels.keys() == expected.channels.keys()
+        for name, pixels in part.channels.items():
+            np.testing.assert_array_equal(pixels, expected.channels[name])
+            assert pixels.dtype == expected.channels[name].dtype
+
+
+@pytest.mark.usefixtures("apart")
+def test_a_process_of_its_own_writes(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    channels = planes(8, "RGBA")
+    write_picture(path, channels)
+    monkeypatch.setattr(exr_library, "_is_shadowed", lambda: False)
+    found = read_channels(path)
+    assert found.keys() == channels.keys()
+    for name, plane in channels.items():
+        np.testing.assert_array_equal(found[name], plane)
+
+
+@pytest.mark.usefixtures("apart")
+def test_what_goes_wrong_apart_is_told(path: Path) -> None:
+    path.write_bytes(b"no picture")
+    with pytest.raises(PictureError, match="is not a whole OpenEXR file"):
+        read_beauty(path)
+    with pytest.raises(PictureError, match="cannot write"):
+        write_picture(path / "below_a_file.exr", planes(1))
 
 
 # --- what Cycles writes ---------------------------------------------------------------

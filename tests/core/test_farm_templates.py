@@ -2,40 +2,17 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
+from flamenco import compile_job
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "pipeline"
 TEMPLATE = EXAMPLES / "xrds_render.template.yaml"
 OPENJD = str(Path(sys.executable).with_name("openjd"))
-# What Flamenco's Manager gives a job type: chunks of frames, tasks, commands.
-FLAMENCO = """
-const author = {
-    Task: (name, type) => ({ name, type, commands: [],
-        addCommand(command) { this.commands.push(command); } }),
-    Command: (name, parameters) => ({ name, parameters }),
-};
-function frameChunker(frames, size) {
-    const all = [];
-    for (const part of frames.split(",")) {
-        const [first, last = first] = part.trim().split("-").map(Number);
-        for (let frame = first; frame <= last; frame++) all.push(frame);
-    }
-    const chunks = [];
-    for (let i = 0; i < all.length; i += size) {
-        const chunk = all.slice(i, i + size);
-        const range = chunk.length > 1 && chunk.at(-1) - chunk[0] === chunk.length - 1;
-        chunks.push(range ? `${chunk[0]}-${chunk.at(-1)}` : chunk.join(","));
-    }
-    return chunks;
-}
-"""
 
 
 def test_open_job_description_accepts_the_template() -> None:
@@ -49,31 +26,15 @@ def test_open_job_description_accepts_the_template() -> None:
 @pytest.fixture(scope="module")
 def tasks() -> list[dict[str, Any]]:
     """The tasks that the Flamenco job type makes of seven frames in chunks of three."""
-    node = shutil.which("node")
-    if node is None:
-        pytest.skip("no node to run the job type with")
-    settings = {
-        "frames": "1-3, 7-10",
-        "chunk_size": 3,
-        "blendfile": "/shots/a.blend",
-        "render_output_path": "/out/######",
-        "format": "OPEN_EXR",
-    }
-    source = (EXAMPLES / "xrds_render.flamenco.js").read_text()
-    asks = f"""
-const tasks = [];
-compileJob({{ settings: {json.dumps(settings)}, addTask: (task) => tasks.push(task) }});
-console.log(JSON.stringify({{ tasks, type: JOB_TYPE }}));
-"""
-    script = FLAMENCO + source + asks
-    done = subprocess.run(
-        [node, "-e", script], capture_output=True, text=True, check=False
+    return compile_job(
+        {
+            "frames": "1-3, 7-10",
+            "chunk_size": 3,
+            "blendfile": "/shots/a.blend",
+            "render_output_path": "/out/######",
+            "format": "OPEN_EXR",
+        }
     )
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    keys = {setting["key"] for setting in told["type"]["settings"]}
-    assert settings.keys() <= keys
-    return told["tasks"]  # type: ignore[no-any-return]
 
 
 def test_flamenco_renders_every_chunk(tasks: list[dict[str, Any]]) -> None:
