@@ -218,10 +218,15 @@ def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
         ("Small Render", f"{width} × {height}, {scene.cycles.samples} spp"),
         ("Guides", f"{facts.width} × {facts.height}, {chosen.guide_samples} spp"),
         ("Rays per Pixel", f"{light:.3g} + {guide:.3g}"),
-        ("Memory", f"≤ {bytes_taken / 1e9:.1f} GB"),
+        ("Memory", f"≤ {_amount(bytes_taken)}"),
     ]
     decisions = [d for d in chosen.decisions if d.decision != "low frame"]
     return told + [(d.decision.capitalize(), d.value) for d in decisions]
+
+
+def _amount(size: float) -> str:
+    """Bytes as a person reads them."""
+    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{max(size / 1e6, 1):.0f} MB"
 
 
 CLASSES = (

@@ -301,7 +301,9 @@ for panel in panels.CLASSES:
     bpy.utils.register_class(panel)
 area = max(window.screen.areas, key=lambda a: a.width * a.height)
 area.type = 'PROPERTIES'
-bpy.data.scenes[0].render.engine = 'XRDS'
+scene = bpy.data.scenes[0]
+scene.render.engine, scene.cycles.samples = 'XRDS', 16
+scene.render.resolution_x, scene.render.resolution_y = 1920, 1080
 """
 PREFERENCES = """
 area = max(window.screen.areas, key=lambda a: a.width * a.height)
