@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 GENERATION = 2  # counts up whenever scenes or settings change
 SAMPLES, GUIDE_SAMPLES, REFERENCE_SAMPLES = 16, 4, 64
-SCALES = (2, 4)
+SCALES = (2, 4, 8)
 RISING = (1, 4, 16, 64)  # samples over which the error must fall
 _SEEDS = {"low": 11, "guides": 22, "plain": 33, "reference": 44}
 
