@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 from xrds_blender import budget
-from xrds_blender.bench import growth, machine, pictures, tasks
+from xrds_blender.bench import growth, machine, measure, pictures, tasks
 from xrds_blender.bench.bench import bench
+from xrds_blender.bench.crops import SHOWN
 from xrds_blender.bench.stages import PLAIN_FRAME, STAGES
 from xrds_blender.bench.sweep import Sweep
 from xrds_core.errors import UsageError
@@ -71,6 +72,8 @@ def world(tmp_path: Path, still_life: Callable[..., Any]) -> World:
 def test_report_is_whole_and_a_second_run_measures_nothing(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # on a busy machine one stage may take many times what it takes on an idle one
+    monkeypatch.setattr(measure, "MOST_OVER_BUDGET", 1e3)
     told = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
     out = world.folder / "out"
     assert told["failures"] == {}
@@ -81,7 +84,7 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
     with (out / "results.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
     assert [row["label"] for row in rows] == [p["label"] for p in told["points"]]
-    _check_page((out / "report.html").read_text("utf-8"))
+    _check_page((out / "report.html").read_text("utf-8"), told)
 
     def refuse(*_: Any) -> None:
         raise AssertionError("measured again")
@@ -127,7 +130,7 @@ def _check_picker(told: dict[str, Any]) -> None:
     assert told["picker"]["runs"] == 1
 
 
-def _check_page(page: str) -> None:
+def _check_page(page: str, told: dict[str, Any]) -> None:
     assert page.count("<svg") >= 3  # over all, of the scene, growth
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing beside it
     crops = re.search(r'class="crops">(.*?)</script>', page, re.DOTALL)
@@ -136,7 +139,8 @@ def _check_page(page: str) -> None:
     assert data["reference"].startswith("data:image/webp")
     labels = {c["label"] for b in data["budgets"] for c in b["columns"]}
     assert labels == set(data["pictures"])
-    assert any(label.startswith("XRDS") for label in labels)
+    best = told["budgets"][0]["best"]
+    assert labels == {best[name]["label"] for name in SHOWN if best.get(name)}
 
 
 @pytest.mark.timeout(300)
