@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import secrets
 import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -35,6 +36,12 @@ def replacing(path: Path) -> Iterator[Path]:
         raise
     finally:
         _unfinished.discard(unfinished)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write a value as a JSON file for people to read too, whole or not at all."""
+    with replacing(path) as part:
+        part.write_text(json.dumps(value, indent=1), "utf-8")
 
 
 def abandon() -> None:

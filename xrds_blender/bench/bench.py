@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.atomic import replacing, write_json
 from xrds_core.errors import UsageError
 
 from .. import console
@@ -250,8 +250,7 @@ def _report(parts: Sequence[SceneBench], chosen: Settings) -> Report:
 
 def write(out: Path, told: Report) -> None:
     """results.json and results.csv."""
-    with replacing(out / "results.json") as part:
-        part.write_text(json.dumps(told, indent=1), "utf-8")
+    write_json(out / "results.json", told)
     rows = [_flat(point) for point in told["points"]]
     columns = list(dict.fromkeys(key for row in rows for key in row))
     with (

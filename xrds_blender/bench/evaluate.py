@@ -5,20 +5,19 @@ Error on windows of real scenes against their references, seconds of whole frame
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from xrds_core import exr, metrics
-from xrds_core.atomic import replacing
+from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
 
 from . import table
 from .contenders import Contenders, Settings
 from .frames import FrameSeconds
-from .inputs import Folder
+from .inputs import Folder, silent
 from .sheets import Sheet
 from .timing import ROUNDS
 from .windows import find_shots
@@ -62,7 +61,7 @@ def evaluate(
     Raises UsageError for missing files and unknown names.
     """
     chosen = Settings(tuple(scales), tuple(presets), tuple(guides), **settings)
-    contenders = Contenders(chosen, Folder(cache), weights, progress or _silent)
+    contenders = Contenders(chosen, Folder(cache), weights, progress or silent)
     records: list[dict[str, Any]] = []
     shots = find_shots(scenes, windows, references)
     absent = set(timing_scenes or ()) - {shot.name for shot in shots}
@@ -85,7 +84,8 @@ def evaluate(
     }
     print(table.text(report), file=sys.stderr)
     if out is not None:
-        _write(out / "results.json", report)
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(out / "results.json", report)
     return report
 
 
@@ -133,13 +133,3 @@ def _settings(chosen: Settings, timing: bool) -> dict[str, Any]:
         "blender": bpy.app.version_string,
         "cpu_count": os.cpu_count(),
     }
-
-
-def _write(path: Path, report: dict[str, Any]) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as part:
-        part.write_text(json.dumps(report, indent=1), "utf-8")
-
-
-def _silent(line: str) -> None:
-    pass

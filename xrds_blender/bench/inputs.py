@@ -32,6 +32,10 @@ OFF = "OFF"  # in place of a denoiser's mode: the picture as rendered
 SEEDS = {"low": 101, "guides": 202, "full": 303, "plain": 404}
 
 
+def silent(line: str) -> None:
+    """Tell nobody: in the place of a progress line's listener."""
+
+
 @dataclass(frozen=True)
 class Request:
     """One rendered input.

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.atomic import write_json
 
 from .. import budget
 from ..job import RenderJob
@@ -228,9 +228,7 @@ class SceneBench:
         del picture
         self._render([config], meter)
         told |= self.pictures.errors(config)
-        picks = self.picks | {f"{multiple:g}": told}
-        with replacing(self._picks_file) as part:
-            part.write_text(json.dumps(picks, indent=1), "utf-8")
+        write_json(self._picks_file, self.picks | {f"{multiple:g}": told})
 
     # --- results ----------------------------------------------------------------------
 

@@ -139,16 +139,19 @@ class Pictures:
             padded = front_end.pad_guide(albedo, radiance, config.scale)
             picture = front_end.demodulated_base(radiance, padded, config.scale)
             return picture[:height, :width]
-        extra, before = guide[0].get("radiance"), beauty.get("noisy")
+        light = {
+            name: None if x is None else front_end.clean_radiance(x)[0]
+            for name, x in (
+                ("noisy", beauty.get("noisy")),
+                ("guide_radiance", guide[0].get("radiance")),
+            )
+        }
         network = self.networks[config.preset, config.scale, config.guides]
         picture = network(
             radiance,
             albedo,
             front_end.clean_normal(guide[0]["normal"])[0],
-            noisy=before if before is None else front_end.clean_radiance(before)[0],
-            guide_radiance=extra
-            if extra is None
-            else front_end.clean_radiance(extra)[0],
+            **light,
         )
         return np.asarray(picture.radiance[..., :3])
 

@@ -18,10 +18,10 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.atomic import write_json
 
 from ..budget import DEFAULT_DENOISER
-from .inputs import Folder, rendered
+from .inputs import Folder, rendered, silent
 from .pictures import Networks, Pictures
 from .sweep import Config
 from .windows import find_shots
@@ -70,14 +70,13 @@ def samples_table(
     with folder as directory:
         for shot in shots:
             kept = Folder(Path(directory))
-            records += _measured(shot, kept, networks, configs, progress or _silent)
+            records += _measured(shot, kept, networks, configs, progress or silent)
     report = {"scale": scale, "preset": preset, "records": records}
     report |= {"summary": summary(records)}
     print(text(report), file=sys.stderr)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        with replacing(out / "samples.json") as part:
-            part.write_text(json.dumps(report, indent=1), "utf-8")
+        write_json(out / "samples.json", report)
     return report
 
 
@@ -232,7 +231,3 @@ def _growth(name: str, by_scene: dict[str, list[float]]) -> Iterator[str]:
 
 def _row(title: str, cells: list[str]) -> str:
     return (f"{title:<14}" + "".join(f"{cell:>14}" for cell in cells)).rstrip()
-
-
-def _silent(line: str) -> None:
-    pass

@@ -16,7 +16,7 @@ import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.atomic import write_json
 
 from . import machine
 from .inputs import OFF, open_scene
@@ -68,8 +68,7 @@ class StageTimes:
         """Keep a run."""
         self.runs.setdefault(name, []).append(run)
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(self.path) as part:
-            part.write_text(json.dumps(self.runs, indent=1), "utf-8")
+        write_json(self.path, self.runs)
 
     def count(self, name: str) -> int:
         """How often it has run."""

@@ -13,7 +13,7 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from xrds_core.atomic import replacing
+from xrds_core.atomic import write_json
 
 from .inputs import GENERATION
 
@@ -88,8 +88,7 @@ class FrameTimes:
         if self.path is None:
             return
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        with replacing(self.path) as part:
-            part.write_text(json.dumps(self.runs, indent=1), "utf-8")
+        write_json(self.path, self.runs)
 
 
 def _file_name(shot: Shot) -> str:

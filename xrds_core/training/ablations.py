@@ -8,14 +8,13 @@ The variants are of the paper's kind, without the base of the small presets, but
 
 from __future__ import annotations
 
-import json
 import re
 import statistics
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ..atomic import replacing
+from ..atomic import write_json
 from ..errors import UsageError
 from ..info import PAPER_OUTPUT, count
 from .config import read_config
@@ -95,8 +94,7 @@ def ablate(
     common = read_config(config, changes)
     told = {"table": table, "scale": common.scale, "steps": common.steps}
     told |= {"seeds": seeds, "rows": rows}
-    with replacing(out / f"{table}.json") as part:
-        part.write_text(json.dumps(told, indent=1))
+    write_json(out / f"{table}.json", told)
     return told
 
 

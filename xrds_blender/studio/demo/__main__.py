@@ -6,7 +6,6 @@ Writes pictures, guides, comparison.png and results.json into a folder.
 from __future__ import annotations
 
 import argparse
-import json
 import sys
 import time
 from collections.abc import Sequence
@@ -16,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from xrds_core import exr
-from xrds_core.atomic import replacing
+from xrds_core.atomic import write_json
 
 from ... import console, ensure_registered
 from ...picture_file import save
@@ -110,8 +109,7 @@ def _write_results(
         "methods": results,
         "reference": {"label": reference.label, "seconds": reference.seconds},
     }
-    with replacing(path) as unfinished:
-        unfinished.write_text(json.dumps(told, indent=1), "utf-8")
+    write_json(path, told)
 
 
 def _parser() -> argparse.ArgumentParser:
