@@ -6,7 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
@@ -87,25 +88,29 @@ def test_cancelling_a_stage_writes_nothing(
 # --- files ----------------------------------------------------------------------------
 
 
-@pytest.fixture
-def full_disk() -> Iterator[Callable[[int], None]]:
-    """Let files take so many bytes and no more: a write then fails half-way."""
+@contextmanager
+def full_disk(size: int) -> Iterator[None]:
+    """Let files take so many bytes and no more: a write then fails half-way.
+
+    Not a fixture: pytest's own log would meet the limit before a fixture ends.
+    """
     resource = pytest.importorskip("resource")
-    _, most = resource.getrlimit(resource.RLIMIT_FSIZE)
-    yield lambda size: resource.setrlimit(resource.RLIMIT_FSIZE, (size, most))
-    resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.mark.parametrize("name", ["frame.exr", "frame.png"])
-def test_a_full_disk_leaves_the_old_frame(
-    life: Any, tmp_path: Path, full_disk: Callable[[int], None], name: str
-) -> None:
+def test_a_full_disk_leaves_the_old_frame(life: Any, tmp_path: Path, name: str) -> None:
     target = tmp_path / name
     target.write_bytes(b"old")
     radiance = np.random.default_rng(0).random((33, 45, 3), np.float32)
     for size in (0, 100, 2000):
-        full_disk(size)
-        with pytest.raises(PictureError, match=f"cannot write .*{name}"):
+        told = pytest.raises(PictureError, match=f"cannot write .*{name}")
+        with told, full_disk(size):
             picture_file.save(target, radiance, radiance[..., 0], life)
         assert target.read_bytes() == b"old"
         assert names(tmp_path) == [name]
