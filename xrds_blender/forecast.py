@@ -9,17 +9,17 @@ from __future__ import annotations
 # runs, with what the allocator loses; the tests compare. Kept here because measuring
 # needs torch, which a panel must not load.
 NETWORK_BYTES = {
-    ("fast", 2): 663,
-    ("fast", 4): 637,
-    ("fast", 8): 619,
-    ("balanced", 2): 671,
-    ("balanced", 4): 645,
-    ("balanced", 8): 621,
-    ("paper", 2): 1435,
+    ("fast", 2): 268,
+    ("fast", 4): 238,
+    ("fast", 8): 162,
+    ("balanced", 2): 356,
+    ("balanced", 4): 326,
+    ("balanced", 8): 185,
+    ("paper", 2): 1438,
     ("paper", 4): 553,
     ("paper", 8): 540,
 }
-OVERHEAD, TILE_BYTES = 2.6, 100.0
+OVERHEAD, TILE_BYTES = 2.0, 100.0
 DEFAULT_LIMIT = 4 << 30
 # Full-size float32 channels beside the network: picture, albedo, normal, alphas, the
 # result and its copy.

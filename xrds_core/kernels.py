@@ -27,6 +27,8 @@ GAIN_LIMIT = 4.0
 MATCHING_STEPS, MATCHING_LIMIT, MATCHING_EPSILON = 2, 3.0, 0.02
 # Logit of how far a step goes, untrained.
 TRUST = 3.0
+# Cells along the sides of what is enlarged at once.
+AREA_SIDE = 48
 
 
 class Source(NamedTuple):
@@ -69,12 +71,14 @@ def find_sources(
 
 
 def neighbours(low: Tensor) -> list[Tensor]:
-    """The 3x3 neighbours of every pixel, edge clamped: nine of (B, C, 1, h, w)."""
-    h, w = low.shape[-2:]
-    padded = F.pad(low, (1, 1, 1, 1), mode="replicate")
-    return [
-        padded[:, :, None, y : y + h, x : x + w] for y in range(3) for x in range(3)
-    ]
+    """The 3x3 neighbours of every pixel: nine (B, C, 1, h, w) of (B, C, h+2, w+2)."""
+    h, w = (size - 2 for size in low.shape[-2:])
+    return [low[:, :, None, y : y + h, x : x + w] for y in range(3) for x in range(3)]
+
+
+def with_rim(x: Tensor) -> Tensor:
+    """Repeat the edge once: (B, C, h, w) to (B, C, h+2, w+2)."""
+    return F.pad(x, (1, 1, 1, 1), mode="replicate")
 
 
 def bilinear_logits(scale: int) -> Tensor:
@@ -86,6 +90,50 @@ def bilinear_logits(scale: int) -> Tensor:
     axis = torch.stack((-offset, 1 - offset.abs(), offset)).clamp(min=0)  # (3, s)
     weights = axis[:, None, :, None] * axis[None, :, None, :]  # (3, 3, s, s)
     return (weights + 0.01).log().view(9, scale * scale)
+
+
+class Area(NamedTuple):
+    """A rectangle of cells: rows from `top` to `bottom`, columns `left` to `right`."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+    def grown(self, margin: int, height: int, width: int) -> Area:
+        """With a margin of cells, as far as a grid of that size has them."""
+        return Area(
+            max(self.top - margin, 0),
+            min(self.bottom + margin, height),
+            max(self.left - margin, 0),
+            min(self.right + margin, width),
+        )
+
+    def of(
+        self, x: Tensor, unit: int, within: Area | None = None, rim: int = 0
+    ) -> Tensor:
+        """What lies in it of `x`, which has `unit` squared pixels for each cell.
+
+        `x` shows the whole grid or the area `within`, and around it a rim, which the
+        result has as well.
+        """
+        top, left = (0, 0) if within is None else (within.top, within.left)
+        return x[
+            ...,
+            (self.top - top) * unit : (self.bottom - top) * unit + 2 * rim,
+            (self.left - left) * unit : (self.right - left) * unit + 2 * rim,
+        ]
+
+
+def areas(height: int, width: int, side: int) -> list[list[Area]]:
+    """Rows of rectangles, of at most `side` squared cells, that cover a grid."""
+    return [
+        [
+            Area(top, min(top + side, height), left, min(left + side, width))
+            for left in range(0, width, side)
+        ]
+        for top in range(0, height, side)
+    ]
 
 
 class KernelTail(nn.Module):
@@ -100,6 +148,9 @@ class KernelTail(nn.Module):
     radiance. Kernels start from bilinear weights and fall with the distance between
     guides, as a joint bilateral filter's, as fast as the network asks; untrained, the
     result is all but bicubic interpolation of the last source.
+
+    The kernels of a whole frame are dozens of planes of its size. They are made, used
+    and forgotten area by area, small enough for the processor's caches.
     """
 
     def __init__(
@@ -113,6 +164,7 @@ class KernelTail(nn.Module):
     ) -> None:
         super().__init__()
         self.scale, self.cell = scale, cell
+        self.area_side = AREA_SIDE
         # unbounded features make every softmax a hard choice, which no longer learns
         self.norm = nn.LayerNorm(channels)
         self.expand = nn.Conv2d(channels, width * cell**2, 3, padding=1)
@@ -130,32 +182,88 @@ class KernelTail(nn.Module):
 
     def forward(self, features: Tensor, guides: Tensor, sources: Sources) -> Tensor:
         cells = self.norm(features.permute(0, 2, 3, 1)).permute(0, 3, 1, 2)
-        x = F.pixel_shuffle(self.expand(cells), self.cell)
-        plain, *others = [
-            torch.log1p(self.enlarge(source.low, "bilinear") * source.modulator)
-            for source in sources
-        ]
-        differences = [other - plain for other in others]
-        x = F.relu(self.mix(torch.cat((x, guides, *differences), dim=1)))
+        means = with_rim(F.avg_pool2d(guides[:, :6].float(), self.scale))
+        rims = [with_rim(source.low) for source in sources]
+        pictures, trusts = [], []
+        for row in areas(cells.shape[-2], cells.shape[-1], self.area_side):
+            found = []
+            for area in row:
+                predicted, sharp = self.look(area, cells, guides, sources)
+                kernels = self.kernels(area, predicted, guides, means)
+                picture = self.combine(area, kernels, sharp, rims, sources)
+                gain = torch.exp(math.log(GAIN_LIMIT) * torch.tanh(predicted[:, -2:-1]))
+                found.append((self.unfold(picture * gain), predicted[:, -1:].mean(2)))
+            pictures.append(torch.cat([picture for picture, _ in found], dim=3))
+            trusts.append(torch.cat([trust for _, trust in found], dim=3))
+        picture, trust = torch.cat(pictures, dim=2), torch.cat(trusts, dim=2)
+        return torch.log1p(self.match(picture, trust, sources[0].low))
+
+    def look(
+        self, area: Area, cells: Tensor, guides: Tensor, sources: Sources
+    ) -> tuple[Tensor, list[Tensor]]:
+        """What is predicted of every pixel of an area, and each source's sharpening.
+
+        (B, 9 * sources + 4, s*s, h, w) and, of every source, (B, 3, s*s, h, w). Two
+        cells around the area are looked at: what is found in one of them, next to the
+        area, is right and seen by the last convolution.
+        """
+        wide, near = (area.grown(margin, *cells.shape[-2:]) for margin in (2, 1))
+        x = F.pixel_shuffle(self.expand(wide.of(cells, 1)), self.cell)
+        logs, sharp = [], []
+        for source in sources:
+            low = wide.of(source.low, self.cell // self.scale)
+            smooth = self.enlarge(low, "bilinear")
+            most = SHARPENING_LIMIT * smooth
+            added = (self.enlarge(low, "bicubic") - smooth).clamp(-most, most)
+            sharp.append(self.fold(area.of(added, self.cell, wide)))
+            smooth = near.of(smooth, self.cell, wide) * near.of(
+                source.modulator, self.cell
+            )
+            logs.append(torch.log1p(smooth))
+        differences = [other - logs[0] for other in logs[1:]]
+        known = (near.of(x, self.cell, wide), near.of(guides, self.cell), *differences)
+        x = area.of(F.relu(self.mix(torch.cat(known, dim=1))), self.cell, near)
+        # a 1x1 convolution does not care where pixels lie: fewer planes to fold before
+        x = self.fold(x)
+        predicted = self.predict(x.flatten(2, 3)).unflatten(2, (x.shape[2], -1))
         # sums over radiance need float32, whatever the precision of the layers above
-        x = self.predict(x).float()
-        picture = self.combine(x[:, :-1], guides.float(), sources)
-        return torch.log1p(self.match(picture, x[:, -1:], sources[0].low))
+        return predicted.float(), sharp
 
-    def enlarge(self, low: Tensor, mode: str) -> Tensor:
-        return F.interpolate(low, scale_factor=self.scale, mode=mode)
+    def kernels(
+        self, area: Area, predicted: Tensor, guides: Tensor, means: Tensor
+    ) -> Tensor:
+        """Softmax over the neighbours of all sources: (B, sources, 9, s*s, h, w)."""
+        pixels = self.fold(area.of(guides[:, :6], self.cell)).float()
+        sharpness = SHARPNESS_UNIT * predicted[:, -4:-2]  # (B, 2, s*s, h, w)
+        fall = []
+        for mean in neighbours(area.of(means, self.cell // self.scale, rim=1)):
+            apart = (pixels - mean).square()
+            x, y, z = (apart[:, channel::3] for channel in range(3))
+            albedo, normal = ((x + y + z) * sharpness).split(1, dim=1)
+            fall.append(albedo + normal)
+        logits = predicted[:, :-4].unflatten(1, (-1, 9)) + self.prior[..., None, None]
+        logits = logits - torch.cat(fall, dim=1)[:, None]
+        return logits.flatten(1, 2).softmax(dim=1).unflatten(1, (-1, 9))
 
-    def combine(self, predicted: Tensor, guides: Tensor, sources: Sources) -> Tensor:
-        predicted = self.fold(predicted)  # (B, n, s*s, h, w)
-        kernels = self.kernels(predicted, guides)
-        out = torch.zeros((), device=guides.device)
-        for m, (low, modulator) in enumerate(sources):
+    def combine(
+        self,
+        area: Area,
+        kernels: Tensor,
+        sharp: list[Tensor],
+        rims: list[Tensor],
+        sources: Sources,
+    ) -> Tensor:
+        """What the kernels gather of all sources, modulated: (B, 3, s*s, h, w)."""
+        out = torch.zeros_like(sharp[0])
+        for m, source in enumerate(sources):
             kernel = kernels[:, m]  # (B, 9, s*s, h, w)
-            sharp = self.fold(self.sharpening(low))
-            gathered = self.gather(kernel, low) + kernel.sum(1, True) * sharp
-            out = out + gathered * self.fold(modulator)
-        gain = torch.exp(math.log(GAIN_LIMIT) * torch.tanh(predicted[:, -1:]))
-        return F.pixel_shuffle((out * gain).clamp(min=0).flatten(1, 2), self.scale)
+            gathered = kernel.sum(1, keepdim=True) * sharp[m]
+            low = area.of(rims[m], self.cell // self.scale, rim=1)
+            for k, neighbour in enumerate(neighbours(low)):
+                gathered = torch.addcmul(gathered, kernel[:, k, None], neighbour)
+            modulator = self.fold(area.of(source.modulator, self.cell))
+            out = torch.addcmul(out, gathered, modulator)
+        return out.clamp(min=0)
 
     def match(self, picture: Tensor, trust: Tensor, low: Tensor) -> Tensor:
         """Bring the area means of the picture near the low-resolution radiance.
@@ -163,7 +271,7 @@ class KernelTail(nn.Module):
         Back-projection (Irani and Peleg, 1991) by factors, so that black stays black;
         where the radiance is noise rather than picture, `trust` can withhold it.
         """
-        power = torch.sigmoid(F.avg_pool2d(trust, self.scale) + TRUST)
+        power = torch.sigmoid(trust + TRUST)
         most = math.log(MATCHING_LIMIT)
         for _ in range(MATCHING_STEPS):
             means = F.avg_pool2d(picture, self.scale) + MATCHING_EPSILON
@@ -172,33 +280,13 @@ class KernelTail(nn.Module):
             picture = picture * self.enlarge(factor, "bilinear")
         return picture
 
-    def sharpening(self, low: Tensor) -> Tensor:
-        smooth = self.enlarge(low, "bilinear")
-        most = SHARPENING_LIMIT * smooth
-        return (self.enlarge(low, "bicubic") - smooth).clamp(-most, most)
+    def enlarge(self, low: Tensor, mode: str) -> Tensor:
+        return F.interpolate(low, scale_factor=self.scale, mode=mode)
 
     def fold(self, x: Tensor) -> Tensor:
         """(B, C, H, W) to (B, C, s*s, h, w)."""
         return F.pixel_unshuffle(x, self.scale).unflatten(1, (x.shape[1], -1))
 
-    def kernels(self, predicted: Tensor, guides: Tensor) -> Tensor:
-        """Softmax over the neighbours of all sources: (B, sources, 9, s*s, h, w)."""
-        logits = predicted[:, :-3].unflatten(1, (-1, 9)) + self.prior[..., None, None]
-        distance = torch.zeros_like(logits[:, 0])
-        for channel, guide in ((-3, guides[:, :3]), (-2, guides[:, 3:6])):
-            sharpness = SHARPNESS_UNIT * predicted[:, channel, None]
-            distance = distance + sharpness * self.distances(guide)
-        logits = logits - distance[:, None]
-        return logits.flatten(1, 2).softmax(dim=1).unflatten(1, (-1, 9))
-
-    def distances(self, guide: Tensor) -> Tensor:
-        """Squared distance of pixels' guides to neighbours': (B, 9, s*s, h, w)."""
-        cells = self.fold(guide)
-        means = neighbours(F.avg_pool2d(guide, self.scale))
-        return torch.stack([(cells - mean).square().sum(1) for mean in means], dim=1)
-
-    @staticmethod
-    def gather(kernel: Tensor, low: Tensor) -> Tensor:
-        """Kernels (B, 9, s*s, h, w) over (B, 3, h, w): (B, 3, s*s, h, w)."""
-        taps = (kernel[:, k, None] * x for k, x in enumerate(neighbours(low)))
-        return sum(taps, torch.zeros((), device=low.device))
+    def unfold(self, x: Tensor) -> Tensor:
+        """(B, C, s*s, h, w) to (B, C, H, W)."""
+        return F.pixel_shuffle(x.flatten(1, 2), self.scale)
