@@ -172,6 +172,7 @@ def text(records: Sequence[dict[str, Any]]) -> str:
     for kind in dict.fromkeys(record["kind"] for record in records):
         chosen = [record for record in records if record["kind"] == kind]
         lines += [f"## {kind.capitalize()}", "", *_table(chosen), ""]
+        lines += [*_by_decision(chosen), ""]
     lines += ["## Decisions", "", *_decisions(records), ""]
     return "\n".join(lines)
 
@@ -206,6 +207,29 @@ def _table(records: Sequence[dict[str, Any]]) -> list[str]:
         f"{size['samples']} samples, {size['guide_samples']} guide samples, "
         f"{size['rounds']} pairs.",
     ]
+
+
+def _by_decision(records: Sequence[dict[str, Any]]) -> list[str]:
+    """What each way of rendering guides saved of their seconds."""
+    names = ("guide samples", "guide bounces", "guide lights", "guide cache")
+    groups: dict[tuple[str, ...], list[dict[str, Any]]] = {}
+    for record in records:
+        told = {d["decision"]: d["value"] for d in record["plan"]}
+        groups.setdefault(tuple(told.get(n, "") for n in names), []).append(record)
+    lines = [
+        f"| {' | '.join(names)} | scenes | guides' seconds saved | of the overhead |",
+        "|---" * (len(names) + 3) + "|",
+    ]
+    for values, chosen in groups.items():
+        saved, share = (
+            statistics.mean(
+                (r["guides_all"] - r["guides_plan"]) / r[of] for r in chosen
+            )
+            for of in ("guides_all", "overhead_all")
+        )
+        scenes = ", ".join(record["scene"] for record in chosen)
+        lines.append(f"| {' | '.join(values)} | {scenes} | {saved:.0%} | {share:.0%} |")
+    return lines
 
 
 def _decisions(records: Sequence[dict[str, Any]]) -> list[str]:
