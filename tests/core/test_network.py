@@ -116,3 +116,19 @@ def test_wrong_guides_are_refused() -> None:
 def test_configuration_round_trip() -> None:
     config = preset_config("fast", 2, "full")
     assert NetworkConfig.from_dict(config.to_dict()) == config
+
+
+@pytest.mark.parametrize("scale", [2, 4, 8])
+@pytest.mark.parametrize("guides", ["fast", "full"])
+def test_areas_are_of_no_matter_to_the_picture(scale: int, guides: str) -> None:
+    network = XRDS(preset_config("fast", scale, guides)).eval()
+    for parameter in network.tail.parameters():  # those of new weights are all zero
+        torch.nn.init.normal_(parameter, std=0.05)
+    size = 11 * network.config.cell
+    radiance = torch.rand(1, 3, size // scale, size // scale)
+    stack = torch.rand(1, network.config.guide_count, size, size)
+    with torch.inference_mode():
+        whole = network(radiance, stack)
+        network.tail.area_side = 3
+        parts = network(radiance, stack)
+    torch.testing.assert_close(parts, whole, rtol=0.0, atol=2e-6)
