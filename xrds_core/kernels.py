@@ -24,7 +24,7 @@ SHARPENING_LIMIT = 0.3
 GAIN_LIMIT = 4.0
 # Steps towards a picture whose area means are the low-resolution radiance, the factor
 # that one step may change a pixel by, and what is added to both sides of its quotient.
-MATCHING_STEPS, MATCHING_LIMIT, MATCHING_EPSILON = 2, 3.0, 0.02
+MATCHING_STEPS, MATCHING_LIMIT, MATCHING_EPSILON = 4, 3.0, 0.02
 # Logit of how far a step goes, untrained.
 TRUST = 3.0
 # Cells along the sides of what is enlarged at once.

@@ -124,13 +124,6 @@ BOUNDS |= {
 }
 
 EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
-    "energy.smooth": (
-        Exemption(
-            "fast x[48] *",
-            2e-2,
-            "texture that OIDN has smoothed away is put back, which brightens a little",
-        ),
-    ),
     "invalid.distance": (
         Exemption(
             "fast *",
