@@ -41,7 +41,7 @@ def replacing(path: Path) -> Iterator[Path]:
 def write_json(path: Path, value: Any) -> None:
     """Write a value as a JSON file for people to read too, whole or not at all."""
     with replacing(path) as part:
-        part.write_text(json.dumps(value, indent=1), "utf-8")
+        part.write_text(json.dumps(value, indent=1) + "\n", "utf-8")
 
 
 def abandon() -> None:

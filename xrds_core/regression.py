@@ -10,6 +10,7 @@ positive. Shape letters as in `network`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import torch
@@ -131,12 +132,15 @@ def fit(target: Tensor, features: list[Feature], noise: float) -> Tensor:
     count = len(features)
     x = [*(feature.low for feature in features), target]
     pairs = [(i, j) for i in range(count + 1) for j in range(i, count + 1)]
-    moments = [mean_product(x[i], x[j]) for i, j in pairs]
-    sums = blur(torch.cat([*moments, *x], dim=1))
-    means = sums[:, len(pairs) :].split([plane.shape[1] for plane in x], dim=1)
+    sums = blur(torch.cat([*mean_products(x, pairs), *x], dim=1))
+    channels = [1] * len(pairs) + [plane.shape[1] for plane in x]
+    blurred = sums.split(channels, dim=1)
+    moments, means = blurred[: len(pairs)], blurred[len(pairs) :]
     covariance = {
-        (i, j): sums[:, k : k + 1] - mean_product(means[i], means[j])
-        for k, (i, j) in enumerate(pairs)
+        pair: moment - product
+        for pair, moment, product in zip(
+            pairs, moments, mean_products(means, pairs), strict=True
+        )
     }
 
     def ridged(unexplained: Tensor | float) -> list[Tensor]:
@@ -157,13 +161,21 @@ def fit(target: Tensor, features: list[Feature], noise: float) -> Tensor:
     return torch.cat(list(clamped), dim=1)
 
 
-def mean_product(x: Tensor, y: Tensor) -> Tensor:
-    """Mean over the channels of x y, of one or three each: (B, 1, h, w)."""
-    return mean(x * y) if x.shape[1] == y.shape[1] else mean(x) * mean(y)
+def mean_products(
+    x: Sequence[Tensor], pairs: Sequence[tuple[int, int]]
+) -> list[Tensor]:
+    """Means over the channels of x[i] x[j], of one or three each: (B, 1, h, w)."""
+    means = [mean(planes) for planes in x]
+    return [
+        mean(x[i] * x[j]) if x[i].shape[1] == x[j].shape[1] else means[i] * means[j]
+        for i, j in pairs
+    ]
 
 
 def mean(x: Tensor) -> Tensor:
     """(B, C, h, w) to (B, 1, h, w)."""
+    if x.shape[1] == 1:
+        return x
     # adding planes is several times faster than torch's mean over few of them
     planes = x.split(1, dim=1)
     return sum(planes[1:], planes[0]) / len(planes)

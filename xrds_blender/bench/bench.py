@@ -7,7 +7,6 @@ folder has measured is kept, and the report is written anew after every scene.
 from __future__ import annotations
 
 import csv
-import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -274,9 +273,7 @@ def _flat(point: dict[str, Any]) -> dict[str, Any]:
 
 
 def _write_model(path: Path, parts: Sequence[SceneBench], told: Report) -> None:
-    fitted = analysis.fitted(parts, told["points"])
-    with replacing(path) as part:
-        part.write_text(json.dumps(fitted.to_json(), indent=1) + "\n", "utf-8")
+    write_json(path, analysis.fitted(parts, told["points"]).to_json())
 
 
 def _say(line: str) -> None:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core import metrics
-from xrds_core.atomic import replacing
+from xrds_core.atomic import replacing, write_json
 
 from ..plan import OMISSIONS
 
@@ -144,15 +144,11 @@ def report(
             key = record["scene"], record["kind"]
             records = [r for r in records if (r["scene"], r["kind"]) != key]
             records.append(record)
-            _write(path, json.dumps({"records": records}, indent=1) + "\n")
-            _write(out.with_suffix(".md"), text(records))
+            out.parent.mkdir(parents=True, exist_ok=True)
+            write_json(path, {"records": records})
+            with replacing(out.with_suffix(".md")) as part:
+                part.write_text(text(records), "utf-8")
     return {"records": records}
-
-
-def _write(path: Path, content: str) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as part:
-        part.write_text(content, "utf-8")
 
 
 def text(records: Sequence[dict[str, Any]]) -> str:
@@ -209,12 +205,17 @@ def _table(records: Sequence[dict[str, Any]]) -> list[str]:
     ]
 
 
+def _decided(record: dict[str, Any]) -> dict[str, str]:
+    """Every decision's value."""
+    return {each["decision"]: each["value"] for each in record["plan"]}
+
+
 def _by_decision(records: Sequence[dict[str, Any]]) -> list[str]:
     """What each way of rendering guides saved of their seconds."""
     names = ("guide samples", "guide bounces", "guide lights", "guide cache")
     groups: dict[tuple[str, ...], list[dict[str, Any]]] = {}
     for record in records:
-        told = {d["decision"]: d["value"] for d in record["plan"]}
+        told = _decided(record)
         groups.setdefault(tuple(told.get(n, "") for n in names), []).append(record)
     lines = [
         f"| {' | '.join(names)} | scenes | guides' seconds saved | of the overhead |",
@@ -237,7 +238,7 @@ def _decisions(records: Sequence[dict[str, Any]]) -> list[str]:
     names = [n for n in names if n not in {"low frame", "sessions"}]
     lines = ["| scene | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
     for record in records:
-        told = {d["decision"]: d["value"] for d in record["plan"]}
+        told = _decided(record)
         cells = [told.get(name, "") for name in names]
         lines.append(f"| {record['scene']}, {record['kind']} | {' | '.join(cells)} |")
     return lines

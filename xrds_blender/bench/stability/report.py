@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.atomic import replacing, write_json
 
 from .bounds import bound
 
@@ -26,8 +25,7 @@ PLOTS = (
 
 def write(folder: Path, told: dict[str, Any], checks: list[Check]) -> None:
     """Write all of it into an existing folder."""
-    with replacing(folder / "results.json") as part:
-        part.write_text(json.dumps(told, indent=1) + "\n")
+    write_json(folder / "results.json", told)
     plots = _plots(folder, told["curves"])
     with replacing(folder / "report.md") as part:
         part.write_text(page(told, checks, plots))
