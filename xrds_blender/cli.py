@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -47,6 +48,11 @@ def _show(options: argparse.Namespace) -> None:
         print(line)
 
 
+def _lines_of(module: str) -> Callable[[dict[str, Any]], Iterable[str]]:
+    """A module's `lines`; it is loaded only when there is something to tell."""
+    return lambda told: import_module(module, __package__).lines(told)
+
+
 # --- the commands: each calls the function that does the work -------------------------
 
 
@@ -54,12 +60,6 @@ def _info(options: argparse.Namespace) -> dict[str, Any]:
     from .torch_folder import load
 
     return load("info").info(_blender_version(), options.weights)
-
-
-def _info_lines(told: dict[str, Any]) -> list[str]:
-    from xrds_core import info
-
-    return list(info.lines(told))
 
 
 def _blender_version() -> str | None:
@@ -262,6 +262,7 @@ def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
 
 def _dataset(options: argparse.Namespace) -> dict[str, Any]:
     _need_blender("dataset")
+    from .studio import datasheet
     from .studio.dataset import generate
 
     written = generate(
@@ -271,7 +272,11 @@ def _dataset(options: argparse.Namespace) -> dict[str, Any]:
         assets=options.assets,
         scales=options.scales,
     )
-    return {"out": str(options.out), "windows": written}
+    found = datasheet.files(options.out)
+    if options.contact is not None:
+        datasheet.contact_sheet(found, options.contact)
+    told = {"out": str(options.out), "written": written}
+    return told | datasheet.datasheet(found)
 
 
 def _train(options: argparse.Namespace) -> dict[str, Any] | None:
@@ -289,12 +294,6 @@ def _ablate(options: argparse.Namespace) -> dict[str, Any]:
     return ablate(
         options.config, options.table, options.out, seeds=seeds, changes=changes
     )
-
-
-def _ablate_lines(told: dict[str, Any]) -> list[str]:
-    from xrds_core.training.ablations import lines
-
-    return lines(told)
 
 
 def _train_lines(told: dict[str, Any]) -> list[str]:
@@ -352,7 +351,7 @@ def _parser() -> argparse.ArgumentParser:
 def _add_info(commands: Any) -> argparse.ArgumentParser:
     command = commands.add_parser("info", help="versions, devices, weights, costs")
     command.add_argument("--weights", type=Path, help="folder of weights files")
-    command.set_defaults(work=_info, lines=_info_lines)
+    command.set_defaults(work=_info, lines=_lines_of("xrds_core.info"))
     return command
 
 
@@ -552,7 +551,8 @@ def _add_dataset(commands: Any) -> argparse.ArgumentParser:
     add("--count", type=arguments.positive, default=1, help="number of scenes")
     add("--assets", type=Path, help="folder of models, textures and skies")
     add("--scales", type=arguments.integers, default=(2, 4, 8), help="as 2,4,8")
-    command.set_defaults(work=_dataset, lines=lambda _: ())
+    add("--contact", type=Path, metavar="FILE.jpg", help="a look at the windows")
+    command.set_defaults(work=_dataset, lines=_lines_of(".studio.datasheet"))
     return command
 
 
@@ -575,7 +575,7 @@ def _add_ablate(commands: Any) -> argparse.ArgumentParser:
     add("--out", type=Path, required=True, help="folder of TABLE.json and its runs")
     add("--seeds", type=arguments.positive, default=3, help="runs of each variant")
     _add_changes(command)
-    command.set_defaults(work=_ablate, lines=_ablate_lines)
+    command.set_defaults(work=_ablate, lines=_lines_of("xrds_core.training.ablations"))
     return command
 
 

@@ -9,11 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender.render import run_job  # noqa: E402
-from xrds_blender.studio import dataset, framing, geometry, scenes  # noqa: E402
+from xrds_blender.studio import (  # noqa: E402
+    dataset,
+    datasheet,
+    framing,
+    geometry,
+    scenes,
+)
 from xrds_blender.studio.assets import Library  # noqa: E402
 from xrds_blender.studio.framing import Window  # noqa: E402
 from xrds_core.errors import UsageError  # noqa: E402
@@ -165,6 +172,42 @@ def test_window_files_hold_what_training_reads(made: Path) -> None:
     assert meta["seed"] == 19
     assert meta["reference_spp"] == 24  # twice that of the training split
     assert max(meta["frame"]) == 1920
+
+
+def test_a_seed_gives_the_same_windows(made: Path, tmp_path: Path) -> None:
+    """But for the last bit of a few values: Cycles' threads add in no fixed order."""
+    make(tmp_path)
+    for path in made.glob("*/*.npz"):
+        again = tmp_path / path.relative_to(made)
+        with np.load(path) as first, np.load(again) as second:
+            assert set(first.files) == set(second.files)
+            for name in set(first.files) - {"meta"}:  # it tells seconds
+                a, b = first[name], second[name]
+                assert (a == b).mean() > 0.99, name
+                np.testing.assert_allclose(a, b, rtol=2e-3, atol=1e-4, err_msg=name)
+
+
+def test_datasheet_counts_and_shows(made: Path, tmp_path: Path) -> None:
+    found = datasheet.files(made)
+    told = datasheet.datasheet(found)
+    assert told["windows"] == {"validation": 2}
+    assert sum(told["kinds"].values()) == 2
+    assert told["scenes"] == 1
+    assert told["mean_bytes"] > 10_000
+    stages = {"low2", "low4", "low8", "guides", "full", "reference"}
+    assert set(told["mean_cpu_seconds"]) == stages
+    assert "2 validation" in datasheet.lines(told)[0]
+    datasheet.contact_sheet(found, tmp_path / "contact.jpg")
+    with Image.open(tmp_path / "contact.jpg") as sheet:
+        assert sheet.size == (datasheet.COLUMNS * datasheet.SIDE, datasheet.SIDE)
+        assert np.asarray(sheet)[:, : datasheet.SIDE].std() > 1
+
+
+def test_a_sheet_of_nothing_is_refused(tmp_path: Path) -> None:
+    assert datasheet.lines(datasheet.datasheet([]))
+    with pytest.raises(UsageError, match="render some first"):
+        datasheet.contact_sheet([], tmp_path / "contact.jpg")
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("scale", [2, 4])

@@ -20,7 +20,7 @@ from PIL import Image
 
 from xrds_core import weights
 from xrds_core.errors import Cancelled, UsageError, WeightsError
-from xrds_core.training.ablations import TABLES, ablate, lines
+from xrds_core.training.ablations import TABLES, Changes, _run_name, ablate, lines
 from xrds_core.training.config import TrainingConfig, read_config, to_toml
 from xrds_core.training.data import Variation
 from xrds_core.training.interruption import Interruption
@@ -457,6 +457,14 @@ def test_table_of_runs_that_differ_in_one_thing(
     assert "kernels over" in "\n".join(lines(told))
     monkeypatch.setattr("xrds_core.training.train.Run.train_step", pytest.fail)
     assert ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps) == told
+
+
+def test_tables_share_runs_of_the_same_changes_only() -> None:
+    names: dict[str, set[Changes]] = {}
+    for variants in TABLES.values():
+        for changes in variants.values():
+            names.setdefault(_run_name(changes), set()).add(changes)
+    assert all(len(changes) == 1 for changes in names.values())
 
 
 @pytest.mark.parametrize("table", TABLES)

@@ -78,8 +78,9 @@ def ablate(
 ) -> dict[str, Any]:
     """Train every variant of a table and write OUT/TABLE.json, which is returned.
 
-    ``changes`` are those of `read_config`, for all runs. Runs lie in OUT/TABLE; they go
-    on where they were interrupted, and those that are done are only read.
+    ``changes`` are those of `read_config`, for all runs. Runs lie in OUT/runs, named by
+    what they change, so that tables share them; they go on where they were interrupted,
+    and those that are done are only read.
 
     Raises:
         UsageError: there is no such table, or the configuration is wrong.
@@ -88,7 +89,7 @@ def ablate(
     if table not in TABLES:
         raise UsageError(f"there is no table {table!r}; there are {', '.join(TABLES)}")
     rows = {
-        name: _row(config, out / table, name, (*changes, *own), seeds)
+        name: _row(config, out / "runs" / _run_name(own), (*changes, *own), seeds)
         for name, own in TABLES[table].items()
     }
     common = read_config(config, changes)
@@ -98,16 +99,18 @@ def ablate(
     return told
 
 
-def _row(
-    config: Path, folder: Path, name: str, changes: Sequence[str], seeds: int
-) -> dict[str, Any]:
+def _run_name(changes: Changes) -> str:
+    return re.sub(r"[^a-z\d.]+", "_", " ".join(changes)).strip("_") or "unchanged"
+
+
+def _row(config: Path, run: Path, changes: Sequence[str], seeds: int) -> dict[str, Any]:
     """One variant: its size, and PSNR (dB) by seed with mean and spread."""
     psnrs: list[float] = []
     for seed in range(seeds):
         chosen = read_config(config, (*changes, f"seed = {seed}"))
-        run = folder / f"{re.sub('[^a-z]+', '_', name.lower())}_{seed}"
-        train(chosen, run)
-        psnrs.append(RunFolder(run).records()[-1]["psnr"]["rendered"]["xrds"])
+        folder = run.with_name(f"{run.name}_seed_{seed}")
+        train(chosen, folder)
+        psnrs.append(RunFolder(folder).records()[-1]["psnr"]["rendered"]["xrds"])
     operations = count(chosen.network_config)
     return {
         "parameters": operations.parameters,

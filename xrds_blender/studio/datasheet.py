@@ -1,0 +1,97 @@
+"""What a training set holds: counts, bytes, seconds of rendering, and a look at it."""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from xrds_core.atomic import replacing
+from xrds_core.errors import UsageError
+from xrds_core.metrics import to_srgb
+
+COLUMNS, SIDE, MOST = 12, 128, 96  # of the sheet: cells a row, their pixels, cells
+QUALITY = 85  # of the JPEG
+
+
+@dataclass(frozen=True)
+class File:
+    """One window's file and what it says of itself."""
+
+    path: Path
+    meta: dict[str, Any]
+
+
+def files(folder: Path) -> list[File]:
+    """All windows of a set, in the order of their names."""
+    return [File(path, _meta(path)) for path in sorted(folder.glob("*/*.npz"))]
+
+
+def _meta(path: Path) -> dict[str, Any]:
+    with np.load(path, allow_pickle=False) as file:
+        return dict(json.loads(str(file["meta"])))
+
+
+def datasheet(found: list[File]) -> dict[str, Any]:
+    """Windows by split and kind, scenes, assets, bytes and CPU seconds of a window."""
+    stages = Counter[str]()
+    for file in found:
+        for name, seconds in file.meta["seconds"].items():
+            if name.endswith("_cpu"):
+                stages[name.removesuffix("_cpu")] += seconds
+    return {
+        "windows": dict(Counter(file.path.parent.name for file in found)),
+        "kinds": dict(Counter(file.meta["kind"] for file in found)),
+        "scenes": len({file.meta["seed"] for file in found}),
+        "assets": len({name for file in found for name in file.meta["assets"]}),
+        "mean_bytes": statistics.fmean(f.path.stat().st_size for f in found)
+        if found
+        else 0.0,
+        "mean_cpu_seconds": {name: s / len(found) for name, s in stages.items()},
+    }
+
+
+def contact_sheet(found: list[File], path: Path) -> None:
+    """Write a JPEG of the references, one window a scene, drawn evenly if many.
+
+    Raises UsageError where there is no window.
+    """
+    from PIL import Image
+
+    scenes = list({file.meta["seed"]: file for file in found}.values())
+    if not scenes:
+        raise UsageError(f"no window to show in {path.name}: render some first")
+    shown = scenes[:: math.ceil(len(scenes) / MOST)]
+    rows = math.ceil(len(shown) / COLUMNS)
+    sheet = Image.new("RGB", (COLUMNS * SIDE, rows * SIDE))
+    for i, file in enumerate(shown):
+        with np.load(file.path, allow_pickle=False) as arrays:
+            reference = arrays["reference"].astype(np.float32)
+        pixels = to_srgb(reference, math.log2(file.meta["exposure"]))
+        cell = Image.fromarray(np.round(pixels * 255).astype(np.uint8))
+        row, column = divmod(i, COLUMNS)
+        sheet.paste(
+            cell.resize((SIDE, SIDE), Image.Resampling.BOX), (column * SIDE, row * SIDE)
+        )
+    with replacing(path) as part:
+        sheet.save(part, "JPEG", quality=QUALITY)
+
+
+def lines(told: dict[str, Any]) -> list[str]:
+    """The datasheet to be read."""
+    stages = ", ".join(f"{k} {s:.1f}" for k, s in told["mean_cpu_seconds"].items())
+    return [
+        f"windows: {_counts(told['windows'])}; {_counts(told['kinds'])}",
+        f"{told['scenes']} scenes, {told['assets']} files of assets",
+        f"a window: {told['mean_bytes'] / 1e6:.2f} MB; CPU seconds: {stages or 'none'}",
+    ]
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {name}" for name, count in counts.items()) or "none"
