@@ -77,6 +77,9 @@ def status_of(work: Callable[[], None]) -> int:
     except ModuleNotFoundError as error:
         # the extension leaves out torch and what only makes XRDS
         line, status = f"this installation has no module {error.name}", FAILED
+    except BrokenPipeError:  # who read stdout has seen enough, as `head` has
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return FAILED
     except MemoryError:
         line = "out of memory; set a memory limit or a smaller picture"
         status = FAILED

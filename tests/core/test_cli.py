@@ -133,6 +133,29 @@ def test_errors_are_one_line(
     assert err.count("\n") == 1
 
 
+def test_a_reader_that_leaves_early_is_no_fault() -> None:
+    code = """
+    import sys
+    from xrds_blender import console
+    def work():
+        for _ in range(100_000):
+            print("a line")
+    sys.exit(console.status_of(work))
+    """
+    with subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(code)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == "a line\n"
+        child.stdout.close()
+        assert child.stderr is not None
+        assert not child.stderr.read()
+    assert child.returncode == 1
+
+
 def test_json_has_stdout_to_itself() -> None:
     done = run(
         """
