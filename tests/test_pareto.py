@@ -75,6 +75,14 @@ def test_cached_guides_cost_nothing() -> None:
     assert "bicubic" not in groups
 
 
+def test_sets_of_guides_are_apart_where_there_are_two() -> None:
+    full = point(9, 27, "xrds", scale=2, guides="full")
+    assert "XRDS, fast guides" not in pareto.groups(XRDS)
+    groups = pareto.groups([*XRDS, full])
+    assert groups["XRDS, full guides"] == [full]
+    assert groups["XRDS, fast guides"] == XRDS
+
+
 def test_mean_curve_is_over_all_scenes_alike() -> None:
     scenes = {"a": (OIDN, 10.0), "b": ([point(2, 25)], 1.0)}
     curve = pareto.mean_curve(scenes)

@@ -29,8 +29,6 @@ DENOISERS = tuple(
 DEFAULT_DENOISER = DENOISERS[0]
 # Those worth trying on the low-resolution picture.
 LOW_DENOISERS = ("HIGH-ACCURATE", "HIGH-FAST", "BALANCED-ACCURATE")
-# The one whose seconds a probe measures; the others' are multiples of it.
-PROBE_DENOISER = "HIGH-FAST"
 MODEL = Path(__file__).with_name("budget.json")
 # Predictions scatter; a frame that is late is worse than one that is early.
 AIM = 0.93
@@ -109,7 +107,7 @@ class Costs:
 class Curve:
     """PSNR in dB over sample counts, never falling; linear in log2 of the count.
 
-    Beyond its last sample it rises as between the last two.
+    Beyond its last sample it is flat: what was not measured is not promised.
     """
 
     samples: tuple[int, ...]
@@ -117,13 +115,14 @@ class Curve:
 
     def at(self, samples: int) -> float:
         """PSNR at a count of at least the first."""
-        if len(self.samples) == 1:
-            return self.psnr[0]
-        last = len(self.samples) - 2
-        i = min(max(bisect_right(self.samples, samples) - 1, 0), last)
-        low, high = self.samples[i : i + 2]
+        after = bisect_right(self.samples, samples)
+        if after in {0, len(self.samples)}:
+            return self.psnr[max(after - 1, 0)]
+        (low, high), (least, most) = (
+            values[after - 1 : after + 1] for values in (self.samples, self.psnr)
+        )
         share = math.log2(samples / low) / math.log2(high / low)
-        return self.psnr[i] + max(share, 0.0) * (self.psnr[i + 1] - self.psnr[i])
+        return least + share * (most - least)
 
     @classmethod
     def of(cls, points: Mapping[int, float]) -> Curve:
@@ -158,7 +157,8 @@ class Model:
     """What `xrds bench` has learnt about all scenes and all machines.
 
     `denoiser_speed` and `network_speed` are seconds at one size over those of
-    PROBE_DENOISER; `other_per_megapixel` seconds of reading, writing and all else.
+    DEFAULT_DENOISER, which a probe measures; `other_per_megapixel` seconds of reading,
+    writing and all else.
     """
 
     errors: ErrorModel
@@ -292,8 +292,8 @@ def _fastest(costs: Costs, errors: ErrorModel, networks: Sequence[Network]) -> P
 
 
 def _least_samples(curve: Curve, psnr: float) -> int:
-    """Smallest count that reaches `psnr`; the largest allowed where none does."""
-    low, high = curve.samples[0], MOST_SAMPLES
+    """Smallest count that reaches `psnr`; the largest measured where none does."""
+    low, high = curve.samples[0], curve.samples[-1]
     while low < high:
         middle = (low + high) // 2
         if curve.at(middle) >= psnr:

@@ -1,7 +1,7 @@
 """Probes of the scene at hand, and the job that keeps to a time budget.
 
-Both probes are renders of a few ten thousand pixels and one sample each, in the
-session that the frame is then rendered with, so that the scene is synced once.
+The probes are small renders of one sample each, in the session that the frame is then
+rendered with, so that the scene is synced once.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import math
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import XRDSError
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .passes import CyclesPasses
     from .plan import Decision
 
-PROBE_PIXELS = 40_000
+PROBE_PIXELS = 130_000  # of the largest probe
 NETWORK_SIDE = 256  # of the output that a network is tried on, in pixels
 
 
@@ -81,24 +81,32 @@ def probe(
     networks: Sequence[Network],
     start: float,
 ) -> Costs:
-    """Costs of the scene's frame; those of the networks are guessed from OIDN's."""
+    """Costs of the scene's frame; those of the networks are guessed from OIDN's.
+
+    What a render costs whatever its size (5 ms) is lost in the largest probe, what the
+    denoiser does (0.1 s) is not: its seconds are the slope between two sizes.
+    """
     pixels = passes.region.width * passes.region.height
     scale = max(1, round(math.sqrt(pixels / PROBE_PIXELS)))
-    beauty = passes.beauty(scale, 1, denoise=False).seconds["beauty"]
-    guide = passes.probe_guides(scale, 1)["guides"]
-    denoise = 0.0
+    oidn: dict[str, Any] = {"denoise": False}
     if has_denoiser():
-        quality, prefilter = budget.PROBE_DENOISER.split("-")
-        both = passes.beauty(scale, 1, quality=quality, prefilter=prefilter)
-        denoise = max(both.seconds["beauty"] - beauty, 0.0)
+        quality, prefilter = budget.DEFAULT_DENOISER.split("-")
+        oidn = {"quality": quality, "prefilter": prefilter}
+    passes.beauty(8 * scale, 1, **oidn)  # the first pays for more, and is thrown away
+    tiny = passes.beauty(8 * scale, 1, **oidn).seconds["beauty"]
+    small = passes.beauty(2 * scale, 1, **oidn).seconds["beauty"]
     whole = scale**2
+    beauty = passes.beauty(scale, 1, denoise=False).seconds["beauty"] * whole
+    guide = passes.probe_guides(scale, 1)["guides"] * whole
+    denoised = (small - tiny) * whole / (1 / 2**2 - 1 / 8**2)
+    denoise = max(denoised - beauty, 0.0) if has_denoiser() else 0.0
     megapixels = pixels / 1e6
     return budget.Costs(
         fixed=time.perf_counter() - start + model.other_per_megapixel * megapixels,
-        beauty=beauty * whole,
-        guide=guide * whole,
-        denoise={m: denoise * whole * x for m, x in model.denoiser_speed.items()},
-        network={n: denoise * whole * model.network_speed[n] for n in networks},
+        beauty=beauty,
+        guide=guide,
+        denoise={mode: denoise * x for mode, x in model.denoiser_speed.items()},
+        network={n: denoise * model.network_speed[n] for n in networks},
     )
 
 

@@ -89,13 +89,18 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
     def refuse(*_: Any) -> None:
         raise AssertionError("measured again")
 
-    monkeypatch.setattr(pictures, "measured", refuse)
-    monkeypatch.setattr(pictures.Pictures, "render", lambda *_: None)
-    monkeypatch.setattr(tasks, "frame", refuse)
-    again = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
+    with monkeypatch.context() as patch:
+        patch.setattr(pictures, "measured", refuse)
+        patch.setattr(pictures.Pictures, "render", lambda *_: None)
+        patch.setattr(tasks, "frame", refuse)
+        again = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
     assert again["points"] == told["points"]
     assert again["growth"] == told["growth"]
     assert again["failures"] == {}
+    # Nothing is left to foresee when the picker renders what nobody has rendered.
+    more = world.run(picker=True, budgets=(3.0, 6.0))
+    assert more["picker"]["runs"] == 2
+    assert more["failures"] == {}
 
 
 def _check_points(told: dict[str, Any]) -> None:

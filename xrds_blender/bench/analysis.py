@@ -229,7 +229,7 @@ def _speeds(
 
 def _ratio(scenes: Sequence[SceneBench], seconds: Any) -> float:
     """Median over scenes of seconds over those of the denoiser that is probed."""
-    unit = budget.PROBE_DENOISER
+    unit = budget.DEFAULT_DENOISER
     ratios = [seconds(s) / max(s.times.denoising(unit), 1e-6) for s in scenes]
     return round(statistics.median(ratios), 4)
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..budget import DEFAULT_DENOISER, PROBE_DENOISER
+from ..budget import DEFAULT_DENOISER
 from ..job import RenderJob
 from . import machine, tasks
 from .inputs import Request
@@ -37,11 +37,12 @@ if TYPE_CHECKING:
 # Cores that no machine at hand has; each stage's line in 1/cores is drawn on to them.
 MORE_CORES = (8, 32)
 MEMORY_LIMIT = 1 << 30
+QUICK_DENOISER = "HIGH-FAST"
 NOTE = (
     "Break-even at equal rays: saved is a frame of one sample + OIDN less the "
     "low-resolution render of scale² samples, its OIDN and one guide sample; paid is "
     f"the network. OIDN at full size is Blender's default ({DEFAULT_DENOISER}) or the "
-    f"quicker {PROBE_DENOISER}. More cores than this machine has are extrapolated: "
+    f"quicker {QUICK_DENOISER}. More cores than this machine has are extrapolated: "
     "every stage as a + b / cores through its runs on fewer. There was no graphics "
     "card to fit."
 )
@@ -121,7 +122,7 @@ def _measured(
 
 def _renders(settings: Settings) -> list[Request]:
     found = [anchor("plain", more=more) for more in (False, True)]
-    found += [anchor("plain", 1, mode) for mode in (DEFAULT_DENOISER, PROBE_DENOISER)]
+    found += [anchor("plain", 1, mode) for mode in (DEFAULT_DENOISER, QUICK_DENOISER)]
     return [*found, anchor("guides"), anchor("guides", more=True)]
 
 
@@ -183,7 +184,7 @@ def _xrds_frame(shot: Shot, settings: Settings, network: Network) -> Task:
         guide_samples=1,
         device=settings.networks.device,
         weights=settings.networks.weights,
-        denoiser=PROBE_DENOISER,
+        denoiser=QUICK_DENOISER,
     )
 
     def task() -> Run:
@@ -207,7 +208,7 @@ def _rows(
         if times.count(_frame(name)):
             seconds = times.median(_frame(name)) - times.median(_frame(name), "network")
             yield _less_network(name), seconds, None
-    for mode in (DEFAULT_DENOISER, PROBE_DENOISER):
+    for mode in (DEFAULT_DENOISER, QUICK_DENOISER):
         try:
             seconds = times.denoising(mode)
         except KeyError:
@@ -260,7 +261,7 @@ def break_even(rows: Sequence[Row], networks: Sequence[Network]) -> list[Row]:
                         _less_network(name),
                         name,
                         _alone(DEFAULT_DENOISER),
-                        _alone(PROBE_DENOISER),
+                        _alone(QUICK_DENOISER),
                     )
                 )
                 if plain is None or rest is None or paid is None:

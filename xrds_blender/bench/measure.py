@@ -59,6 +59,8 @@ class SceneBench:
         identity = f"{shot.name}-{shot.digest}-{frame}"
         self.times = StageTimes(directory / f"{identity}-stages.json")
         self._picks_file = directory / f"{identity}-picks.json"
+        # Encoded, by label: the report is written again after every scene.
+        self.crops: dict[str, str] = {}
         self.pictures = Pictures(
             shot, settings.folder, settings.networks, settings.reference_samples
         )
@@ -156,9 +158,11 @@ class SceneBench:
     def measure(self, meter: Meter) -> None:
         """Time, render and compare whatever is missing."""
         if self.settings.timing:
+            rounds = self.settings.rounds
+            # All foreseen first: the costs' own probe must not render inside a render.
+            seconds = {n: self._task_seconds(n) for n in self._stopwatch.left(rounds)}
             self._stopwatch.measure(
-                self.settings.rounds,
-                lambda n: meter.done(self._task_seconds(n), f"{self.name}: {n}"),
+                rounds, lambda n: meter.done(seconds[n], f"{self.name}: {n}")
             )
         self._render(self.configs, meter)
         self._compare(meter)
@@ -170,13 +174,16 @@ class SceneBench:
 
     def _render(self, configs: list[Config], meter: Meter) -> None:
         part = workload.share(self.shot.window)
+        seconds = {  # before anything is rendered, as in `measure`
+            request: workload.render_seconds(request, self.costs, part)
+            for request in self.pictures.missing(configs)
+        }
 
         def tell(request: Request) -> None:
             what = f"{self.name}: {request.kind}, {request.samples} spp"
-            meter.done(workload.render_seconds(request, self.costs, part), what)
+            meter.done(seconds[request], what)
 
-        missing = self.pictures.missing(configs)
-        self.pictures.render(missing, self.settings.journal, tell)
+        self.pictures.render(list(seconds), self.settings.journal, tell)
 
     def _compare(self, meter: Meter) -> None:
         saved = time.perf_counter()

@@ -42,15 +42,18 @@ GROUPS: dict[str, Callable[[Point], bool]] = {
 
 
 def groups(points: Sequence[Point]) -> dict[str, list[Point]]:
-    """Points by group; XRDS also by scale and with its guides for nothing."""
+    """Points by group; XRDS also by scale, by guides and with them for nothing."""
     found = {name: [p for p in points if has(p)] for name, has in GROUPS.items()}
-    for scale in sorted({p["settings"]["scale"] for p in found["XRDS"]}):
-        found[f"XRDS x{scale}"] = [
-            p for p in found["XRDS"] if p["settings"]["scale"] == scale
-        ]
-    found[CACHED] = [
-        without_guides(p) for p in found["XRDS"] if p["settings"]["guides"] == "fast"
-    ]
+    ours = found["XRDS"]
+    for scale in sorted({p["settings"]["scale"] for p in ours}):
+        found[f"XRDS x{scale}"] = [p for p in ours if p["settings"]["scale"] == scale]
+    guides = {
+        f"XRDS, {kind} guides": [p for p in ours if p["settings"]["guides"] == kind]
+        for kind in ("fast", "full")
+    }
+    found[CACHED] = [without_guides(p) for p in guides["XRDS, fast guides"]]
+    if all(guides.values()):  # one alone is all of XRDS
+        found |= guides
     return {name: members for name, members in found.items() if members}
 
 

@@ -66,6 +66,8 @@ def mean_plot(scenes: dict[str, tuple[Sequence[Point], float]]) -> bytes:
 
 def growth_plot(growth: dict[str, Any]) -> bytes:
     """SVG of seconds and peak memory over pixels of the output, on all cores."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     figure, panels = _figure("growth with the frame", "megapixels of the output")
     most = max(row["cores"] for row in growth["rows"])
     lines: dict[str, list[dict[str, Any]]] = {}
@@ -73,9 +75,15 @@ def growth_plot(growth: dict[str, Any]) -> bytes:
         if row["cores"] == most and "less the network" not in row["task"]:
             lines.setdefault(row["task"], []).append(row)
     keys = (("seconds", 1.0, "seconds"), ("peak_memory", 2.0**30, "peak memory, GiB"))
+    sizes = sorted({row["pixels"] / 1e6 for row in growth["rows"]})
     for panel, (key, unit, label) in zip(panels, keys, strict=True):
         panel.set_ylabel(label)
         panel.set_yscale("log")
+        panel.set_xticks(sizes, [f"{size:.2g}" for size in sizes])
+        panel.set_xticks([], minor=True)
+        panel.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.yaxis.set_minor_formatter(NullFormatter())
         for number, (name, rows) in enumerate(lines.items()):
             shown = [(r["pixels"] / 1e6, r[key] / unit) for r in rows if r[key]]
             if shown:
