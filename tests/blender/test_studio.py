@@ -23,7 +23,7 @@ from xrds_blender.studio import (  # noqa: E402
 )
 from xrds_blender.studio.assets import Library  # noqa: E402
 from xrds_blender.studio.framing import Window  # noqa: E402
-from xrds_core.errors import UsageError  # noqa: E402
+from xrds_core.errors import PictureError, UsageError  # noqa: E402
 
 KINDS = list(scenes.RECIPES)
 
@@ -201,6 +201,15 @@ def test_datasheet_counts_and_shows(made: Path, tmp_path: Path) -> None:
     with Image.open(tmp_path / "contact.jpg") as sheet:
         assert sheet.size == (datasheet.COLUMNS * datasheet.SIDE, datasheet.SIDE)
         assert np.asarray(sheet)[:, : datasheet.SIDE].std() > 1
+
+
+def test_a_damaged_window_is_named(made: Path, tmp_path: Path) -> None:
+    whole = next(made.glob("*/*.npz"))
+    torn = tmp_path / "train" / whole.name
+    torn.parent.mkdir()
+    torn.write_bytes(whole.read_bytes()[:5000])
+    with pytest.raises(PictureError, match=f"{torn.name} is no whole training window"):
+        datasheet.files(tmp_path)
 
 
 def test_a_sheet_of_nothing_is_refused(tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import math
 import statistics
+import zipfile
+import zlib
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from xrds_core.atomic import replacing
-from xrds_core.errors import UsageError
+from xrds_core.errors import PictureError, UsageError
 from xrds_core.metrics import to_srgb
 
 COLUMNS, SIDE, MOST = 12, 128, 96  # of the sheet: cells a row, their pixels, cells
@@ -29,13 +31,22 @@ class File:
 
 
 def files(folder: Path) -> list[File]:
-    """All windows of a set, in the order of their names."""
+    """All windows of a set, in the order of their names.
+
+    Raises PictureError for a damaged one.
+    """
     return [File(path, _meta(path)) for path in sorted(folder.glob("*/*.npz"))]
 
 
 def _meta(path: Path) -> dict[str, Any]:
-    with np.load(path, allow_pickle=False) as file:
-        return dict(json.loads(str(file["meta"])))
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return dict(json.loads(str(file["meta"])))
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        raise PictureError(
+            f"{path} is no whole training window: delete it, and its scene's line in "
+            "scenes.jsonl to render it again"
+        ) from None
 
 
 def datasheet(found: list[File]) -> dict[str, Any]:
