@@ -13,6 +13,9 @@ import time
 from types import TracebackType
 from typing import Any
 
+# What Cycles says once the scene is there; a frame in tiles is read back and denoised
+# after its last sample.
+_RENDERING = ("Sample ", "Rendered ", "Finish", "Reading full buffer", "Denoising")
 _PEAK = re.compile(r"Mem:[\d.]+M, Peak:([\d.]+)M")
 
 
@@ -60,7 +63,7 @@ class StageClock:
             self.peak = max(self.peak, int(float(found[1]) * 2**20))
         status = line.rpartition("|")[2].strip()
         self._status = now
-        self._syncing = not status.startswith(("Sample ", "Rendered ", "Finished"))
+        self._syncing = not status.startswith(_RENDERING)
 
     @property
     def sync(self) -> float:

@@ -10,7 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import cycles_session  # noqa: E402  # bpy is asked for first
+from xrds_blender import clock, cycles_session  # noqa: E402  # bpy is asked for first
 from xrds_blender.borrowed import Borrowed, PipelineSettings  # noqa: E402
 from xrds_blender.render import run_job  # noqa: E402
 from xrds_core.errors import Cancelled, SceneError  # noqa: E402
@@ -28,6 +28,30 @@ def test_scale_one_is_cycles_bit_for_bit(still_life: Build, written: Any) -> Non
         return passes.beauty(1, denoise=False).radiance
 
     np.testing.assert_array_equal(run_job(scene, job), plain)
+
+
+def test_a_frame_in_tiles_is_denoised_after_its_last_sample(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As Cycles 4.5 tells it; only what comes before the first sample is sync."""
+    now = 0.0
+    monkeypatch.setattr(clock.time, "perf_counter", lambda: now)
+    told = (
+        "house, ViewLayer | Updating Scene BVH",
+        "house, ViewLayer | Sample 0/1",
+        "house, ViewLayer | Rendered 3/4 Tiles, Sample 1/1",
+        "house, ViewLayer | Finished",
+        "house | Reading full buffer from disk",
+        "house | ViewLayer | Denoising",
+        "house | ViewLayer | Finishing",
+    )
+    with clock.StageClock() as heard:
+        for line in told:
+            now += 1.0
+            heard._hear(f"Fra:1 Mem:45.07M (Peak 319.10M) | {line}")
+        now += 1.0
+    assert heard.sync == 2.0
+    assert heard.render == 6.0
 
 
 def animate(scene: Any) -> None:
