@@ -100,6 +100,13 @@ def test_a_budget_below_all_takes_the_fastest_and_says_so() -> None:
     assert told.reason.startswith("2 s is too little for this scene; the fastest")
 
 
+def test_of_choices_as_fast_as_the_fastest_the_better_is_taken() -> None:
+    modes = COSTS.denoise | {"HIGH-ACCURATE": 2.4}  # 7.4 s beside 7 s
+    picked = choose(2.0, replace(COSTS, denoise=modes))
+    assert not picked.fits
+    assert picked.choice == replace(PLAIN, samples=1)
+
+
 def test_plain_is_taken_where_it_is_better_and_xrds_named_beside() -> None:
     picked = choose(300.0)
     assert picked.choice.scale == 1
