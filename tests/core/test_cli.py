@@ -133,6 +133,16 @@ def test_errors_are_one_line(
     assert err.count("\n") == 1
 
 
+def started(code: str) -> subprocess.Popen[str]:
+    """Python running ``code``, to be heard while it runs."""
+    return subprocess.Popen(
+        [sys.executable, "-c", textwrap.dedent(code)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
 def test_a_reader_that_leaves_early_is_no_fault() -> None:
     code = """
     import sys
@@ -142,12 +152,7 @@ def test_a_reader_that_leaves_early_is_no_fault() -> None:
             print("a line")
     sys.exit(console.status_of(work))
     """
-    with subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(code)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as child:
+    with started(code) as child:
         assert child.stdout is not None
         assert child.stdout.readline() == "a line\n"
         child.stdout.close()
@@ -219,12 +224,7 @@ def test_interrupt_does_not_wait_for_c(tmp_path: Path) -> None:
         for _ in range(100):
             libc.usleep(900_000)
     """
-    with subprocess.Popen(
-        [sys.executable, "-c", textwrap.dedent(code)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as child:
+    with started(code) as child:
         assert child.stdout is not None
         assert child.stdout.readline() == "ready\n"
         start = time.perf_counter()
