@@ -54,11 +54,10 @@ def inside(name: str, packages: tuple[str, ...]) -> bool:
 
 
 CORE = [path for path in SOURCES if inside(module_name(path), ("xrds_core",))]
+COMMAND_LINE = ("xrds_blender.cli", "xrds_blender.cli_training")
 # The command line names every command and looks for its work only when asked.
 EXTENSION = [
-    path
-    for path in SOURCES
-    if not inside(module_name(path), (*OUTSIDE, "xrds_blender.cli"))
+    path for path in SOURCES if not inside(module_name(path), (*OUTSIDE, *COMMAND_LINE))
 ]
 
 
@@ -102,8 +101,9 @@ def test_extension_imports_nothing_it_leaves_out(path: Path) -> None:
     assert not [found for found in imports(path) if inside(found, OUTSIDE)]
 
 
-def test_command_line_imports_the_rest_only_when_asked() -> None:
-    path = source("xrds_blender/cli.py")
+@pytest.mark.parametrize("name", COMMAND_LINE)
+def test_command_line_imports_the_rest_only_when_asked(name: str) -> None:
+    path = source(f"{name.replace('.', '/')}.py")
     top = ast.Module(
         body=[n for n in ast.parse(path.read_text()).body if not is_function(n)],
         type_ignores=[],

@@ -113,6 +113,8 @@ def timed(tmp_path: Path) -> StageTimes:
         times.add("sync", {"seconds": 0.5, "cpu": 0.5, "peak": 10})
         name = network_name(Config("xrds", 1, "", 2, "fast", "fast"))
         times.add(name, {"seconds": 4.0, "cpu": 8.0, "peak": 300})
+        name = network_name(Config("xrds", 1, "", 2, "fast", "fast", 1))
+        times.add(name, {"seconds": 4.5, "cpu": 9.0, "peak": 300})
     return times
 
 
@@ -133,6 +135,9 @@ def test_seconds_are_sums_of_the_stages_medians(tmp_path: Path) -> None:
     assert plain.peak_memory == 100
     own = times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", "fast", 4))
     assert own.seconds["beauty"] == pytest.approx(4.1)
+    assert own.seconds["network"] == 4.0
+    few = times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", "fast", 3))
+    assert few.seconds["network"] == 4.5  # with their filter
     assert own.seconds["denoise"] == pytest.approx(0.25)
     assert own.seconds["guides"] == pytest.approx(4.1)
     assert own.seconds["network"] == 4.0

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Sequence
-from importlib import import_module
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
 from xrds_core.errors import UsageError, XRDSError
 
-from . import arguments, console
+from . import arguments, cli_training, console
+from .commands import lines_of, need_blender
 
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
@@ -48,11 +48,6 @@ def _show(options: argparse.Namespace) -> None:
         print(line)
 
 
-def _lines_of(module: str) -> Callable[[dict[str, Any]], Iterable[str]]:
-    """A module's `lines`; it is loaded only when there is something to tell."""
-    return lambda told: import_module(module, __package__).lines(told)
-
-
 # --- the commands: each calls the function that does the work -------------------------
 
 
@@ -73,7 +68,7 @@ def _blender_version() -> str | None:
 def _render(options: argparse.Namespace) -> dict[str, Any]:
     if options.explain:
         return _plan(options)
-    _need_blender("render")
+    need_blender("render")
     if options.output is None:
         raise UsageError("name the output with -o, or ask for the plan with --explain")
     from .render_file import render_file
@@ -113,7 +108,7 @@ def _job(options: argparse.Namespace) -> Any:
 
 
 def _plan(options: argparse.Namespace) -> dict[str, Any]:
-    _need_blender("plan")
+    need_blender("plan")
     from .explain import explain_file
 
     return explain_file(options.scene, _job(options), resolution=options.resolution)
@@ -150,6 +145,7 @@ def _upscale(options: argparse.Namespace) -> dict[str, Any]:
         scale=options.scale,
         preset=options.preset,
         guides=options.guides,
+        guide_samples=options.guide_samples,
         exposure=options.exposure,
         device=options.device,
         memory_limit=options.memory_limit,
@@ -162,7 +158,7 @@ def _upscale_lines(told: dict[str, Any]) -> list[str]:
 
 
 def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
-    _need_blender("evaluate")
+    need_blender("evaluate")
     from .bench.evaluate import evaluate
     from .bench.samples import samples_table
 
@@ -196,7 +192,7 @@ def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _bench(options: argparse.Namespace) -> dict[str, Any]:
-    _need_blender("bench")
+    need_blender("bench")
     from .bench.bench import bench
 
     return bench(
@@ -230,7 +226,7 @@ def _progress(line: str) -> None:
 
 def _stability(options: argparse.Namespace) -> dict[str, Any]:
     if {"scenes", "shots", "load"} & set(options.parts):
-        _need_blender("stability")
+        need_blender("stability")
     from .bench.stability.suite import stability
 
     told = stability(
@@ -247,7 +243,7 @@ def _stability(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
-    _need_blender("plan-report")
+    need_blender("plan-report")
     from .bench.plan_report import Setting, report
 
     setting = Setting(
@@ -258,60 +254,6 @@ def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
         options.rounds,
     )
     return report(options.scenes, options.kind, setting, options.out, _progress)
-
-
-def _dataset(options: argparse.Namespace) -> dict[str, Any]:
-    _need_blender("dataset")
-    from .studio import datasheet
-    from .studio.dataset import generate
-
-    written = generate(
-        options.out,
-        seed=options.seed,
-        count=options.count,
-        assets=options.assets,
-        scales=options.scales,
-    )
-    found = datasheet.files(options.out)
-    if options.contact is not None:
-        datasheet.contact_sheet(found, options.contact)
-    told = {"out": str(options.out), "written": written}
-    return told | datasheet.datasheet(found)
-
-
-def _train(options: argparse.Namespace) -> dict[str, Any] | None:
-    from xrds_core.training.config import read_config
-    from xrds_core.training.train import train
-
-    folder = options.out or Path("runs") / options.config.stem
-    return train(read_config(options.config, options.changes), folder)
-
-
-def _ablate(options: argparse.Namespace) -> dict[str, Any]:
-    from xrds_core.training.ablations import ablate
-
-    seeds, changes = options.seeds, options.changes
-    return ablate(
-        options.config, options.table, options.out, seeds=seeds, changes=changes
-    )
-
-
-def _train_lines(told: dict[str, Any]) -> list[str]:
-    best = told["best"]
-    return [
-        f"{told['out']}: {told['step']} steps, weights of step {best['step']} are "
-        f"{best['gain']:+.2f} dB on the better of bicubic and demodulated"
-    ]
-
-
-def _need_blender(command: str) -> None:
-    try:
-        import bpy  # noqa: F401  # only asked whether it is there
-    except ImportError as error:
-        raise UsageError(
-            f"{command} needs Blender: install the bpy module "
-            "(pip install bpy) or run blender --command xrds"
-        ) from error
 
 
 # --- the options ----------------------------------------------------------------------
@@ -337,9 +279,10 @@ def _parser() -> argparse.ArgumentParser:
         _add_stability,
         _add_plan_report,
         _add_bench,
-        _add_dataset,
-        _add_train,
-        _add_ablate,
+        cli_training.add_dataset,
+        cli_training.add_train,
+        cli_training.add_ablate,
+        cli_training.add_train_filter,
     ):
         command = add(commands)
         command.add_argument(
@@ -351,7 +294,7 @@ def _parser() -> argparse.ArgumentParser:
 def _add_info(commands: Any) -> argparse.ArgumentParser:
     command = commands.add_parser("info", help="versions, devices, weights, costs")
     command.add_argument("--weights", type=Path, help="folder of weights files")
-    command.set_defaults(work=_info, lines=_lines_of("xrds_core.info"))
+    command.set_defaults(work=_info, lines=lines_of("xrds_core.info"))
     return command
 
 
@@ -414,6 +357,12 @@ def _add_upscale(commands: Any) -> argparse.ArgumentParser:
     add("guide_file", type=Path, metavar="GUIDES.exr", help="full-resolution passes")
     add("-o", "--output", type=Path, required=True, metavar="OUT.exr")
     add("--scale", type=int, choices=(1, 2, 4, 8), default=2)
+    add(
+        "--guide-samples",
+        type=arguments.positive,
+        metavar="N",
+        help="per pixel of GUIDES.exr: the noise of few is filtered; many by default",
+    )
     _add_network(command)
     command.set_defaults(work=_upscale, lines=_upscale_lines)
     return command
@@ -541,53 +490,6 @@ def _add_bench(commands: Any) -> argparse.ArgumentParser:
     add("--weights", type=Path, help="folder of weights files")
     command.set_defaults(work=_bench, lines=_bench_lines)
     return command
-
-
-def _add_dataset(commands: Any) -> argparse.ArgumentParser:
-    command = commands.add_parser("dataset", help="render a training set")
-    add = command.add_argument
-    add("--out", type=Path, required=True)
-    add("--seed", type=int, default=0, help="first scene's seed")
-    add("--count", type=arguments.positive, default=1, help="number of scenes")
-    add("--assets", type=Path, help="folder of models, textures and skies")
-    add("--scales", type=arguments.integers, default=(2, 4, 8), help="as 2,4,8")
-    add("--contact", type=Path, metavar="FILE.jpg", help="a look at the windows")
-    command.set_defaults(work=_dataset, lines=_lines_of(".studio.datasheet"))
-    return command
-
-
-def _add_train(commands: Any) -> argparse.ArgumentParser:
-    command = commands.add_parser("train", help="train or resume a network")
-    command.add_argument("config", type=Path, metavar="CONFIG.toml")
-    command.add_argument("--out", type=Path, metavar="RUN", help="runs/CONFIG")
-    _add_changes(command)
-    command.set_defaults(work=_train, lines=_train_lines)
-    return command
-
-
-def _add_ablate(commands: Any) -> argparse.ArgumentParser:
-    command = commands.add_parser(
-        "ablate", help="train networks that differ in one thing, for a table"
-    )
-    add = command.add_argument
-    add("config", type=Path, metavar="CONFIG.toml")
-    add("--table", required=True, help="base, guides, blocks, rival, loss, input")
-    add("--out", type=Path, required=True, help="folder of TABLE.json and its runs")
-    add("--seeds", type=arguments.positive, default=3, help="runs of each variant")
-    _add_changes(command)
-    command.set_defaults(work=_ablate, lines=_lines_of("xrds_core.training.ablations"))
-    return command
-
-
-def _add_changes(command: argparse.ArgumentParser) -> None:
-    command.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        dest="changes",
-        metavar="KEY=VALUE",
-        help="in the place of the file's, as scale=8 or 'start=\"a.safetensors\"'",
-    )
 
 
 if __name__ == "__main__":

@@ -85,7 +85,7 @@ class GuideSource:
             albedo, alpha = large(beauty.radiance), large(beauty.alpha)
             normal = np.zeros_like(albedo)
             seconds = {"sync": 0.0, "guides": 0.0}
-            found[view] = Guides(albedo, normal, alpha, None, None, seconds)
+            found[view] = Guides(albedo, normal, alpha, None, None, None, seconds)
             self._passes.put_back({(view, ALBEDO): albedo, (view, NORMAL): normal})
         return found
 
@@ -156,6 +156,7 @@ def _guides(kept: CachedGuides, seconds: dict[str, float]) -> dict[str, Guides]:
             alpha,
             None,
             None,
+            kept.samples,
             seconds,
         )
         for view, alpha in kept.alphas.items()

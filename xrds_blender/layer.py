@@ -251,6 +251,7 @@ def _upscale(
         noisy=seen(beauty.noisy),
         guide_radiance=placed(seen(guides.radiance)),
         guide_alpha=placed(guides.alpha),
+        guide_samples=guides.samples,
         exposure=exposure,
         memory_limit=job.memory_limit,
         progress=tell,

@@ -66,7 +66,8 @@ class Guides:
     """Full-resolution albedo and normal (H, W, 3), alpha and depth (H, W).
 
     Albedo is as Cycles writes it, not clamped; normals are in camera space.
-    `radiance` (H, W, 3) is there for full guides only. `seconds`: sync, guides.
+    `radiance` (H, W, 3) is there for full guides only. `samples` are per pixel, None
+    for guides without noise. `seconds`: sync, guides.
     """
 
     albedo: Array
@@ -74,6 +75,7 @@ class Guides:
     alpha: Array
     depth: Array | None
     radiance: Array | None
+    samples: int | None
     seconds: dict[str, float] = field(default_factory=dict)
 
 
@@ -281,7 +283,8 @@ class CyclesPasses:
             clock = self._run((self.width, self.height), self.region, exact=full)
         seconds = {"sync": clock.sync, "guides": clock.render}
         return {
-            view: self._read_guides(view, full, denoise, seconds) for view in self.views
+            view: self._read_guides(view, full, denoise, samples, seconds)
+            for view in self.views
         }
 
     def probe_guides(self, scale: int, samples: int) -> dict[str, float]:
@@ -385,7 +388,12 @@ class CyclesPasses:
                     yield name, pixels
 
     def _read_guides(
-        self, view: str, full: bool, denoised: bool, seconds: dict[str, float]
+        self,
+        view: str,
+        full: bool,
+        denoised: bool,
+        samples: int,
+        seconds: dict[str, float],
     ) -> Guides:
         albedo, normal = self._read(ALBEDO, view), self._read(NORMAL, view)
         assert albedo is not None
@@ -398,5 +406,6 @@ class CyclesPasses:
             radiance[..., 3].copy(),
             None if depth is None else depth[..., 0],
             radiance[..., :3].copy() if full else None,
+            samples,
             seconds,
         )

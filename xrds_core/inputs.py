@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import torch
 
-from .errors import PictureError
+from .errors import PictureError, UsageError
 from .front_end import clean_radiance, fill_holes, pad_guide, transfer
+from .guide_filter import FEW_SAMPLES
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -37,6 +38,8 @@ class Inputs:
     guide_alpha: Picture | None
     """(H, W)"""
     bad_pixels: int
+    has_noisy_guides: bool
+    """Albedo and normal are of few samples."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -104,11 +107,15 @@ def check(
     guide_radiance: Any = None,
     guide_alpha: Any = None,
     noisy: Any = None,
+    guide_samples: int | None = None,
 ) -> Inputs:
     """Return the arrays, cleaned; float32 ones without a fault are not copied.
 
-    Raises PictureError, with the sizes and the remedy, for arrays that do not fit.
+    Raises PictureError, with the sizes and the remedy, for arrays that do not fit, and
+    UsageError for guides of less than a sample.
     """
+    if guide_samples is not None and guide_samples < 1:
+        raise UsageError(f"guide_samples is {guide_samples}; it must be 1 or more")
     low = _array("radiance", radiance, (3, 4))
     guides = {
         "albedo": _array("albedo", albedo, (3,)),
@@ -141,6 +148,7 @@ def check(
         light,
         None if cover is None else cover[..., 0],
         bad_pixels,
+        guide_samples is not None and guide_samples < FEW_SAMPLES,
     )
 
 

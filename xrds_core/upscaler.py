@@ -17,13 +17,16 @@ from .cost import Cost, measure
 from .devices import choose_device, choose_precision, free_memory, is_out_of_memory
 from .errors import OutOfMemory, PictureError, UsageError, WeightsError
 from .front_end import EXPOSURE_RANGE, auto_exposure, inverse_transfer
+from .guide_filter import filter_guides
 from .idle import busy_area, write_base
 from .inputs import Inputs, check
 from .network import XRDS
 from .progress import Callback, Progress, watched
-from .weights import load, load_preset
+from .weights import load, load_guide_filter, load_preset
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from .front_end import Picture
     from .idle import Area
 
@@ -63,7 +66,8 @@ class Upscaler:
         device: ``auto``, or what torch knows: ``cpu``, ``cuda``, ``cuda:1``, ``mps``.
         precision: ``auto``, ``fp32`` or ``bf16``; only the layers of the network
             ever run in bf16.
-        weights: a folder of presets, a file, or a network, in place of the shipped.
+        weights: a folder of presets, a file, or a network, in place of the shipped;
+            a filter of guides in the folder, too, takes the place of the shipped.
 
     Raises:
         WeightsError: the weights are missing, damaged or of another scale.
@@ -82,6 +86,8 @@ class Upscaler:
         self.device = choose_device(device)
         self.precision = choose_precision(precision, self.device)
         self.network = _network(preset, scale, guides, weights).to(self.device)
+        folder = None if isinstance(weights, XRDS) else weights
+        self.guide_filter = load_guide_filter(folder).to(self.device)
         self._cost: Cost | None = None
 
     @property
@@ -105,6 +111,7 @@ class Upscaler:
         noisy: Picture | None = None,
         guide_radiance: Picture | None = None,
         guide_alpha: Picture | None = None,
+        guide_samples: int | None = None,
         exposure: float | None = None,
         memory_limit: int | None = None,
         tile: int | None = None,
@@ -122,6 +129,8 @@ class Upscaler:
             guide_radiance: (H, W, 3), for ``full`` guides and only for them.
             guide_alpha: (H, W), the alpha of the guides' render; in place of the
                 picture's own, too, where ``radiance`` has none.
+            guide_samples: per pixel of albedo and normal; the noise of a few of them
+                is filtered out first. None where they are many, or not known.
             exposure: of a picture this is a part of; None finds it in ``radiance``.
             memory_limit: bytes to aim at, beside the arrays given and returned. The
                 smallest tiles are taken where it is too small even for them.
@@ -134,7 +143,14 @@ class Upscaler:
             Cancelled: ``progress`` returned False.
         """
         inputs = check(
-            self.scale, radiance, albedo, normal, guide_radiance, guide_alpha, noisy
+            self.scale,
+            radiance,
+            albedo,
+            normal,
+            guide_radiance,
+            guide_alpha,
+            noisy,
+            guide_samples,
         )
         self._check_guides(inputs)
         exposure = _exposure(exposure, inputs)
@@ -260,16 +276,15 @@ class Upscaler:
         """Return the radiance of one tile, (scale height, scale width, 3)."""
         bf16 = self.precision == torch.bfloat16
         try:
-            with (
-                torch.inference_mode(),
-                torch.autocast(self.device.type, torch.bfloat16, enabled=bf16),
-            ):
+            with torch.inference_mode():
+                guides = self._guides(inputs, tile, exposure)
                 noisy = inputs.noisy_tensor(tile, exposure)
-                t = self.network(
-                    inputs.radiance_tensor(tile, exposure).to(self.device),
-                    inputs.guide_tensor(tile, exposure).to(self.device),
-                    None if noisy is None else noisy.to(self.device),
-                )
+                with torch.autocast(self.device.type, torch.bfloat16, enabled=bf16):
+                    t = self.network(
+                        inputs.radiance_tensor(tile, exposure).to(self.device),
+                        guides,
+                        None if noisy is None else noisy.to(self.device),
+                    )
                 result = inverse_transfer(t, exposure).clamp_(min=0.0)
         except (RuntimeError, MemoryError) as error:
             if not is_out_of_memory(error):
@@ -281,6 +296,13 @@ class Upscaler:
             ) from error
         array: Picture = result[0].permute(1, 2, 0).cpu().numpy()
         return array
+
+    def _guides(self, inputs: Inputs, tile: tiling.Tile, exposure: float) -> Tensor:
+        """Return the guides of a tile, without the noise of few samples."""
+        guides = inputs.guide_tensor(tile, exposure).to(self.device)
+        if not inputs.has_noisy_guides:
+            return guides
+        return filter_guides(self.guide_filter, guides)
 
 
 def _largest(plan: list[tiling.Tile]) -> int:
@@ -329,6 +351,7 @@ def upscale(
     noisy: Picture | None = None,
     guide_radiance: Picture | None = None,
     alpha: Picture | None = None,
+    guide_samples: int | None = None,
     exposure: float | None = None,
     device: str = "auto",
     memory_limit: int | None = None,
@@ -350,6 +373,7 @@ def upscale(
         noisy=noisy,
         guide_radiance=guide_radiance,
         guide_alpha=alpha,
+        guide_samples=guide_samples,
         exposure=exposure,
         memory_limit=memory_limit,
         progress=progress,

@@ -2,7 +2,8 @@
 
 A file holds the tensors of one `XRDS` in half precision and, in its metadata, the
 network's configuration as JSON under ``config`` beside whatever else was recorded
-(preset, blender_series, training set, licence), all strings.
+(preset, blender_series, training set, licence), all strings. The filter of guides of
+few samples has a file of its own, for it serves every network.
 """
 
 from __future__ import annotations
@@ -16,13 +17,15 @@ from typing import Any
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as serialize
-from torch import Tensor
+from torch import Tensor, nn
 
 from .atomic import replacing
 from .errors import WeightsError
+from .guide_filter import FILE_NAME, GuideFilter
 from .network import PRESETS, XRDS, NetworkConfig
 
 DIRECTORY = Path(__file__).with_name("weights")
+GUIDE_FILTER = DIRECTORY / FILE_NAME
 
 _LARGEST_SETTING = 4096  # far above any real width or count; bounds hostile files
 
@@ -38,13 +41,23 @@ def save(network: XRDS, path: str | Path, metadata: dict[str, str]) -> None:
 
     Raises WeightsError if a weight does not fit half precision.
     """
-    tensors = {k: v.detach().cpu().half() for k, v in network.state_dict().items()}
+    _write(network, path, {**metadata, "config": json.dumps(network.config.to_dict())})
+
+
+def save_guide_filter(
+    guide_filter: GuideFilter, path: str | Path, metadata: dict[str, str]
+) -> None:
+    """Write a filter and ``metadata``, as `save` does a network."""
+    _write(guide_filter, path, metadata)
+
+
+def _write(module: nn.Module, path: str | Path, record: dict[str, str]) -> None:
+    tensors = {k: v.detach().cpu().half() for k, v in module.state_dict().items()}
     bad = [name for name, tensor in tensors.items() if not tensor.isfinite().all()]
     if bad:
         raise WeightsError(
             f"{bad[0]} is not finite in half precision; the training has diverged"
         )
-    record = {**metadata, "config": json.dumps(network.config.to_dict())}
     with replacing(Path(path)) as unfinished:
         unfinished.write_bytes(serialize(tensors, record))
 
@@ -62,6 +75,26 @@ def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:
     network = XRDS(config)
     network.load_state_dict({name: x.float() for name, x in tensors.items()})
     return network.eval().requires_grad_(False), metadata
+
+
+def guide_filter_file(directory: str | Path | None = None) -> Path:
+    """Return the file of ``directory``'s filter, or of the shipped one without."""
+    own = None if directory is None else Path(directory) / FILE_NAME
+    return own if own is not None and own.is_file() else GUIDE_FILTER
+
+
+def load_guide_filter(directory: str | Path | None = None) -> GuideFilter:
+    """Return the filter of ``directory``, or the shipped one if there is none in it.
+
+    Raises WeightsError if the file is missing or damaged.
+    """
+    path = guide_filter_file(directory)
+    tensors, _ = _read(path)
+    guide_filter = GuideFilter()
+    shapes = {k: v.shape for k, v in guide_filter.state_dict().items()}
+    _compare(path, shapes, tensors)
+    guide_filter.load_state_dict({name: x.float() for name, x in tensors.items()})
+    return guide_filter.eval().requires_grad_(False)
 
 
 def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:

@@ -71,7 +71,7 @@ def test_what_moves_makes_them_anew_and_back_again_does_not() -> None:
     np.testing.assert_array_equal(shot(scene, seed=1).albedo, pictures[2].albedo)
 
 
-def test_samples_add_up_to_the_limit() -> None:
+def test_samples_add_up_to_the_limit(network: Any) -> None:
     scene = traps.trap("texture", 48, 36)
     pictures = [shot(scene, seed=1, guide_limit=6) for _ in range(4)]
     assert [told(p) for p in pictures] == [
@@ -80,6 +80,9 @@ def test_samples_add_up_to_the_limit() -> None:
         "added up to 6 samples",
         "used 6 samples",
     ]
+    # those of the cache decide whether their noise is filtered
+    told_samples = [call["guide_samples"] for made in network for call in made.calls]
+    assert told_samples == [2, 4, 6, 6]
     keep = ("guide cache",)
     clean = render(scene, 2, samples=1, guide_samples=64, seed=9, keep=keep).albedo
     noise = [np.abs(p.albedo - clean).mean() for p in pictures]

@@ -120,6 +120,7 @@ class Contenders:
                 *guides,
                 noisy=inputs.noisy,
                 guide_radiance=inputs.guide_radiance,
+                guide_samples=self.settings.guide_samples,
             ).radiance[..., :3]
         for name, enlarge in ENLARGEMENTS.items():
             result[name] = enlarge(inputs.radiance, inputs.noisy, *guides, case.scale)

@@ -81,9 +81,17 @@ class FrameSeconds:
         upscaler = self.contenders.upscaler(case)
         if upscaler is not None:
             extra = guide if case.guides == "full" else None
+            samples = self.contenders.settings.guide_samples
             self.times.add(
                 self._network_name(case),
-                lambda: upscaler(low, guide, guide, noisy=low, guide_radiance=extra),
+                lambda: upscaler(
+                    low,
+                    guide,
+                    guide,
+                    noisy=low,
+                    guide_radiance=extra,
+                    guide_samples=samples,
+                ),
                 warm=True,
             )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import json
 from functools import lru_cache
@@ -46,6 +47,13 @@ class Networks:
     def digest(self, network: tuple[str, int, str]) -> str:
         """Of the weights file."""
         return str(self.records[network]["sha256"])[:12]
+
+    def filter_digest(self) -> str:
+        """Of the filter of guides of few samples."""
+        from xrds_core.weights import guide_filter_file
+
+        data = guide_filter_file(self.weights).read_bytes()
+        return hashlib.sha256(data).hexdigest()[:12]
 
     def __getitem__(self, network: tuple[str, int, str]) -> Any:
         if network not in self._loaded:
@@ -151,6 +159,7 @@ class Pictures:
             radiance,
             albedo,
             front_end.clean_normal(guide[0]["normal"])[0],
+            guide_samples=config.guide_samples,
             **light,
         )
         return np.asarray(picture.radiance[..., :3])
@@ -179,7 +188,10 @@ class Pictures:
         if config.method != "xrds":
             return config.key
         network = config.preset, config.scale, config.guides
-        return f"{config.key}-{self.networks.digest(network)}"
+        key = f"{config.key}-{self.networks.digest(network)}"
+        if config.has_noisy_guides:
+            key += f"-{self.networks.filter_digest()}"
+        return key
 
     def errors(self, config: Config) -> dict[str, float]:
         """Error measures, computed once for these weights."""

@@ -149,7 +149,8 @@ def network_name(config: Config) -> str:
     if config.method != "xrds":
         return f"{config.method} x{config.scale}"
     full = " full" if config.guides == "full" else ""
-    return f"XRDS {config.preset}{full} x{config.scale}"
+    few = ", guides of few samples" if config.has_noisy_guides else ""
+    return f"XRDS {config.preset}{full} x{config.scale}{few}"
 
 
 class Stopwatch:

@@ -57,6 +57,13 @@ class Config:
         """Unlike that of every other configuration; in file names and journals."""
         return "_".join(str(value) for value in asdict(self).values() if value != "")
 
+    @property
+    def has_noisy_guides(self) -> bool:
+        """Whether the noise of its guides is filtered before the network sees them."""
+        from xrds_core.guide_filter import FEW_SAMPLES
+
+        return self.method == "xrds" and 0 < self.guide_samples < FEW_SAMPLES
+
     def beauty(self) -> Request:
         """The render that the picture's light comes from."""
         kind = "plain" if self.scale == 1 else "low"

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from xrds_core.guide_filter import FEW_SAMPLES
+
 from ..budget import DEFAULT_DENOISER
 from ..job import RenderJob
 from .contenders import ENLARGEMENTS
@@ -36,8 +38,10 @@ def tasks(shot: Shot, sweep: Sweep, networks: Networks) -> dict[str, Task]:
             found[name] = _baseline(ENLARGEMENTS[method], window, scale)
     for network in sweep.networks:
         preset, scale, guides = network
-        name = network_name(Config("xrds", 1, "", scale, preset, guides))
-        found[name] = _network(networks, network, window)
+        for samples in (1, FEW_SAMPLES):
+            config = Config("xrds", 1, "", scale, preset, guides, samples)
+            task = _network(networks, network, window, samples)
+            found[network_name(config)] = task
     found[PLAIN_FRAME] = lambda: frame(shot, plain_job())[1]
     if sweep.networks:
         job = _quick_job(networks, sweep.networks[0])
@@ -85,7 +89,9 @@ def _baseline(enlarge: Enlargement, window: Window, scale: int) -> Task:
     return task
 
 
-def _network(networks: Networks, network: tuple[str, int, str], window: Window) -> Task:
+def _network(
+    networks: Networks, network: tuple[str, int, str], window: Window, samples: int
+) -> Task:
     """Loading shows apart, as `load`; the first run of a process is thrown away."""
     warm: list[bool] = []
 
@@ -95,7 +101,9 @@ def _network(networks: Networks, network: tuple[str, int, str], window: Window) 
         extra = full if network[2] == "full" else None
 
         def run() -> Any:
-            return upscaler(low, full, full, guide_radiance=extra)
+            return upscaler(
+                low, full, full, guide_radiance=extra, guide_samples=samples
+            )
 
         if not warm:
             warm.append(bool(run()))

@@ -82,18 +82,28 @@ def read_window(path: Path, scale: int, guides: str) -> Window:
         PictureError: the file is damaged or was rendered without that scale.
     """
     low, high = array_names(scale, guides)
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in low + high}
-            meta = json.loads(str(file["meta"]))
-    except DAMAGED as error:
-        raise PictureError(
-            f"{path} is no training window for scale {scale}, {guides} guides: "
-            f"{str(error)[:200]}"
-        ) from error
+    arrays, meta = read_arrays(path, low + high, f"scale {scale}, {guides} guides")
     clean = {name: clean_radiance(arrays[name].astype(np.float32))[0] for name in low}
     exposures = {name: auto_exposure(picture) for name, picture in clean.items()}
     return Window(path, arrays, exposures, meta)
+
+
+def read_arrays(
+    path: Path, names: Sequence[str], use: str
+) -> tuple[dict[str, NDArray[np.float16]], dict[str, Any]]:
+    """Some arrays of a window, and its metadata; `use` is what they are for.
+
+    Raises:
+        PictureError: the file is damaged or lacks one of them.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            arrays = {name: file[name] for name in names}
+            return arrays, json.loads(str(file["meta"]))
+    except DAMAGED as error:
+        raise PictureError(
+            f"{path} is no training window for {use}: {str(error)[:200]}"
+        ) from error
 
 
 def holds(path: Path, names: Sequence[str]) -> bool:
