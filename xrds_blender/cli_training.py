@@ -92,7 +92,11 @@ def add_ablate(commands: Any) -> argparse.ArgumentParser:
     )
     add = command.add_argument
     add("config", type=Path, metavar="CONFIG.toml")
-    add("--table", required=True, help="base, guides, blocks, rival, loss, input")
+    add(
+        "--table",
+        required=True,
+        help="base, guides, blocks, rival, loss, input, variation",
+    )
     add("--out", type=Path, required=True, help="folder of TABLE.json and its runs")
     add("--seeds", type=arguments.positive, default=3, help="runs of each variant")
     _add_changes(command)

@@ -65,6 +65,12 @@ TABLES: dict[str, dict[str, Changes]] = {
         "noisy": ("variation.noisy = 1.0",),
         "both": ("variation.noisy = 0.0", "variation.denoised_only = 0.0"),
     },
+    "variation": {
+        "as configured": (),
+        "nothing lit anew": ("variation.shaded = 0.0",),
+        "no tints": ("variation.tint_stops = 0.0",),
+        "no symmetries": ("variation.symmetries = false",),
+    },
 }
 
 
