@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 ROUNDS = 3
 PLAIN_FRAME, XRDS_FRAME = "whole frame, plain", "whole frame, XRDS"
+GUIDE_FILTER = "filter of guides of few samples"
 STAGES = ("sync", "beauty", "denoise", "guides", "network", "other")
 
 
@@ -116,6 +117,8 @@ class StageTimes:
             stages["guides"] = self._line(guide[0], key)
         if not plain:
             stages["network"] = self.median(network_name(config), key)
+        if config.has_noisy_guides:
+            stages["network"] += self.median(GUIDE_FILTER, key)
         return stages
 
     def line(
@@ -149,8 +152,7 @@ def network_name(config: Config) -> str:
     if config.method != "xrds":
         return f"{config.method} x{config.scale}"
     full = " full" if config.guides == "full" else ""
-    few = ", guides of few samples" if config.has_noisy_guides else ""
-    return f"XRDS {config.preset}{full} x{config.scale}{few}"
+    return f"XRDS {config.preset}{full} x{config.scale}"
 
 
 class Stopwatch:

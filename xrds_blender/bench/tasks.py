@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_core.guide_filter import FEW_SAMPLES
-
 from ..budget import DEFAULT_DENOISER
 from ..job import RenderJob
 from .contenders import ENLARGEMENTS
 from .inputs import open_scene
-from .stages import PLAIN_FRAME, XRDS_FRAME, clocked, network_name
+from .stages import GUIDE_FILTER, PLAIN_FRAME, XRDS_FRAME, clocked, network_name
 from .sweep import Config
 
 if TYPE_CHECKING:
@@ -38,12 +36,11 @@ def tasks(shot: Shot, sweep: Sweep, networks: Networks) -> dict[str, Task]:
             found[name] = _baseline(ENLARGEMENTS[method], window, scale)
     for network in sweep.networks:
         preset, scale, guides = network
-        for samples in (1, FEW_SAMPLES):
-            config = Config("xrds", 1, "", scale, preset, guides, samples)
-            task = _network(networks, network, window, samples)
-            found[network_name(config)] = task
+        name = network_name(Config("xrds", 1, "", scale, preset, guides))
+        found[name] = _network(networks, network, window)
     found[PLAIN_FRAME] = lambda: frame(shot, plain_job())[1]
     if sweep.networks:
+        found[GUIDE_FILTER] = _guide_filter(networks, sweep.networks[0], window)
         job = _quick_job(networks, sweep.networks[0])
         found[XRDS_FRAME] = lambda: frame(shot, job)[1]
     return found
@@ -89,9 +86,30 @@ def _baseline(enlarge: Enlargement, window: Window, scale: int) -> Task:
     return task
 
 
-def _network(
-    networks: Networks, network: tuple[str, int, str], window: Window, samples: int
+def _guide_filter(
+    networks: Networks, network: tuple[str, int, str], window: Window
 ) -> Task:
+    """Of a whole frame; the same whatever the network."""
+    import torch
+
+    from xrds_core.guide_filter import filter_guides
+
+    def task() -> Run:
+        upscaler, (_, full) = networks[network], noise(window, network[1])
+        guides = torch.from_numpy(np.concatenate((full, full), axis=-1))
+        guides = guides.permute(2, 0, 1)[None].contiguous().to(upscaler.device)
+
+        def run() -> None:
+            with torch.inference_mode():
+                filter_guides(upscaler.guide_filter, guides)
+
+        run()
+        return clocked(run)
+
+    return task
+
+
+def _network(networks: Networks, network: tuple[str, int, str], window: Window) -> Task:
     """Loading shows apart, as `load`; the first run of a process is thrown away."""
     warm: list[bool] = []
 
@@ -101,9 +119,7 @@ def _network(
         extra = full if network[2] == "full" else None
 
         def run() -> Any:
-            return upscaler(
-                low, full, full, guide_radiance=extra, guide_samples=samples
-            )
+            return upscaler(low, full, full, guide_radiance=extra)
 
         if not warm:
             warm.append(bool(run()))
