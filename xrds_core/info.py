@@ -20,7 +20,7 @@ from .network import (
     WindowCrossAttention,
     preset_config,
 )
-from .weights import available
+from .weights import available, guide_filter_record
 
 PAPER_ROWS = ((5, 3), (3, 3), (1, 3), (5, 2), (5, 1))  # RDST per XDG, XDG: table 5
 PAPER_OUTPUT = 1024  # pixels along each side of the picture the paper counts for
@@ -169,6 +169,7 @@ def info(
         "paper_table": paper_table(),
         "presets": preset_costs(),
         "weights": available(weights),
+        "guide_filter": guide_filter_record(weights),
     }
 
 
@@ -200,3 +201,5 @@ def lines(told: dict[str, Any]) -> Iterator[str]:
             f"  {record['file']}  Blender {record['blender_series']}"
             f"  sha256 {record['sha256'][:16]}"
         )
+    record = told["guide_filter"]
+    yield f"guide filter: {record['file']}  sha256 {record['sha256'][:16]}"

@@ -77,7 +77,13 @@ def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:
     return network.eval().requires_grad_(False), metadata
 
 
-def guide_filter_file(directory: str | Path | None = None) -> Path:
+def guide_filter_record(directory: str | Path | None = None) -> dict[str, str]:
+    """Return {file, sha256} of the filter that ``directory``'s networks go with."""
+    path = _guide_filter_file(directory)
+    return {"file": path.name, "sha256": _digest(path)}
+
+
+def _guide_filter_file(directory: str | Path | None) -> Path:
     """Return the file of ``directory``'s filter, or of the shipped one without."""
     own = None if directory is None else Path(directory) / FILE_NAME
     return own if own is not None and own.is_file() else GUIDE_FILTER
@@ -88,7 +94,7 @@ def load_guide_filter(directory: str | Path | None = None) -> GuideFilter:
 
     Raises WeightsError if the file is missing or damaged.
     """
-    path = guide_filter_file(directory)
+    path = _guide_filter_file(directory)
     tensors, _ = _read(path)
     guide_filter = GuideFilter()
     shapes = {k: v.shape for k, v in guide_filter.state_dict().items()}
@@ -199,6 +205,10 @@ def _record(path: Path) -> dict[str, Any]:
         "scale": config.scale,
         "guides": config.guides,
         "file": path.name,
-        "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        "sha256": _digest(path),
         "blender_series": metadata.get("blender_series"),
     }
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -15,7 +15,11 @@ from xrds_core.exr_upscale import upscale_file
 from xrds_core.guide_filter import FEW_SAMPLES, STRENGTH, GuideFilter, filter_guides
 from xrds_core.network import XRDS, preset_config
 from xrds_core.upscaler import Upscaler
-from xrds_core.weights import load_guide_filter, save_guide_filter
+from xrds_core.weights import (
+    guide_filter_record,
+    load_guide_filter,
+    save_guide_filter,
+)
 
 
 @pytest.fixture(scope="module")
@@ -175,6 +179,8 @@ def test_a_folder_may_bring_its_own(tmp_path: Path) -> None:
     assert all(
         torch.equal(found[k], v.half().float()) for k, v in own.state_dict().items()
     )
+    assert guide_filter_record(tmp_path) != guide_filter_record()
+    assert guide_filter_record(tmp_path / "without") == guide_filter_record()
     other = load_guide_filter(tmp_path / "without").state_dict()
     assert not all(torch.equal(found[k], v) for k, v in other.items())
 

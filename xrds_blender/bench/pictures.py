@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
 import json
 from functools import lru_cache
@@ -50,10 +49,9 @@ class Networks:
 
     def filter_digest(self) -> str:
         """Of the filter of guides of few samples."""
-        from xrds_core.weights import guide_filter_file
+        from xrds_core.weights import guide_filter_record
 
-        data = guide_filter_file(self.weights).read_bytes()
-        return hashlib.sha256(data).hexdigest()[:12]
+        return guide_filter_record(self.weights)["sha256"][:12]
 
     def __getitem__(self, network: tuple[str, int, str]) -> Any:
         if network not in self._loaded:
