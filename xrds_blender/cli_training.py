@@ -95,7 +95,7 @@ def add_ablate(commands: Any) -> argparse.ArgumentParser:
     add(
         "--table",
         required=True,
-        help="base, guides, blocks, rival, loss, input, variation",
+        help="base, guides, blocks, depth, rival, loss, input, variation",
     )
     add("--out", type=Path, required=True, help="folder of TABLE.json and its runs")
     add("--seeds", type=arguments.positive, default=3, help="runs of each variant")
@@ -112,7 +112,7 @@ def add_train_filter(commands: Any) -> argparse.ArgumentParser:
     add = command.add_argument
     add("data", type=Path, nargs="+", metavar="DATASET", help="folders of `dataset`")
     add("--out", type=Path, required=True, metavar="guide_filter.safetensors")
-    add("--steps", type=arguments.positive, default=8000)
+    add("--steps", type=arguments.positive, default=10_000)
     add("--seed", type=int, default=0)
     told = "xrds_core.training.guide_filter"
     command.set_defaults(work=_train_filter, lines=lines_of(told))

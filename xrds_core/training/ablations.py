@@ -44,6 +44,11 @@ TABLES: dict[str, dict[str, Changes]] = {
         "RDST": (NO_BASE, NO_XM),
         "RDST and XM": (NO_BASE,),
     },
+    "depth": {
+        "one XDG of one RDST": (NO_BASE,),
+        "one XDG of two": (NO_BASE, "network.blocks = 2"),
+        "two XDGs of one": (NO_BASE, "network.groups = 2"),
+    },
     "rival": {
         "SwinIR's blocks without guides": (
             NO_BASE,

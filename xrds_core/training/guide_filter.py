@@ -28,7 +28,7 @@ from .interruption import Interruption
 from .windows import find_windows, paths_of, read_arrays
 
 RENDERS = ("guides_a", "guides_b")
-STEPS = 8000
+STEPS = 10_000
 BATCH, CROP = 8, 64
 LEARNING_RATE, FINAL_LEARNING_RATE = 2e-3, 1e-5
 ALBEDO_FLOOR = 0.1  # squared errors of albedo are relative to it, above this
