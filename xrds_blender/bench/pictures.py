@@ -42,16 +42,11 @@ class Networks:
             (record["preset"], record["scale"], record["guides"]): record
             for record in files.available(weights)
         }
+        self.filter_digest = files.guide_filter_record(weights)["sha256"][:12]
 
     def digest(self, network: tuple[str, int, str]) -> str:
         """Of the weights file."""
         return str(self.records[network]["sha256"])[:12]
-
-    def filter_digest(self) -> str:
-        """Of the filter of guides of few samples."""
-        from xrds_core.weights import guide_filter_record
-
-        return guide_filter_record(self.weights)["sha256"][:12]
 
     def __getitem__(self, network: tuple[str, int, str]) -> Any:
         if network not in self._loaded:
@@ -188,7 +183,7 @@ class Pictures:
         network = config.preset, config.scale, config.guides
         key = f"{config.key}-{self.networks.digest(network)}"
         if config.has_noisy_guides:
-            key += f"-{self.networks.filter_digest()}"
+            key += f"-{self.networks.filter_digest}"
         return key
 
     def errors(self, config: Config) -> dict[str, float]:
