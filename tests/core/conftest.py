@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from xrds_core.training.config import TrainingConfig
 from xrds_core.training.data import Variation
@@ -15,6 +16,15 @@ from xrds_core.training.data import Variation
 SIZE = 32
 TINY = {"channels": 8, "guide_channels": 8, "window_size": 4, "tail_channels": 4}
 WriteWindow = Callable[..., None]
+
+
+@pytest.fixture
+def one_thread() -> Iterator[None]:
+    """Tiny layers are slower on several threads, by far where others compute too."""
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(threads)
 
 
 @pytest.fixture(scope="session")

@@ -22,6 +22,8 @@ from xrds_core.training.guide_filter import (
 )
 from xrds_core.weights import load_guide_filter
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 SIDE = 72
 
 
@@ -42,14 +44,6 @@ def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
         half = {name: x.astype(np.float16) for name, x in arrays.items()}
         np.savez_compressed(path, meta=meta, **half)
     return folder
-
-
-@pytest.fixture(autouse=True)
-def _one_thread() -> Any:
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(threads)
 
 
 def weights_of(path: Path) -> list[torch.Tensor]:

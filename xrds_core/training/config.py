@@ -83,8 +83,12 @@ class TrainingConfig:
         if step < self.warmup:
             return self.learning_rate * (step + 1) / self.warmup
         done = (step - self.warmup) / max(1, self.steps - self.warmup)
-        span = self.learning_rate - self.final_learning_rate
-        return self.final_learning_rate + span * (1 + math.cos(math.pi * done)) / 2
+        return cosine(self.learning_rate, self.final_learning_rate, done)
+
+
+def cosine(first: float, last: float, done: float) -> float:
+    """From the first to the last along half a wave, as `done` goes from 0 to 1."""
+    return last + (first - last) * (1 + math.cos(math.pi * done)) / 2
 
 
 def read_config(path: Path, changes: Sequence[str] = ()) -> TrainingConfig:

@@ -24,6 +24,7 @@ from ..errors import Cancelled, UsageError, WeightsError
 from ..front_end import clean_albedo, clean_normal
 from ..guide_filter import FEW_SAMPLES, GuideFilter
 from ..weights import save_guide_filter
+from .config import cosine
 from .interruption import Interruption
 from .windows import find_windows, paths_of, read_arrays
 
@@ -165,8 +166,7 @@ class Learner:
 
     def learning_rate(self) -> float:
         """Of the next step: falls along a cosine."""
-        part = (1 + math.cos(math.pi * self.step / self.steps)) / 2
-        return FINAL_LEARNING_RATE + part * (LEARNING_RATE - FINAL_LEARNING_RATE)
+        return cosine(LEARNING_RATE, FINAL_LEARNING_RATE, self.step / self.steps)
 
     def keep(self) -> None:
         """Write the checkpoint."""
