@@ -13,10 +13,10 @@ SUITES ?= trixie sid
 
 install: $(STAMP)
 
-$(STAMP): pyproject.toml
+$(STAMP): pyproject.toml xrds_lab/pyproject.toml
 	test -x $(RUN) || $(PYTHON) -m venv $(VENV)
 	$(RUN) -m pip install --quiet "torch==$(TORCH)"
-	$(RUN) -m pip install --quiet --editable ".[blender,dev]" "bpy==$(BPY)"
+	$(RUN) -m pip install --quiet --editable ".[blender,dev]" --editable ./xrds_lab "bpy==$(BPY)"
 	rm -f $(VENV)/.installed-*
 	touch $@
 
@@ -34,11 +34,11 @@ test-app: install
 	$(RUN) -m pytest tests/app -s -rs
 
 demo: install
-	$(RUN) -m xrds_blender.studio.demo --out demo
+	$(RUN) -m xrds_lab.demo --out demo
 
 extension: install
 	$(RUN) extension/build.py --out dist --torch $(TORCH) --platform $(PLATFORMS)
 
 clean:
 	rm -rf build dist demo *.egg-info .pytest_cache .mypy_cache .ruff_cache
-	find xrds_core xrds_blender tests -name __pycache__ -prune -exec rm -rf {} +
+	find xrds_core xrds_blender xrds_lab tests -name __pycache__ -prune -exec rm -rf {} +

@@ -22,8 +22,6 @@ ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = "blender_manifest.toml"
 PROJECT_FILES = ("pyproject.toml", "README.md", "LICENSE")
 PACKAGES = ("xrds_core", "xrds_blender")
-# They serve the making of XRDS, not rendering with it.
-LEFT_OUT = ("training", "studio", "bench", "__pycache__")
 SIZE_LIMIT = 300_000_000  # bytes; what the extension platform means to take
 # Python inside Blender, and the Blenders that have it: from, to (not included).
 PYTHONS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
@@ -57,7 +55,7 @@ def own_wheel(folder: Path) -> Path:
     for name in PROJECT_FILES:
         shutil.copy(ROOT / name, source)
     for name in PACKAGES:
-        ignored = shutil.ignore_patterns(*LEFT_OUT)
+        ignored = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
     options = ["--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]
     _run("-m", "pip", "wheel", *options, str(folder), str(source))

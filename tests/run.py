@@ -1,8 +1,8 @@
-"""Run every test: core ones together, each Blender module in its own process.
+"""Run every test: core ones together, every other module in its own process.
 
 A process that rendered with the bpy module can hang when it ends, so each module of
-tests/blender gets its own process, which leaves with pytest's exit status and without
-an interpreter's end. That status is the verdict; the JUnit file only counts.
+tests/blender and tests/lab gets its own process, which leaves with pytest's exit status
+and without an interpreter's end. That status is the verdict; the JUnit file counts.
 """
 
 from __future__ import annotations
@@ -78,13 +78,14 @@ def run(name: str, paths: list[Path], options: list[str]) -> Verdict:
 
 
 def batches() -> list[tuple[str, list[Path]]]:
-    """Name and files of every pytest process: one for all that needs no Blender."""
-    blender = sorted((TESTS / "blender").glob("test_*.py"))
-    # tests/app needs a Blender program and half an hour: make test-app.
-    app = set((TESTS / "app").glob("test_*.py"))
-    plain = [p for p in TESTS.rglob("test_*.py") if p not in {*blender, *app}]
-    found = [("core", sorted(plain))] if plain else []
-    return found + [(f"blender/{path.stem}", [path]) for path in blender]
+    """Name and files of every pytest process: one for all that needs no Blender.
+
+    tests/app is not among them: it needs a Blender program and half an hour.
+    """
+    core = [*TESTS.glob("test_*.py"), *(TESTS / "core").glob("test_*.py")]
+    alone = [p for name in ("blender", "lab") for p in (TESTS / name).glob("test_*.py")]
+    found = [("core", sorted(core))]
+    return found + [(f"{p.parent.name}/{p.stem}", [p]) for p in sorted(alone)]
 
 
 def closing_line(verdicts: list[Verdict]) -> str:

@@ -5,15 +5,29 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("xrds_core", "xrds_blender")
-# What the extension leaves out; nothing that it holds may import these.
-OUTSIDE = ("xrds_core.training", "xrds_blender.studio", "xrds_blender.bench")
+PACKAGES = ("xrds_core", "xrds_blender", "xrds_lab")
+SHIPPED = ("xrds_core", "xrds_blender")
+# Every folder may import those below it, and itself. Imports inside functions and those
+# for type checkers count as well.
+ORDER = (
+    "xrds_lab",
+    "xrds_blender",
+    "xrds_blender.command",
+    "xrds_blender.interface",
+    "xrds_blender.shot",
+    "xrds_blender.frame",
+    "xrds_blender.cycles",
+    "xrds_blender.scene",
+    "xrds_blender.planning",
+    "xrds_core",
+)
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}
 SOURCES = sorted(path for name in PACKAGES for path in (ROOT / name).rglob("*.py"))
 
@@ -21,6 +35,9 @@ SOURCES = sorted(path for name in PACKAGES for path in (ROOT / name).rglob("*.py
 def module_name(path: Path) -> str:
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {module_name(path): path for path in SOURCES}
 
 
 def resolved(node: ast.ImportFrom, path: Path) -> str:
@@ -34,53 +51,82 @@ def resolved(node: ast.ImportFrom, path: Path) -> str:
     return ".".join([*package, node.module] if node.module else package)
 
 
-def imports(path: Path, tree: ast.AST | None = None) -> Iterator[str]:
-    """Absolute names of all that a file imports, `from a import b` as a and a.b."""
-    for node in ast.walk(tree or ast.parse(path.read_text())):
+def imports(path: Path) -> Iterator[str]:
+    """Absolute names of all that a file imports: `from a import b` is a.b, if a module.
+
+    `from a import b` of another kind is a.
+    """
+    for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
             base = resolved(node, path)
-            yield base
-            yield from (f"{base}.{alias.name}" for alias in node.names)
+            for alias in node.names:
+                name = f"{base}.{alias.name}"
+                yield name if name in MODULES else base
 
 
 def roots(path: Path) -> set[str]:
     return {name.split(".")[0] for name in imports(path)}
 
 
-def inside(name: str, packages: tuple[str, ...]) -> bool:
-    return any(name == p or name.startswith(p + ".") for p in packages)
+def folder(module: str) -> str:
+    """The entry of ORDER that a module lies in."""
+    return max((name for name in ORDER if inside(module, name)), key=len)
 
 
-CORE = [path for path in SOURCES if inside(module_name(path), ("xrds_core",))]
-COMMAND_LINE = ("xrds_blender.cli", "xrds_blender.cli_training")
-# The command line names every command and looks for its work only when asked.
-EXTENSION = [
-    path for path in SOURCES if not inside(module_name(path), (*OUTSIDE, *COMMAND_LINE))
-]
+def inside(name: str, package: str) -> bool:
+    return name == package or name.startswith(package + ".")
+
+
+def own_imports(module: str) -> set[str]:
+    """The project's modules that one of them imports."""
+    return {name for name in imports(MODULES[module]) if name in MODULES} - {module}
+
+
+def below(package: str) -> list[Path]:
+    return [path for name, path in MODULES.items() if inside(name, package)]
 
 
 def source(name: str) -> Path:
-    path = ROOT / name
-    if not path.exists():
-        pytest.skip(f"{name} is not written yet")
-    return path
+    return MODULES[name]
 
 
 def test_sources_are_found() -> None:
-    assert len(SOURCES) > 10
+    assert len(below("xrds_core")) > 20
+    assert len(below("xrds_blender")) > 40
+    assert len(below("xrds_lab")) > 60
 
 
-@pytest.mark.parametrize("path", CORE, ids=module_name)
-def test_core_knows_no_blender(path: Path) -> None:
-    assert not roots(path) & {"bpy", "mathutils", "xrds_blender"}
+def test_every_folder_has_its_place() -> None:
+    folders = {
+        f"xrds_blender.{path.name}"
+        for path in (ROOT / "xrds_blender").iterdir()
+        if (path / "__init__.py").is_file()
+    }
+    assert folders <= set(ORDER)
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_arrows_run_down(module: str) -> None:
+    place = ORDER.index(folder(module))
+    upward = {n for n in own_imports(module) if ORDER.index(folder(n)) < place}
+    assert not upward
+
+
+def test_no_circles() -> None:
+    """Modules are taken away when all that they import has gone; none may stay."""
+    left = {module: own_imports(module) for module in MODULES}
+    while free := [module for module, needed in left.items() if not needed & set(left)]:
+        for module in free:
+            del left[module]
+    assert not left
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=module_name)
 def test_imports_inside_a_package_are_relative(path: Path) -> None:
     own = module_name(path).split(".")[0]
-    told = [
+    absolute = [
         node
         for node in ast.walk(ast.parse(path.read_text()))
         if (
@@ -93,47 +139,45 @@ def test_imports_inside_a_package_are_relative(path: Path) -> None:
             and any(alias.name.split(".")[0] == own for alias in node.names)
         )
     ]
-    assert not told
+    assert not absolute
 
 
-@pytest.mark.parametrize("path", EXTENSION, ids=module_name)
-def test_extension_imports_nothing_it_leaves_out(path: Path) -> None:
-    assert not [found for found in imports(path) if inside(found, OUTSIDE)]
+@pytest.mark.parametrize("path", below("xrds_core"), ids=module_name)
+def test_core_knows_no_blender(path: Path) -> None:
+    assert not roots(path) & {"bpy", "mathutils"}
 
 
-@pytest.mark.parametrize("name", COMMAND_LINE)
-def test_command_line_imports_the_rest_only_when_asked(name: str) -> None:
-    path = source(f"{name.replace('.', '/')}.py")
-    top = ast.Module(
-        body=[n for n in ast.parse(path.read_text()).body if not is_function(n)],
-        type_ignores=[],
-    )
-    assert not [found for found in imports(path, top) if inside(found, OUTSIDE)]
-
-
-def is_function(node: ast.stmt) -> bool:
-    return isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+@pytest.mark.parametrize("path", below("xrds_blender.planning"), ids=module_name)
+def test_planning_is_plain_python(path: Path) -> None:
+    assert not roots(path) & {"bpy", "torch", "numpy"}
 
 
 def test_network_is_torch_alone() -> None:
     allowed = {"torch", "__future__", "math", "dataclasses", "typing", "collections"}
-    assert roots(source("xrds_core/regression.py")) <= allowed
-    base = ("xrds_core.kernels", "xrds_core.regression")
+    assert roots(source("xrds_core.regression")) <= allowed
     for name in ("network", "kernels"):
-        path = source(f"xrds_core/{name}.py")
-        assert roots(path) <= allowed | {"xrds_core"}
-        own = {each for each in imports(path) if inside(each, ("xrds_core",))}
-        assert all(inside(each, base) for each in own)
+        module = f"xrds_core.{name}"
+        assert roots(source(module)) <= allowed | {"xrds_core"}
+        assert own_imports(module) <= {"xrds_core.kernels", "xrds_core.regression"}
 
 
-def test_plan_is_plain_python() -> None:
-    path = source("xrds_blender/plan.py")
-    assert not roots(path) & {"torch", "bpy"}
+def test_the_wheel_holds_core_and_add_on_alone() -> None:
+    """And the laboratory's own metadata name every one of its packages."""
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    assert told["packages"]["find"]["include"] == ["xrds_core*", "xrds_blender*"]
+    told = tomllib.loads((ROOT / "xrds_lab" / "pyproject.toml").read_text())
+    packages = {module_name(p) for p in below("xrds_lab") if p.stem == "__init__"}
+    assert set(told["tool"]["setuptools"]["packages"]) == packages
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=module_name)
 def test_no_vague_names(path: Path) -> None:
     assert not VAGUE & set(path.relative_to(ROOT).with_suffix("").parts)
+
+
+def test_the_add_on_s_top_is_its_front_alone() -> None:
+    files = [path for path in (ROOT / "xrds_blender").iterdir() if path.is_file()]
+    assert [path.name for path in files] == ["__init__.py"]
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -149,5 +193,5 @@ def test_importing_a_package_loads_no_torch(package: str) -> None:
 def test_files_and_functions_stay_small(path: Path) -> None:
     assert len(path.read_text().splitlines()) <= 600
     for node in ast.walk(ast.parse(path.read_text())):
-        if is_function(node):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             assert node.end_lineno - node.lineno < 80, node.name

@@ -1,72 +1,73 @@
 """The Blender add-on: the XRDS render engine and its commands.
 
-Importing it needs neither Blender nor torch; `register()` needs Blender.
+Importing it needs neither Blender nor torch; `register()` and `render()` need Blender.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
 
-_registered = False
+if TYPE_CHECKING:
+    from .cycles.passes import CyclesPasses
+    from .frame.job import Picture
+
+__all__ = ["register", "render", "run_job", "unregister"]
+
+T = TypeVar("T")
 
 
 def register(package: str = __name__) -> None:
-    """Make Blender know the engine, its settings and its panels.
+    """Make Blender know the engine, its settings, its panels and its command.
 
     `package` is the add-on's module name, under which Blender keeps its preferences.
     """
-    import bpy
+    from .command import blender_command
+    from .interface import registration
 
-    from . import (
-        cycles_session,
-        engine,
-        operators,
-        panels,
-        preferences,
-        properties,
-        write_lock,
-    )
-
-    global _registered
-    cycles_session.functions()
-    bpy.utils.register_class(properties.XRDSSettings)
-    bpy.types.Scene.xrds = bpy.props.PointerProperty(type=properties.XRDSSettings)
-    bpy.utils.register_class(engine.XRDSRender)
-    write_lock.register()
-    preferences.register(package)
-    operators.register()
-    panels.register()
-    _registered = True
+    registration.register(package)
+    blender_command.register()
 
 
 def unregister() -> None:
     """Take back everything that `register` did."""
-    import bpy
+    from .command import blender_command
+    from .interface import registration
 
-    from . import engine, operators, panels, preferences, properties, write_lock
-
-    global _registered
-    panels.unregister()
-    operators.unregister()
-    preferences.unregister()
-    write_lock.unregister()
-    bpy.utils.unregister_class(engine.XRDSRender)
-    del bpy.types.Scene.xrds
-    bpy.utils.unregister_class(properties.XRDSSettings)
-    _registered = False
+    blender_command.unregister()
+    registration.unregister()
 
 
-def ensure_registered() -> None:
-    """Register once, for scripts that use the bpy module."""
-    if not _registered:
-        register()
+def render(scene: Any, scale: int = 2, **choices: Any) -> Picture:
+    """Render the current frame of `scene` and return its picture.
+
+    `choices` are `layer`, the name of a view layer (the first that is used by default),
+    and the other fields of `xrds_blender.frame.job.RenderJob`. The scene's own `xrds`
+    settings and its compositor play no part, and everything in it is as before
+    afterwards.
+
+    Raises SceneError without a camera, WeightsError without the weights, UsageError
+    for values out of range, Cancelled when the user stops the render.
+    """
+    from .frame import rendering
+    from .interface.registration import ensure_registered
+
+    ensure_registered()
+    return rendering.render(scene, scale, **choices)
 
 
-def __getattr__(name: str) -> Any:
-    """Load `render`, `run_job` and their types when first asked for."""
-    if name in {"render", "run_job", "RenderJob", "Picture"}:
-        from importlib import import_module
+def run_job(
+    scene: Any, job: Callable[[CyclesPasses], T], *, layer: str | None = None
+) -> T:
+    """Call `job` inside a render of `scene` and return what it returns.
 
-        module = import_module(".render", __name__)
-        return module if name == "render" else getattr(module, name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    `job` may render Cycles' passes by hand. One frame and one view layer (`layer`, the
+    first that is used by default), without compositor and sequencer. What the job
+    raises reaches the caller; engine and settings are then as before. Raises SceneError
+    without a camera.
+    """
+    from .frame import rendering
+    from .interface.registration import ensure_registered
+
+    ensure_registered()
+    return rendering.run_job(scene, job, layer=layer)

@@ -13,7 +13,7 @@ import pytest
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 
-from program import Program, Window, programs  # noqa: E402  # beside the tests
+from program import Program, Window, programs  # beside the tests
 
 ROOT = HERE.parents[1]
 ARTIFACTS = ROOT / "build" / "app"

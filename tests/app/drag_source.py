@@ -11,7 +11,7 @@ from pathlib import Path
 import gi
 
 gi.require_version("Gtk", "3.0")
-from gi.repository import Gdk, Gtk  # noqa: E402  # the version is named first
+from gi.repository import Gdk, Gtk  # the version is named first
 
 path = Path(sys.argv[1])
 window = Gtk.Window(title="Downloads", type=Gtk.WindowType.TOPLEVEL)

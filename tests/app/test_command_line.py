@@ -154,7 +154,7 @@ preferences = bpy.context.preferences.addons[{MODULE!r}].preferences
 preferences.torch = {folder!r}
 bpy.ops.xrds.self_test()
 import torch
-from xrds_blender.preferences import torch_status
+from xrds_blender.interface.preferences import torch_status
 print("used=" + torch.__file__)
 print("status=%s" % torch_status())
 """

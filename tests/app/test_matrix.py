@@ -19,8 +19,15 @@ from program import HERE, Program
 pytestmark = pytest.mark.timeout(2400)
 ROOT = HERE.parents[1]
 MATRIX = ROOT / "docs" / "compatibility.md"
-COPIED = ("xrds_core", "xrds_blender", "tests/blender", "pyproject.toml")
-# Left out: what makes XRDS (studio, bench), and what starts a Python of its own.
+COPIED = (
+    "xrds_core",
+    "xrds_blender",
+    "xrds_lab",
+    "tests/blender",
+    "tests/conftest.py",
+    "pyproject.toml",
+)
+# Left out: what starts a Python of its own.
 MODULES = (
     "engine",
     "features",

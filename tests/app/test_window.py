@@ -293,7 +293,7 @@ OPEN_PANELS = """
 view = bpy.context.preferences.view
 view.language = {language!r}
 view.use_translate_interface = view.use_translate_tooltips = True
-from xrds_blender import panels
+from xrds_blender.interface import panels
 for panel in reversed(panels.CLASSES):  # a new editor shows them open
     bpy.utils.unregister_class(panel)
     panel.bl_options = set()

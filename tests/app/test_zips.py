@@ -83,7 +83,7 @@ def test_the_manifest_names_what_lies_there(package: Path) -> None:
             names = wheel.namelist()
     assert sorted(Path(name).name for name in told["wheels"]) == sorted(wheels(package))
     assert len(told["platforms"]) == 1
-    assert "xrds_blender/engine.py" in names
+    assert "xrds_blender/interface/engine.py" in names
     for folder in ("training", "studio", "bench", "tests"):
         assert not [name for name in names if f"/{folder}/" in f"/{name}"]
 

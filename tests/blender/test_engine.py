@@ -10,10 +10,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import cycles_session  # noqa: E402
-from xrds_blender.render import render, run_job  # noqa: E402
-from xrds_core import exr  # noqa: E402
-from xrds_core.errors import UsageError, WeightsError  # noqa: E402
+from xrds_blender import render, run_job
+from xrds_blender.cycles import session
+from xrds_core import exr
+from xrds_core.errors import UsageError, WeightsError
 
 BLENDER_5 = bpy.app.version >= (5, 0)
 
@@ -128,7 +128,7 @@ def test_persistent_data_changes_no_pixel(
 
 
 def test_the_network_sees_the_picture_before_denoising(life: Any, network: Any) -> None:
-    if not cycles_session.has_denoiser():
+    if not session.has_denoiser():
         pytest.skip("this Blender has no OpenImageDenoise")
     render(life, 2, samples=2, seed=1)
     rough, smooth = run_job(
@@ -287,12 +287,12 @@ def test_missing_weights_are_one_clear_line(life: Any, tmp_path: Path) -> None:
 def test_missing_weights_end_f12_with_an_error_and_no_file(
     life: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from xrds_blender import layer
+    from xrds_blender.frame import networks
 
     def load(*_: Any) -> None:
         raise WeightsError("no weights, on purpose")
 
-    monkeypatch.setattr(layer, "_load", load)
+    monkeypatch.setattr(networks, "_load", load)
     life.render.engine = "XRDS"
     life.render.filepath = str(tmp_path / "none.png")
     with pytest.raises(RuntimeError, match=r"^Error: no weights, on purpose\n$"):
@@ -321,7 +321,7 @@ def test_a_clean_render_prints_frames_and_no_warning(
 
 @pytest.mark.skipif(not BLENDER_5, reason="one working space before Blender 5")
 def test_the_network_sees_rec709(life: Any, network: Any, written: Any) -> None:
-    from xrds_blender.colour import converted, to_rec709
+    from xrds_blender.cycles.colour import converted, to_rec709
 
     bpy.ops.wm.set_working_color_space(working_space="ACEScg", convert_colors=False)
     picture = render(life, 2, samples=4, seed=1)

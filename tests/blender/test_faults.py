@@ -18,20 +18,15 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import (  # noqa: E402
-    cli,
-    cycles_session,
-    guide_cache,
-    layer,
-    picture_file,
-    status_bar,
-)
-from xrds_blender.job import NetworkFailed, RenderJob  # noqa: E402
-from xrds_blender.render import render  # noqa: E402
-from xrds_blender.render_file import render_file  # noqa: E402
-from xrds_blender.whole_file import is_whole  # noqa: E402
-from xrds_core import exr  # noqa: E402
-from xrds_core.errors import Cancelled, OutOfMemory, PictureError, XRDSError  # noqa: E402
+from xrds_blender import render
+from xrds_blender.command import main, picture_file
+from xrds_blender.command.render_file import render_file
+from xrds_blender.command.whole_file import is_whole
+from xrds_blender.cycles import session
+from xrds_blender.frame import guide_cache, networks, progress, super_resolution
+from xrds_blender.frame.job import NetworkFailed, RenderJob
+from xrds_core import exr
+from xrds_core.errors import Cancelled, OutOfMemory, PictureError, XRDSError
 
 SIZE = (45, 33)
 
@@ -64,9 +59,7 @@ def names(folder: Path) -> list[str]:
 # --- cancel ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "stage", [status_bar.LOW, status_bar.GUIDES, status_bar.NETWORK]
-)
+@pytest.mark.parametrize("stage", [progress.LOW, progress.GUIDES, progress.NETWORK])
 def test_cancelling_a_stage_writes_nothing(
     life: Any, network: Any, monkeypatch: pytest.MonkeyPatch, stage: str
 ) -> None:
@@ -75,13 +68,13 @@ def test_cancelling_a_stage_writes_nothing(
     written = []
     with monkeypatch.context() as patch:
         patch.setattr(
-            cycles_session, "is_stopped", lambda _: stage in (status_bar.now() or "")
+            session, "is_stopped", lambda _: stage in (progress.current() or "")
         )
-        patch.setattr(layer, "_write", lambda *_: written.append(1))
+        patch.setattr(super_resolution, "_write", lambda *_: written.append(1))
         with pytest.raises(Cancelled):
             render(life, 2, seed=1)
     assert not written
-    assert status_bar.now() is None
+    assert progress.current() is None
     np.testing.assert_array_equal(render(life, 2, seed=1).radiance, expected)
 
 
@@ -152,7 +145,7 @@ def too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: Any, **__: Any) -> None:
         raise OutOfMemory("cpu has too little memory")
 
-    monkeypatch.setattr(layer, "_load", lambda *_: fail)
+    monkeypatch.setattr(networks, "_load", lambda *_: fail)
 
 
 def test_too_little_memory_keeps_the_low_resolution_picture(
@@ -216,9 +209,9 @@ def no_torch(
     else:
         found = None if request.param == "missing" else ModuleType("torch")
         monkeypatch.setitem(sys.modules, "torch", found)
-    layer._load.cache_clear()
+    networks._load.cache_clear()
     yield
-    layer._load.cache_clear()
+    networks._load.cache_clear()
 
 
 def test_without_a_sound_torch_only_plain_renders(
@@ -228,7 +221,7 @@ def test_without_a_sound_torch_only_plain_renders(
     assert render(life, plain=True).radiance.any()
     picked = render(life, time_budget=0.1)
     assert picked.job.plain
-    monkeypatch.setattr(cycles_session, "run", None)  # and nothing is rendered before
+    monkeypatch.setattr(session, "run", None)  # and nothing is rendered before
     with pytest.raises(XRDSError, match=r"^XRDS needs PyTorch, .*or render plain$"):
         render(life, 2)
 
@@ -236,7 +229,7 @@ def test_without_a_sound_torch_only_plain_renders(
 def test_without_a_sound_torch_commands_say_so(
     life: Any, no_torch: None, blend: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert cli.main(["render", str(blend), "-o", str(blend.with_suffix(".exr"))]) == 1
+    assert main.main(["render", str(blend), "-o", str(blend.with_suffix(".exr"))]) == 1
     err = capfd.readouterr().err
     assert err.strip().splitlines()[-1].startswith("xrds: XRDS needs PyTorch")
     assert "Traceback" not in err
@@ -246,7 +239,7 @@ def test_a_blender_without_denoiser_renders_and_says_so(
     life: Any, network: Any, written: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     life.cycles.use_denoising = True
-    monkeypatch.setattr(cycles_session, "has_denoiser", lambda: False)
+    monkeypatch.setattr(session, "has_denoiser", lambda: False)
     picture = render(life, 2, seed=1)
     (told,) = [each for each in picture.plan if each.decision == "denoise"]
     assert told.value == "skipped"
@@ -260,7 +253,7 @@ def test_a_blender_without_denoiser_renders_and_says_so(
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from xrds_blender import cli
+from xrds_blender.command import main
 
 replace = Path.replace
 
@@ -271,7 +264,7 @@ def killed(self, target):
     return replace(self, target)
 
 Path.replace = killed
-cli.main(sys.argv[1:])
+main.main(sys.argv[1:])
 """
 
 
@@ -347,7 +340,7 @@ def test_a_border_resumes_too(blend: Path, tmp_path: Path) -> None:
 
 def test_two_renders_into_one_folder(blend: Path, tmp_path: Path) -> None:
     folder = tmp_path / "f"
-    words = [sys.executable, "-m", "xrds_blender.cli"]
+    words = [sys.executable, "-m", "xrds_blender.command.main"]
     line = [*words, *command(blend, f"{folder}/#.exr", "1-2")]
     children = [
         subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)

@@ -14,9 +14,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import cycles_session  # noqa: E402
-from xrds_blender.render import render, run_job  # noqa: E402
-from xrds_core import exr  # noqa: E402
+from xrds_blender import render, run_job
+from xrds_blender.cycles import session
+from xrds_core import exr
 
 BLENDER_5 = bpy.app.version >= (5, 0)
 
@@ -43,14 +43,14 @@ def settings_of_passes(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     """Cycles' settings at each of its renders."""
     seen: list[dict[str, Any]] = []
     names = ("samples", "use_adaptive_sampling", "adaptive_threshold", "time_limit")
-    run = cycles_session.run
+    run = session.run
 
     def watched(engine: Any, depsgraph: Any, **more: Any) -> Any:
         cycles = depsgraph.scene_eval.cycles
         seen.append({name: getattr(cycles, name) for name in names})
         return run(engine, depsgraph, **more)
 
-    monkeypatch.setattr(cycles_session, "run", watched)
+    monkeypatch.setattr(session, "run", watched)
     return seen
 
 

@@ -10,12 +10,14 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import ensure_registered, guide_cache  # noqa: E402
-from xrds_blender.guide_cache import CachedGuides, GuideCache  # noqa: E402
-from xrds_blender.job import Picture  # noqa: E402
-from xrds_blender.pass_names import ALBEDO, NORMAL  # noqa: E402
-from xrds_blender.render import render  # noqa: E402
-from xrds_blender.studio import traps  # noqa: E402
+from xrds_blender import render
+from xrds_blender.cycles.pass_names import ALBEDO, NORMAL
+from xrds_blender.frame import guide_cache
+from xrds_blender.frame.guide_cache import CachedGuides, GuideCache
+from xrds_blender.frame.job import Picture
+from xrds_blender.interface.registration import ensure_registered
+from xrds_blender.planning.plan import savings_but
+from xrds_lab.studio import traps
 
 
 @pytest.fixture(autouse=True)
@@ -83,8 +85,8 @@ def test_samples_add_up_to_the_limit(network: Any) -> None:
     # those of the cache decide whether their noise is filtered
     told_samples = [call["guide_samples"] for made in network for call in made.calls]
     assert told_samples == [2, 4, 6, 6]
-    keep = ("guide cache",)
-    clean = render(scene, 2, samples=1, guide_samples=64, seed=9, keep=keep).albedo
+    others = savings_but("guide cache")
+    clean = render(scene, 2, samples=1, guide_samples=64, seed=9, savings=others).albedo
     noise = [np.abs(p.albedo - clean).mean() for p in pictures]
     assert noise[2] < 0.8 * noise[0]
 
@@ -110,7 +112,7 @@ def test_the_result_holds_data_passes_of_kept_guides(written: Any) -> None:
         depth.rect.foreach_get(pixels)
         seen.append(pixels)
 
-    from xrds_blender import layer as module
+    from xrds_blender.frame import super_resolution as module
 
     scene.view_layers[0].use_pass_z = True
     old = module._write
@@ -138,9 +140,10 @@ def test_a_picture_may_be_changed_by_its_owner() -> None:
     assert shot(scene).albedo.max() < 2.0
 
 
-def test_keeping_the_omission_renders_every_time() -> None:
+def test_without_the_cache_every_time_is_rendered() -> None:
     scene = traps.trap("texture", 48, 36)
-    assert [told(shot(scene, keep=("guide cache",))) for _ in range(2)] == ["off"] * 2
+    others = savings_but("guide cache")
+    assert [told(shot(scene, savings=others)) for _ in range(2)] == ["off"] * 2
 
 
 def test_a_folder_serves_another_process(tmp_path: Path) -> None:

@@ -11,10 +11,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.guide_key import NotFollowed, guide_key  # noqa: E402
-from xrds_blender.scene_facts import scene_facts  # noqa: E402
-from xrds_blender.studio import traps  # noqa: E402
-from xrds_blender.studio.nodes import Nodes  # noqa: E402
+from xrds_blender.scene.guide_key import NotFollowed, guide_key
+from xrds_blender.scene.scene_facts import scene_facts
+from xrds_lab.studio import traps
+from xrds_lab.studio.nodes import Nodes
 
 Change = Callable[[Any], None]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from xrds_blender.low_camera import Frame, Lens, LowGrid, Region, widened
+from xrds_blender.cycles.low_camera import Frame, Lens, LowGrid, Region, widened
 
 bpy = pytest.importorskip("bpy")
 SIDE = 48  # pixels of the windows in which shifts are measured
@@ -84,7 +84,7 @@ def shift(low: np.ndarray, full: np.ndarray, scale: int) -> np.ndarray:
 def test_corners_shift_less_than_a_tenth_of_a_pixel(
     name: str, empty_scene: Callable[..., Any]
 ) -> None:
-    from xrds_blender.render import run_job
+    from xrds_blender import run_job
 
     (width, height), fit, lens_shift, aspect, kind = CAMERAS[name]
     scene = empty_scene(width, height, 1)

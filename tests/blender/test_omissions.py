@@ -10,11 +10,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import ensure_registered, plan  # noqa: E402
-from xrds_blender.explain import find_facts  # noqa: E402
-from xrds_blender.job import RenderJob  # noqa: E402
-from xrds_blender.render import evaluate, run_job  # noqa: E402
-from xrds_blender.studio import traps  # noqa: E402
+from xrds_blender import run_job
+from xrds_blender.frame.frame_facts import find_facts
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.frame.rendering import evaluate
+from xrds_blender.interface.registration import ensure_registered
+from xrds_blender.planning import plan
+from xrds_lab.studio import traps
 
 SAMPLES = 32
 # What the guide render may do less, by itself.

@@ -9,22 +9,24 @@ import bpy
 import pytest
 
 import xrds_blender
-from xrds_blender import (
+from xrds_blender.frame import progress, torch_folder
+from xrds_blender.interface import (
     cycles_panels,
+    machine,
     operators,
     panels,
     preferences,
+    properties,
+    registration,
     status_bar,
-    torch_folder,
     translations,
 )
-from xrds_blender.job import RenderJob
 
 
 @pytest.fixture(autouse=True)
 def registered() -> None:
     bpy.ops.wm.read_factory_settings()
-    xrds_blender.ensure_registered()
+    registration.ensure_registered()
 
 
 def test_cycles_panels_show_under_xrds() -> None:
@@ -72,12 +74,12 @@ def test_panel_draws_every_property_it_names() -> None:
         region = SimpleNamespace(width=300)
         preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
 
-    status_bar.keep({**dict.fromkeys(panels.STAGE_NAMES, 0.0), "network": 12.34})
+    progress.keep({**dict.fromkeys(panels.STAGE_NAMES, 0.0), "network": 12.34})
     for panel in panels.CLASSES:
         panel.draw(Drawn, Context)
     drawn = set(Drawn.layout.drawn)
     assert {"scale", "preset", "samples", "guide_samples", "guides"} <= drawn
-    assert {"device", "use_exposure", "exposure", "plain"} <= drawn
+    assert {"use_exposure", "exposure", "plain"} <= drawn
     assert {"12.3 s", "960 × 540, 4096 spp"} <= drawn
     assert "0.0 s" not in drawn
 
@@ -101,10 +103,10 @@ def test_summary_tells_the_low_size(scale: str, low: str) -> None:
 
 def test_panel_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bpy.context.scene
-    monkeypatch.setattr(panels.cycles_session, "has_denoiser", lambda: True)
+    monkeypatch.setattr(panels.session, "has_denoiser", lambda: True)
     assert panels.remarks(scene) == []
     monkeypatch.setattr(torch_folder, "is_there", lambda: False)
-    monkeypatch.setattr(panels.cycles_session, "has_denoiser", lambda: False)
+    monkeypatch.setattr(panels.session, "has_denoiser", lambda: False)
     scene.view_layers[0].use_pass_glossy_direct = True
     told = " ".join(text for _, text in panels.remarks(scene))
     for word in ("PyTorch is missing", "no denoiser", "Light passes"):
@@ -117,21 +119,19 @@ def test_operator_needs_a_camera() -> None:
 
 
 def test_machine_without_add_on_has_defaults() -> None:
-    assert preferences.machine() == preferences.Machine()
+    assert machine.machine() == machine.Machine()
 
 
 def test_job_takes_the_preferences(monkeypatch: pytest.MonkeyPatch) -> None:
-    here = preferences.Machine("cuda:1", 1 << 30, Path("folder"))
-    monkeypatch.setattr(preferences, "machine", lambda: here)
+    here = machine.Machine("cuda:1", 1 << 30, Path("folder"))
+    monkeypatch.setattr(properties, "machine", lambda: here)
     settings = bpy.context.scene.xrds
-    job = RenderJob.of(settings)
+    job = properties.job_of(settings)
     assert (job.device, job.memory_limit, job.weights) == (
         here.device,
         here.memory_limit,
         here.weights,
     )
-    settings.device = "cpu"  # the scene's own choice goes before
-    assert RenderJob.of(settings).device == "cpu"
 
 
 def test_operator_keeps_the_engine() -> None:
@@ -149,7 +149,7 @@ def test_operator_keeps_the_engine() -> None:
 
 
 def test_every_shipped_preset_sets_what_a_saved_one_would(tmp_path: Path) -> None:
-    from xrds_blender import presets
+    from xrds_blender.interface import presets
 
     shipped = sorted((presets.SHIPPED / "presets" / presets.FOLDER).glob("*.py"))
     assert len(shipped) == 3
@@ -167,7 +167,7 @@ def test_every_shipped_preset_sets_what_a_saved_one_would(tmp_path: Path) -> Non
 
 
 def preset_folders() -> list[str]:
-    from xrds_blender import presets
+    from xrds_blender.interface import presets
 
     return bpy.utils.preset_paths(presets.FOLDER)
 
@@ -177,7 +177,7 @@ def test_self_test_renders_and_leaves_nothing() -> None:
     before = {kind: len(getattr(bpy.data, kind)) for kind in kinds}
     assert bpy.ops.xrds.self_test() == {"FINISHED"}
     assert {kind: len(getattr(bpy.data, kind)) for kind in kinds} == before
-    works, seconds, versions = preferences.XRDS_OT_self_test.told
+    works, seconds, versions = preferences.XRDS_OT_self_test.lines
     assert works == "XRDS works: 64 x 64 pixels on cpu"
     assert "network" in seconds
     assert f"Blender {bpy.app.version_string}" in versions
@@ -186,11 +186,11 @@ def test_self_test_renders_and_leaves_nothing() -> None:
 def test_self_test_tells_what_is_wrong(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here = preferences.Machine(weights=tmp_path)
-    monkeypatch.setattr(preferences, "machine", lambda: here)
+    here = machine.Machine(weights=tmp_path)
+    monkeypatch.setattr(machine, "machine", lambda: here)
     with pytest.raises(RuntimeError, match="no weights"):
         bpy.ops.xrds.self_test()
-    assert preferences.XRDS_OT_self_test.told[0].startswith("Failed: no weights")
+    assert preferences.XRDS_OT_self_test.lines[0].startswith("Failed: no weights")
 
 
 def test_status_bar_tells_the_stage() -> None:
@@ -207,9 +207,9 @@ def test_status_bar_tells_the_stage() -> None:
         update_progress = staticmethod(lambda _: None)
 
     status_bar.draw(Bar, None)
-    status_bar.begin(Engine, status_bar.GUIDES, 2)
+    progress.begin(Engine, progress.GUIDES, 2)
     status_bar.draw(Bar, None)
-    status_bar.end()
+    progress.end()
     status_bar.draw(Bar, None)
     assert told == ["XRDS 2/3: Guides"]
 

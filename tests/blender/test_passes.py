@@ -10,10 +10,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import clock, cycles_session  # noqa: E402  # bpy is asked for first
-from xrds_blender.borrowed import Borrowed, PipelineSettings  # noqa: E402
-from xrds_blender.render import run_job  # noqa: E402
-from xrds_core.errors import Cancelled, SceneError  # noqa: E402
+from xrds_blender import run_job
+from xrds_blender.cycles import clock, session  # bpy is asked for first
+from xrds_blender.cycles.borrowed import Borrowed, PipelineSettings
+from xrds_core.errors import Cancelled, SceneError
 
 Build = Callable[..., Any]
 
@@ -85,7 +85,7 @@ def test_one_session_renders_what_a_session_each_would(
             lambda: passes.beauty(4, 8, denoise=False, seed=5).radiance,
         ):
             if fresh:
-                cycles_session.free(passes._engine)
+                session.free(passes._engine)
             pictures.append(call())
         return pictures
 
@@ -148,7 +148,7 @@ def test_guides_keep_albedo_and_normals_of_the_full_render(still_life: Build) ->
 
 
 def test_denoising_gives_both_pictures(still_life: Build) -> None:
-    if not cycles_session.has_denoiser():
+    if not session.has_denoiser():
         pytest.skip("this Blender has no OpenImageDenoise")
     scene = still_life()
 
@@ -167,7 +167,7 @@ def test_denoising_gives_both_pictures(still_life: Build) -> None:
 def test_without_a_denoiser_the_picture_stays_noisy(
     still_life: Build, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cycles_session, "has_denoiser", lambda: False)
+    monkeypatch.setattr(session, "has_denoiser", lambda: False)
     scene = still_life()
 
     def job(passes: Any) -> Any:
@@ -254,7 +254,7 @@ def test_what_a_job_raises_reaches_the_caller(still_life: Build) -> None:
 def test_a_cancelled_pass_raises(
     still_life: Build, monkeypatch: pytest.MonkeyPatch, call: str
 ) -> None:
-    monkeypatch.setattr(cycles_session, "is_stopped", lambda engine: True)
+    monkeypatch.setattr(session, "is_stopped", lambda engine: True)
     with pytest.raises(Cancelled):
         run_job(
             still_life(),
@@ -305,7 +305,7 @@ def test_a_session_ends_only_when_samples_fall(
     counts: tuple[int, ...],
     sessions: int,
 ) -> None:
-    cycles, made = cycles_session.functions(), []
+    cycles, made = session.functions(), []
     create = cycles.create
 
     def counting(*arguments: Any, **options: Any) -> None:

@@ -9,9 +9,12 @@ from typing import Any
 
 import pytest
 
-from xrds_blender import budget, cycles_session, picking
-from xrds_blender.job import RenderJob
-from xrds_blender.render import render, run_job
+from xrds_blender import render, run_job
+from xrds_blender.cycles import session
+from xrds_blender.frame import picking
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.planning import budget
+from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import UsageError
 
 XRDS = budget.Choice("HIGH-FAST", 0, 4, "fast", "fast", 1)
@@ -23,7 +26,7 @@ COSTS = budget.Costs(
     fixed=1.0,
     beauty=100.0,
     guide=50.0,
-    denoise=dict.fromkeys(budget.DENOISERS, 10.0),
+    denoise=dict.fromkeys(Denoiser, 10.0),
     network={XRDS.network: 1.0},
 )
 
@@ -56,7 +59,7 @@ def test_probes_measure_the_scene(still_life: Callable[..., Any]) -> None:
     costs = run_job(still_life(400, 300), probe)
     assert min(costs.fixed, costs.beauty, costs.guide) > 0
     assert costs.fixed < time.perf_counter() - start + 1
-    assert set(costs.denoise) == set(budget.DENOISERS)
+    assert set(costs.denoise) == set(Denoiser)
     assert set(costs.network) == set(networks)
 
 
@@ -110,7 +113,7 @@ def test_quality_asks_for_no_more_than_it_needs(
 def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(
     still_life: Callable[..., Any], only: Callable[..., None]
 ) -> None:
-    if not cycles_session.has_denoiser():
+    if not session.has_denoiser():
         pytest.skip("this Blender has no OpenImageDenoise")
     only(plain=40.0)
     scene = still_life(64, 48, 7)
@@ -127,13 +130,14 @@ def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(
 
 def test_panel_setting_reaches_the_job(still_life: Callable[..., Any]) -> None:
     scene = still_life()
-    from xrds_blender import ensure_registered
+    from xrds_blender.interface.properties import job_of
+    from xrds_blender.interface.registration import ensure_registered
 
     ensure_registered()
     scene.xrds.time_budget = 12.5
-    assert RenderJob.of(scene.xrds).time_budget is None
+    assert job_of(scene.xrds).time_budget is None
     scene.xrds.use_time_budget = True
-    assert RenderJob.of(scene.xrds).time_budget == 12.5
+    assert job_of(scene.xrds).time_budget == 12.5
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from xrds_blender import picture_file
+from xrds_blender.command import picture_file
 from xrds_core.errors import PictureError, UsageError, XRDSError
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from xrds_blender import cli
+from xrds_blender.command import main
 from xrds_core import exr, weights
 from xrds_core.network import XRDS, preset_config
 
@@ -48,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def xrds(folder: Path, line: str) -> subprocess.CompletedProcess[str]:
     """Run the command in `folder` as a process of its own."""
     return subprocess.run(
-        [sys.executable, "-m", "xrds_blender.cli", *line.split()],
+        [sys.executable, "-m", "xrds_blender.command.main", *line.split()],
         capture_output=True,
         text=True,
         check=False,
@@ -105,7 +105,7 @@ def test_resolution_is_the_one_asked_for(folder: Path) -> None:
 def test_interrupt_ends_a_render_at_once(folder: Path) -> None:
     line = "render scene.blend -o i.exr --plain --samples 1000000"
     with subprocess.Popen(
-        [sys.executable, "-m", "xrds_blender.cli", *line.split()],
+        [sys.executable, "-m", "xrds_blender.command.main", *line.split()],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -146,7 +146,7 @@ def test_refusals_come_before_rendering(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(folder)
-    assert cli.main(line.split()) == status
+    assert main.main(line.split()) == status
     out, err = capfd.readouterr()
     last = err.strip().splitlines()[-1]
     assert last.startswith("xrds: ")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from xrds_blender import torch_folder
+from xrds_blender.frame import torch_folder
 from xrds_core.errors import UsageError
 
 VERSION = "from typing import Optional\n__version__ = '2.9.1+cu128'\n"
@@ -53,7 +53,7 @@ def test_a_folder_goes_first_and_is_forgotten_again(folder: Path) -> None:
     code = f"""
 import sys
 from pathlib import Path
-from xrds_blender import torch_folder
+from xrds_blender.frame import torch_folder
 before = list(sys.path)
 torch_folder.use(Path({str(folder)!r}))
 assert torch_folder.available().version == '2.9.1+cu128'
@@ -79,7 +79,7 @@ def test_missing_torch_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_preferences_show_what_is_used(folder: Path) -> None:
-    from xrds_blender import preferences
+    from xrds_blender.interface import preferences
 
     (icon, line) = preferences.torch_status()[0]
     assert icon == "INFO"

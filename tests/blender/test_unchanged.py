@@ -9,10 +9,11 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender import cycles_session, ensure_registered  # noqa: E402
-from xrds_blender.job import NetworkFailed  # noqa: E402
-from xrds_blender.render import render, run_job  # noqa: E402
-from xrds_core.errors import Cancelled, OutOfMemory  # noqa: E402
+from xrds_blender import render, run_job
+from xrds_blender.cycles import session
+from xrds_blender.frame.job import NetworkFailed
+from xrds_blender.interface.registration import ensure_registered
+from xrds_core.errors import Cancelled, OutOfMemory
 
 
 def properties(struct: Any) -> dict[str, Any]:
@@ -63,7 +64,7 @@ def life(
     """A scene whose settings are unlike those of any pass; compared at the end."""
     ensure_registered()
     scene = still_life(45, 33)
-    scene.cycles.use_denoising = cycles_session.has_denoiser()
+    scene.cycles.use_denoising = session.has_denoiser()
     scene.cycles.use_adaptive_sampling = True
     scene.cycles.max_bounces, scene.cycles.diffuse_bounces = 7, 3
     scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 2.5
@@ -130,7 +131,7 @@ def test_after_an_error_inside_cycles(
     def broken(*_: Any) -> None:
         raise MemoryError("on purpose")
 
-    monkeypatch.setattr(cycles_session.functions(), "render", broken)
+    monkeypatch.setattr(session.functions(), "render", broken)
     with pytest.raises(MemoryError):
         render(life, 4)
 
@@ -141,7 +142,7 @@ def test_after_too_little_memory_for_the_network(
     def fail(*_: Any, **__: Any) -> None:
         raise OutOfMemory("on purpose")
 
-    monkeypatch.setattr("xrds_blender.layer._load", lambda *_: fail)
+    monkeypatch.setattr("xrds_blender.frame.networks._load", lambda *_: fail)
     with pytest.raises(NetworkFailed):
         render(life, 4)
 
@@ -157,7 +158,7 @@ def test_after_cancelling_anywhere(
         asked.append(1)
         return len(asked) >= at
 
-    monkeypatch.setattr(cycles_session, "is_stopped", is_stopped)
+    monkeypatch.setattr(session, "is_stopped", is_stopped)
     with pytest.raises(Cancelled):
         render(life, 4)
     assert len(asked) == at
@@ -166,7 +167,7 @@ def test_after_cancelling_anywhere(
 def test_a_cancelled_f12_is_no_error(
     life: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cycles_session, "is_stopped", lambda engine: True)
+    monkeypatch.setattr(session, "is_stopped", lambda engine: True)
     life.render.engine = "XRDS"
     try:
         bpy.ops.render.render()

@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 
 from xrds_core import exr_library
 from xrds_core.errors import PictureError
-from xrds_core.exr import (
-    Names,
-    read_beauty,
-    read_channels,
-    read_guides,
-    write_picture,
-)
+from xrds_core.exr import Names, read_beauty, read_channels, read_guides, write_picture
 
 Array = NDArray[np.float32]
 LAYOUTS = ("flat", "layered", "parts", "named parts")

@@ -18,18 +18,12 @@ import numpy as np
 import pytest
 import torch
 
-from xrds_blender.bench.stability import light, sameness, suite
-from xrds_blender.bench.stability.bounds import (
-    BOUNDS,
-    EXEMPTIONS,
-    Exemption,
-    bound,
-    judge,
-)
-from xrds_blender.bench.stability.measured import Measured, distance, worst
-from xrds_blender.bench.stability.pictures import constant, textured
-from xrds_blender.bench.stability.subject import Subject, shipped
 from xrds_core.errors import Cancelled
+from xrds_lab.stability import light, sameness, suite
+from xrds_lab.stability.bounds import BOUNDS, EXEMPTIONS, Exemption, bound, judge
+from xrds_lab.stability.measured import Measured, distance, worst
+from xrds_lab.stability.pictures import constant, textured
+from xrds_lab.stability.subject import Subject, shipped
 
 Work = Callable[[Subject], Iterator[Measured]]
 

@@ -15,11 +15,7 @@ from xrds_core.exr_upscale import upscale_file
 from xrds_core.guide_filter import FEW_SAMPLES, STRENGTH, GuideFilter, filter_guides
 from xrds_core.network import XRDS, preset_config
 from xrds_core.upscaler import Upscaler
-from xrds_core.weights import (
-    guide_filter_record,
-    load_guide_filter,
-    save_guide_filter,
-)
+from xrds_core.weights import guide_filter_record, load_guide_filter, save_guide_filter
 
 
 @pytest.fixture(scope="module")

@@ -30,9 +30,9 @@ COUNT = 150
 READERS = {
     "exr": ("from xrds_core.exr import read_beauty as read", "PictureError"),
     "safetensors": ("from xrds_core.weights import load as read", "WeightsError"),
-    "toml": ("from xrds_core.training.config import read_config as read", "UsageError"),
+    "toml": ("from xrds_lab.training.config import read_config as read", "UsageError"),
     "npz": (
-        "from xrds_core.training.windows import read_window\n"
+        "from xrds_lab.training.windows import read_window\n"
         "read = lambda path: read_window(path, 2, 'fast')",
         "PictureError",
     ),

@@ -8,12 +8,7 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from xrds_core.network import (
-    GUIDE_CHANNELS,
-    XRDS,
-    NetworkConfig,
-    preset_config,
-)
+from xrds_core.network import GUIDE_CHANNELS, XRDS, NetworkConfig, preset_config
 from xrds_core.regression import explain
 
 TINY = NetworkConfig(groups=1, blocks=1, channels=8, guide_channels=4, window_size=4)

@@ -1,0 +1,167 @@
+"""The picker: pure functions of costs and expected errors."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from xrds_blender.planning import budget
+from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
+
+PLAIN, QUICK = Choice("HIGH-ACCURATE", 0), Choice("FAST-FAST", 0)
+LOW = Choice("HIGH-FAST", 0, 4, "fast", "fast", 2)
+FULL = Choice("HIGH-FAST", 0, 2, "fast", "full", 1)
+NETWORKS = [LOW.network, FULL.network]
+ERRORS = ErrorModel(
+    {
+        PLAIN: Curve((1, 4, 16), (24.0, 29.0, 33.0)),
+        QUICK: Curve((1, 4, 16), (22.0, 26.0, 30.0)),
+        LOW: Curve((4, 16, 64), (23.0, 25.0, 25.5)),
+        FULL: Curve((4, 16), (25.0, 27.0)),
+    }
+)
+COSTS = Costs(
+    fixed=1.0,
+    beauty=4.0,
+    guide=2.0,
+    denoise={"HIGH-ACCURATE": 24.0, "HIGH-FAST": 4.0, "FAST-FAST": 2.0},
+    network={LOW.network: 3.0, FULL.network: 3.0},
+)
+positive = st.floats(0.01, 100.0)
+
+
+def choose(seconds: float, costs: Costs = COSTS) -> budget.Picked:
+    return budget.choose(seconds, costs, ERRORS, NETWORKS)
+
+
+def test_seconds_are_the_sum_of_the_parts() -> None:
+    assert COSTS.seconds(replace(PLAIN, samples=3)) == 1 + 24 + 3 * 4
+    low = 1 + 4 / 16 + 2 * 2 + 3 + 8 * 4 / 16
+    assert COSTS.seconds(replace(LOW, samples=8)) == low
+    full = 1 + 4 / 4 + 1 * 4 + 3 + 8 * 4 / 4  # its guides are full samples
+    assert COSTS.seconds(replace(FULL, samples=8)) == full
+
+
+def test_curve_is_linear_in_doublings_and_goes_on() -> None:
+    curve = Curve((1, 4), (20.0, 24.0))
+    assert [curve.at(n) for n in (1, 2, 4, 16)] == [20.0, 22.0, 24.0, 24.0]
+
+
+def test_curve_never_falls() -> None:
+    assert Curve.of({1: 20.0, 2: 25.0, 4: 24.0}).psnr == (20.0, 25.0, 25.0)
+
+
+@given(st.tuples(positive, positive), positive, positive, positive, positive)
+def test_more_budget_never_expects_more_error(
+    budgets: tuple[float, float],
+    fixed: float,
+    beauty: float,
+    guide: float,
+    denoise: float,
+) -> None:
+    modes = {name: denoise * x for name, x in COSTS.denoise.items()}
+    costs = Costs(fixed, beauty, guide, modes, COSTS.network)
+    less, more = (choose(seconds, costs) for seconds in sorted(budgets))
+    if less.fits:
+        assert more.fits
+        assert more.psnr >= less.psnr
+
+
+@given(st.floats(0.1, 1000.0))
+def test_what_is_chosen_keeps_to_the_budget(seconds: float) -> None:
+    picked = choose(seconds)
+    assert picked.seconds == COSTS.seconds(picked.choice)
+    assert picked.fits == (picked.seconds <= seconds)
+    assert picked.psnr == ERRORS.psnr(picked.choice)
+
+
+@given(st.floats(5.0, 1000.0))
+def test_nothing_that_fits_is_better(seconds: float) -> None:
+    picked = choose(seconds)
+    for family in ERRORS.curves:
+        for samples in (1, 2, 4, 16, 64, 256):
+            other = replace(family, samples=samples)
+            fits = COSTS.seconds(other) <= seconds * budget.AIM
+            if fits and samples >= ERRORS.curves[family].samples[0]:
+                assert ERRORS.psnr(other) <= picked.psnr + 1e-9
+
+
+def test_a_budget_below_all_takes_the_fastest_and_says_so() -> None:
+    picked = choose(2.0)
+    assert not picked.fits
+    assert picked.choice == replace(QUICK, samples=1)  # 7 s, and XRDS 9.25 s
+    told = picked.decision(2.0)
+    assert "\n" not in told.reason
+    assert told.reason.startswith("2 s is too little for this scene; the fastest")
+
+
+def test_of_choices_as_fast_as_the_fastest_the_better_is_taken() -> None:
+    modes = COSTS.denoise | {"HIGH-ACCURATE": 2.4}  # 7.4 s beside 7 s
+    picked = choose(2.0, replace(COSTS, denoise=modes))
+    assert not picked.fits
+    assert picked.choice == replace(PLAIN, samples=1)
+
+
+def test_plain_is_taken_where_it_is_better_and_xrds_named_beside() -> None:
+    picked = choose(300.0)
+    assert picked.choice.scale == 1
+    told = picked.decision(300.0)
+    assert told.value == f"plain, {picked.choice.samples} samples, OIDN HIGH-ACCURATE"
+    assert "best XRDS for 300 s: fast x2" in told.reason
+
+
+def test_xrds_is_taken_where_the_denoiser_leaves_no_time() -> None:
+    dear = replace(COSTS, denoise=dict.fromkeys(COSTS.denoise, 40.0))
+    picked = choose(20.0, dear)
+    assert picked.choice.scale > 1
+    assert picked.rival is None
+    assert "the only kind" in picked.decision(20.0).reason
+
+
+def test_networks_without_weights_are_not_chosen() -> None:
+    dear = replace(COSTS, denoise=dict.fromkeys(COSTS.denoise, 40.0), network={})
+    assert budget.choose(60.0, dear, ERRORS, []).choice.scale == 1
+
+
+@given(st.floats(20.0, 40.0))
+def test_quality_is_reached_in_the_least_seconds(psnr: float) -> None:
+    picked = budget.reach(psnr, COSTS, ERRORS, NETWORKS)
+    if not picked.fits:
+        assert picked.psnr < psnr
+        return
+    assert picked.psnr >= psnr
+    fewer = replace(picked.choice, samples=picked.choice.samples - 1)
+    family = replace(fewer, samples=0)
+    if fewer.samples >= ERRORS.curves[family].samples[0]:
+        assert ERRORS.psnr(fewer) < psnr
+    if picked.rival is not None:
+        assert picked.rival.seconds >= picked.seconds
+
+
+def test_unreachable_quality_takes_the_best_and_says_so() -> None:
+    picked = budget.reach(90.0, COSTS, ERRORS, NETWORKS)
+    assert picked.decision(90.0, in_seconds=False).reason.startswith("90 dB is beyond")
+
+
+def test_shipped_model_is_whole() -> None:
+    model = budget.shipped()
+    assert set(model.denoiser_speed) == set(Denoiser)
+    assert model.denoiser_speed[DEFAULT_DENOISER] == pytest.approx(1.0)
+    assert any(choice.scale > 1 for choice in model.errors.curves)
+    for choice, curve in model.errors.curves.items():
+        assert choice.denoiser in model.denoiser_speed
+        assert choice.scale == 1 or choice.network in model.network_speed
+        assert list(curve.psnr) == sorted(curve.psnr)
+
+
+def test_model_survives_its_file(tmp_path: Path) -> None:
+    model = budget.Model(ERRORS, COSTS.denoise, COSTS.network, 0.2, "four scenes")
+    file = tmp_path / "budget.json"
+    file.write_text(json.dumps(model.to_json()), "utf-8")
+    assert budget.Model.read(file) == model

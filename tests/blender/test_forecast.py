@@ -1,0 +1,32 @@
+"""The panel's figures against what the network measures of itself."""
+
+from __future__ import annotations
+
+import pytest
+
+from xrds_blender.planning import forecast
+
+
+@pytest.mark.parametrize(("preset", "scale"), list(forecast.NETWORK_BYTES))
+def test_network_bytes_are_those_of_the_network(preset: str, scale: int) -> None:
+    from xrds_core import upscaler
+    from xrds_core.cost import measure
+    from xrds_core.network import XRDS, preset_config
+
+    cost = measure(XRDS(preset_config(preset, scale)).eval())
+    told = forecast.NETWORK_BYTES[preset, scale]
+    assert told == pytest.approx(cost.bytes, rel=0.05)
+    assert forecast.OVERHEAD == upscaler._CPU_OVERHEAD
+    assert forecast.TILE_BYTES == upscaler._TILE_BYTES
+    assert forecast.DEFAULT_LIMIT == upscaler.DEFAULT_MEMORY
+
+
+def test_memory_stays_under_a_limit() -> None:
+    free = forecast.memory(1920, 1080, "fast", 2)
+    held = forecast.memory(1920, 1080, "fast", 2, limit=1 << 28)
+    assert 0 < held - (1 << 28) < free
+
+
+def test_rays_are_those_of_every_full_size_pixel() -> None:
+    assert forecast.rays(64, 4, 4) == (4.0, 4.0)
+    assert forecast.low_size(1366, 768, 8) == (171, 96)

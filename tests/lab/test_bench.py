@@ -1,0 +1,192 @@
+"""The report over one scene of a few pixels: measured, resumed, written."""
+
+from __future__ import annotations
+
+import csv
+import importlib
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+
+from xrds_blender.planning import budget
+from xrds_blender.planning.denoiser import Denoiser
+from xrds_core.errors import UsageError
+from xrds_lab.bench import growth, machine, measure, pictures, tasks
+from xrds_lab.bench.bench import bench
+from xrds_lab.bench.crops import SHOWN
+from xrds_lab.bench.stages import PLAIN_FRAME, STAGES
+from xrds_lab.bench.sweep import Sweep
+
+SWEEP = Sweep(
+    (("fast", 4, "fast"),),
+    plain_samples=(1, 2),
+    low_samples={4: (4,)},
+    guide_samples=(1, 2),
+)
+SIZE = (72, 52)  # that 4 does not divide: the low picture reaches beyond the frame
+
+
+@pytest.fixture(autouse=True)
+def few_modes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two modes of the denoiser instead of nine."""
+    few = (Denoiser.HIGH_ACCURATE, Denoiser.HIGH_FAST)
+    for module in ("sweep", "measure", "analysis"):
+        found = importlib.import_module(f"xrds_lab.bench.{module}")
+        for name in ("DENOISERS", "LOW_DENOISERS"):
+            if hasattr(found, name):
+                monkeypatch.setattr(found, name, few)
+    monkeypatch.setattr(growth, "_core_counts", lambda: [machine.cores()])
+
+
+class World:
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.scene = folder, folder / "cubes.blend"
+
+    def run(self, **options: Any) -> dict[str, Any]:
+        given = {
+            "budgets": (1.0, 8.0),
+            "resolution": SIZE,
+            "reference_samples": 4,
+            "rounds": 1,
+            "sweep": SWEEP,
+            "picker": False,
+        }
+        return bench([self.scene], self.folder / "out", **(given | options))
+
+
+@pytest.fixture
+def world(tmp_path: Path, still_life: Callable[..., Any]) -> World:
+    still_life()
+    made = World(tmp_path)
+    bpy.ops.wm.save_as_mainfile(filepath=str(made.scene))
+    return made
+
+
+@pytest.mark.timeout(600)
+def test_report_is_whole_and_a_second_run_measures_nothing(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # on a busy machine one stage may take many times what it takes on an idle one
+    monkeypatch.setattr(measure, "MOST_OVER_BUDGET", 1e3)
+    told = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
+    out = world.folder / "out"
+    assert told["failures"] == {}
+    assert json.loads((out / "results.json").read_text()) == told
+    _check_points(told)
+    _check_growth(told["growth"])
+    _check_picker(told)
+    with (out / "results.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["label"] for row in rows] == [p["label"] for p in told["points"]]
+    _check_page((out / "report.html").read_text("utf-8"), told)
+
+    def refuse(*_: Any) -> None:
+        raise AssertionError("measured again")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pictures, "measured", refuse)
+        patch.setattr(pictures.Pictures, "render", lambda *_: None)
+        patch.setattr(tasks, "frame", refuse)
+        again = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
+    assert again["points"] == told["points"]
+    assert again["growth"] == told["growth"]
+    assert again["failures"] == {}
+    # Nothing is left to foresee when the picker renders what nobody has rendered.
+    more = world.run(picker=True, budgets=(3.0, 6.0))
+    assert more["picker"]["runs"] == 2
+    assert more["failures"] == {}
+
+
+def _check_points(told: dict[str, Any]) -> None:
+    methods = {point["method"] for point in told["points"]}
+    assert methods == {"cycles", "oidn", "bicubic", "demodulated_bilinear", "xrds"}
+    for point in told["points"]:
+        assert set(point["seconds"]) == {*STAGES, "total"}
+        parts = sum(s for stage, s in point["seconds"].items() if stage != "total")
+        assert parts == pytest.approx(point["seconds"]["total"])
+        assert point["cpu_seconds"] > 0
+        assert 5 < point["psnr"] < 80
+        assert 0 < point["relmse_trimmed"] <= point["relmse"]
+    (scene,) = told["scenes"]
+    assert scene["frame"] == list(SIZE)
+    assert scene["rho"] > 0
+    assert scene["reference_psnr_floor"] > 10
+
+
+def _check_growth(told: dict[str, Any]) -> None:
+    sizes = {tuple(row["size"]) for row in told["rows"]}
+    assert sizes == {(32, 24), (64, 48)}
+    names = {row["task"] for row in told["rows"]}
+    assert {PLAIN_FRAME, "XRDS fast x4", "OIDN HIGH-ACCURATE alone"} <= names
+    assert all(row["seconds"] >= 0 for row in told["rows"])
+    assert told["break_even"]
+
+
+def _check_picker(told: dict[str, Any]) -> None:
+    (entry,) = told["budgets"]
+    assert entry["picker"]["label"].startswith(("OIDN", "XRDS"))
+    assert "dB expected" in entry["picker"]["reason"]
+    assert told["picker"]["runs"] == 1
+
+
+def _check_page(page: str, told: dict[str, Any]) -> None:
+    assert page.count("<svg") >= 3  # over all, of the scene, growth
+    assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing beside it
+    crops = re.search(r'class="crops">(.*?)</script>', page, re.DOTALL)
+    assert crops is not None
+    data = json.loads(crops[1])
+    assert data["reference"].startswith("data:image/webp")
+    labels = {c["label"] for b in data["budgets"] for c in b["columns"]}
+    assert labels == set(data["pictures"])
+    best = told["budgets"][0]["best"]
+    assert labels == {best[name]["label"] for name in SHOWN if best.get(name)}
+
+
+@pytest.mark.timeout(300)
+def test_one_bad_configuration_is_left_out_and_told(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    good = pictures.Pictures.picture
+
+    def bad(self: Any, config: Any) -> np.ndarray:
+        if config.method == "bicubic":
+            raise ValueError("no such picture")
+        return good(self, config)
+
+    monkeypatch.setattr(pictures.Pictures, "picture", bad)
+    told = world.run(timing=False)
+    assert list(told["failures"].values()) == ["ValueError: no such picture"]
+    assert {p["method"] for p in told["points"]} >= {"oidn", "xrds"}
+    assert (world.folder / "out" / "report.html").is_file()
+
+
+@pytest.mark.timeout(300)
+def test_the_pickers_model_is_written_and_can_be_read(world: World) -> None:
+    file = world.folder / "budget.json"
+    world.run(timing=False, model=file)
+    model = budget.Model.read(file)
+    assert model.source.startswith("mean over 1 scenes: cubes; weights: fast x4")
+    plain = budget.Choice("HIGH-FAST", 0)
+    assert model.errors.curves[plain].samples == (1, 2)
+    own = budget.Choice("HIGH-FAST", 0, 4, "fast", "fast", 2)
+    assert own in model.errors.curves
+
+
+def test_contradictions_are_told_before_anything_is_rendered(tmp_path: Path) -> None:
+    scene = tmp_path / "a.blend"
+    out = tmp_path / "out"
+    with pytest.raises(UsageError, match="there is no scene"):
+        bench([scene], out, resolution=SIZE)
+    scene.write_bytes(b"")
+    with pytest.raises(UsageError, match="--windows or --resolution"):
+        bench([scene], out, resolution=SIZE, windows=tmp_path / "w.json")
+    with pytest.raises(UsageError, match="--windows with --references"):
+        bench([scene], out, references=tmp_path)
+    with pytest.raises(UsageError, match="two scenes are named a"):
+        bench([scene, tmp_path / "b" / "a.blend"], out, resolution=SIZE)

@@ -1,0 +1,223 @@
+"""The standard measure on a scene of a few pixels, rendered once."""
+
+from __future__ import annotations
+
+import importlib
+import json
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from PIL import Image
+
+from xrds_core import exr, metrics, weights
+from xrds_core.errors import UsageError
+from xrds_core.network import XRDS, preset_config
+from xrds_lab.bench import contenders, inputs, windows
+from xrds_lab.bench.evaluate import evaluate
+from xrds_lab.bench.samples import samples_table
+
+FRAME, WINDOW = [128, 96], [32, 16, 64, 48]
+
+
+def save_scene(path: Path) -> None:
+    """A textured floor under a sky and a lamp: structure in x and in y."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_plane_add(size=6)
+    material = bpy.data.materials.new("checks")
+    material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    checker = nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Scale"].default_value = 17
+    shader = nodes["Principled BSDF"]
+    links.new(checker.outputs["Color"], shader.inputs["Base Color"])
+    bpy.context.object.data.materials.append(material)
+    bpy.ops.object.light_add(type="SUN", rotation=(0.5, 0.3, 0))
+    bpy.context.object.data.energy = 3
+    bpy.ops.object.camera_add(location=(0.3, -4, 4), rotation=(0.75, 0, 0.1))
+    scene = bpy.context.scene
+    scene.camera = bpy.context.object
+    scene.render.engine = "CYCLES"
+    scene.view_settings.exposure = 0.5
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+
+
+class World:
+    """Files of a measurement, and how to run it."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.scene = folder / "floor.blend"
+        self.windows = folder / "windows.json"
+        self.cache = folder / "cache"
+        self.reference = folder / "floor.exr"
+
+    def prepare(self) -> None:
+        save_scene(self.scene)
+        entry = {"resolution": FRAME, "window": WINDOW, "floor_psnr": 42.0}
+        self.windows.write_text(json.dumps({"floor": entry}), "utf-8")
+        self.reference.touch()
+        (shot,) = windows.find_shots([self.scene], self.windows, self.folder)
+        request = inputs.Request("plain", 32)
+        folder = inputs.Folder(self.cache)
+        arrays = inputs.rendered(shot, [request], folder, print)[request]
+        self.truth = arrays["radiance"]
+        planes = {letter: self.truth[..., i] for i, letter in enumerate("RGB")}
+        exr.write_picture(self.reference, planes)
+
+    def run(self, **options: Any) -> dict[str, Any]:
+        given = {"scales": [2], "samples": 4, "guide_samples": 2} | options
+        return evaluate(
+            [self.scene],
+            windows=self.windows,
+            references=self.folder,
+            cache=self.cache,
+            **given,
+        )
+
+
+@pytest.fixture(scope="module")
+def world(tmp_path_factory: pytest.TempPathFactory) -> World:
+    made = World(tmp_path_factory.mktemp("measure"))
+    made.prepare()
+    return made
+
+
+@pytest.fixture(scope="module")
+def report(world: World) -> dict[str, Any]:
+    return world.run(scales=[2, 4], guides=["fast", "full"])
+
+
+def test_every_rival_is_measured(report: dict[str, Any]) -> None:
+    keys = [
+        (r["scene"], r["scale"], r["preset"], r["guides"]) for r in report["scenes"]
+    ]
+    assert keys == [("floor", s, "fast", g) for s in (2, 4) for g in ("fast", "full")]
+    for record in report["scenes"]:
+        rivals = set(contenders.ENLARGEMENTS) | {"oidn_equal_spp"}
+        assert rivals <= set(record["methods"])
+        for row in record["methods"].values():
+            assert 10 < row["psnr"] < 60
+            assert 0 < row["relmse_trimmed"] <= row["relmse"] < 1
+            assert 0 < row["flip"] < 1
+            assert row["seconds"] is None
+        assert record["reference_psnr_floor"] == 42.0
+
+
+def test_checks_in_the_albedo_are_won_by_demodulation(report: dict[str, Any]) -> None:
+    for record in report["scenes"]:
+        methods = record["methods"]
+        better = methods["demodulated_bilinear"]["psnr"] - methods["bicubic"]["psnr"]
+        assert better > 1
+
+
+def test_low_resolution_and_guides_lie_on_the_reference(
+    world: World, report: dict[str, Any]
+) -> None:
+    (shot,) = windows.find_shots([world.scene], world.windows, world.folder)
+    settings = contenders.Settings(scales=(4,), samples=4, guide_samples=2)
+    held = contenders.Contenders(settings, inputs.Folder(world.cache), None, print)
+    given = held.inputs(shot, contenders.Case(4, "fast", "fast"))
+    assert given.exposure_stops == 0.5
+    errors = {}
+    for dy in range(-2, 3):
+        for dx in range(-2, 3):
+            moved = np.roll(world.truth, (dy, dx), axis=(0, 1))
+            means = moved.reshape(12, 4, 16, 4, 3).mean(axis=(1, 3))
+            inner = slice(1, -1)
+            errors[dy, dx] = metrics.psnr(
+                given.radiance[inner, inner], means[inner, inner]
+            )
+    assert max(errors, key=errors.__getitem__) == (0, 0), errors
+
+
+def test_a_second_run_renders_nothing(
+    world: World, report: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the package's attribute of this name is the public function
+    module = importlib.import_module("xrds_blender.frame.rendering")
+    monkeypatch.setattr(module, "run_job", lambda *a, **k: pytest.fail("rendered"))
+    again = world.run(scales=[2, 4], guides=["fast", "full"], out=world.folder)
+    assert again == report
+    assert json.loads((world.folder / "results.json").read_text()) == again
+
+
+def test_a_spoilt_file_is_rendered_again(world: World, report: dict[str, Any]) -> None:
+    (file,) = world.cache.glob("*low4*")
+    file.write_bytes(file.read_bytes()[:5000])
+    again = world.run(scales=[4])
+    assert len(again["scenes"]) == 1
+    assert file.stat().st_size > 5000
+
+
+def test_weights_and_whole_frames(world: World) -> None:
+    network = XRDS(preset_config("fast", 2))
+    weights.save(network, world.folder / "fast_x2.safetensors", {})
+    report = world.run(
+        weights=world.folder,
+        timing=True,
+        timing_rounds=1,
+        timing_scenes=["floor"],
+        sheets=world.folder / "sheets",
+    )
+    (record,) = report["scenes"]
+    assert next(iter(record["methods"])) == "xrds"
+    assert record["gain"] == report["worst"]["2"]["fast"]["gain"]
+    assert "oidn_equal_time" in record["methods"]
+    stages = record["frame_seconds"]["xrds"]
+    parts = sum(stages[p] for p in ("sync", "beauty", "denoise", "guides", "network"))
+    assert 0 < parts <= stages["total"]
+    assert record["methods"]["xrds"]["seconds"] == stages["total"]
+    assert record["frame_seconds"]["oidn_equal_time"]["samples"] >= 1
+    with Image.open(world.folder / "sheets" / "floor.jpg") as sheet:
+        assert sheet.width == 5 * (WINDOW[2] * 4 + 2)
+        assert sheet.height == 2 * (WINDOW[3] * 4 + 2 * 18)
+
+
+def test_unknown_names_are_refused(world: World) -> None:
+    with pytest.raises(UsageError, match="noisy"):
+        world.run(guides=["noisy"])
+    with pytest.raises(UsageError, match="boat"):
+        world.run(timing=True, timing_scenes=["floor", "boat"])
+
+
+def test_table_of_samples(world: World, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = world.folder / "networks"
+    folder.mkdir()
+    for guides in ("fast", "full"):
+        network = XRDS(preset_config("fast", 2, guides))
+        weights.save(network, folder / weights.file_name("fast", 2, guides), {})
+    report = samples_table(
+        [world.scene],
+        windows=world.windows,
+        references=world.folder,
+        cache=world.cache,
+        weights=folder,
+        out=world.folder,
+    )
+    assert json.loads((world.folder / "samples.json").read_text()) == report
+    rows = {
+        (r["method"], r["guides"], r["samples"], r["denoiser"]): r
+        for r in report["records"]
+    }
+    assert len(rows) == 5 + 3 + 2 * 4  # fast and full guides, two modes of OIDN
+    assert all(row["seconds"] > 0 for row in rows.values())
+    told = report["summary"]
+    ours = rows["xrds", "fast", 16, "HIGH-ACCURATE"]
+    for mode, denoiser in (("default", "HIGH-ACCURATE"), ("fast", "FAST-FAST")):
+        theirs = rows["oidn", "", 4, denoiser]
+        found = told["over_oidn"][mode]["4"]
+        assert found["gain"] == {"floor": ours["psnr"] - theirs["psnr"]}
+        assert found["seconds"] == {"floor": ours["seconds"] / theirs["seconds"]}
+        full = rows["xrds", "full", 16, "HIGH-ACCURATE"]
+        assert full["guide_samples"] == 4  # eight on the average, half of them each
+        eight = rows["oidn", "", 8, denoiser]
+        gain = told["full_over_oidn"][mode]["8"]["mean_gain"]
+        assert gain == full["psnr"] - eight["psnr"]
+    few, some, many = told["more_samples"]["floor"]
+    assert few < some < many + 1
+    shown = capsys.readouterr().err
+    assert f"{many - some:+.2f}" in shown or f"{some - few:+.2f}" in shown
+    assert "full guides" in shown

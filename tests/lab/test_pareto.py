@@ -1,0 +1,262 @@
+"""Frontiers, crossings and fits of the report; nothing is rendered."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from xrds_core.errors import Cancelled
+from xrds_lab.bench import growth, machine, pareto
+from xrds_lab.bench.inputs import OFF
+from xrds_lab.bench.journal import MOST_KILLS, Journal
+from xrds_lab.bench.stages import (
+    GUIDE_FILTER,
+    PLAIN_FRAME,
+    XRDS_FRAME,
+    StageTimes,
+    network_name,
+    task_name,
+)
+from xrds_lab.bench.sweep import Config, Sweep, anchor, anchors
+
+
+def point(seconds: float, psnr: float, method: str = "oidn", **more: Any) -> Any:
+    settings = {"denoiser": "HIGH-ACCURATE", "scale": 1, "guides": ""} | more
+    stages = {"total": seconds, "guides": 1.0, "beauty": seconds - 1.0}
+    return {
+        "scene": "car",
+        "method": method,
+        "settings": settings,
+        "label": f"{method} {seconds:g}",
+        "seconds": stages,
+        "psnr": psnr,
+        "relmse_trimmed": 10 ** (-psnr / 10),
+    }
+
+
+OIDN = [point(10, 20), point(20, 30), point(15, 19), point(40, 33)]
+XRDS = [
+    point(5, 22, "xrds", scale=4, guides="fast"),
+    point(12, 26, "xrds", scale=2, guides="fast"),
+]
+
+
+def test_frontier_leaves_out_what_is_beaten() -> None:
+    assert [p["psnr"] for p in pareto.frontier(OIDN)] == [20, 30, 33]
+    falling = pareto.frontier(OIDN, "relmse_trimmed")
+    assert [p["psnr"] for p in falling] == [20, 30, 33]
+
+
+def test_best_within_keeps_to_the_seconds() -> None:
+    assert pareto.best_within(OIDN, 19.9)["psnr"] == 20
+    assert pareto.best_within(OIDN, 9.9) is None
+
+
+def test_curve_is_linear_in_log_seconds() -> None:
+    assert pareto.at(OIDN, 9.0) is None
+    assert pareto.at(OIDN, 200**0.5) == pytest.approx(25)
+    assert pareto.at(OIDN, 400.0) == 33
+
+
+def test_crossings_name_who_is_better_from_where() -> None:
+    found = pareto.crossings(XRDS, OIDN)
+    assert [change["ours_better"] for change in found] == [True, False]
+    assert found[0]["seconds"] == 5
+    assert pareto.at(OIDN, found[1]["seconds"]) >= 26
+
+
+def test_cached_guides_cost_nothing() -> None:
+    groups = pareto.groups([*OIDN, *XRDS])
+    assert [p["seconds"]["total"] for p in groups[pareto.CACHED]] == [4, 11]
+    assert [p["seconds"]["total"] for p in groups["XRDS"]] == [5, 12]
+    assert set(groups) >= {"XRDS x2", "XRDS x4", "OIDN, default"}
+    assert "bicubic" not in groups
+
+
+def test_sets_of_guides_are_apart_where_there_are_two() -> None:
+    full = point(9, 27, "xrds", scale=2, guides="full")
+    assert "XRDS, fast guides" not in pareto.groups(XRDS)
+    groups = pareto.groups([*XRDS, full])
+    assert groups["XRDS, full guides"] == [full]
+    assert groups["XRDS, fast guides"] == XRDS
+
+
+def test_mean_curve_is_over_all_scenes_alike() -> None:
+    scenes = {"a": (OIDN, 10.0), "b": ([point(2, 25)], 1.0)}
+    curve = pareto.mean_curve(scenes)
+    assert curve[0][0] >= 2  # before, the second scene has nothing
+    assert curve[-1][1] == (33 + 25) / 2
+
+
+# --- seconds as sums of stages --------------------------------------------------------
+
+SWEEP = Sweep((("fast", 2, "fast"),))
+
+
+def timed(tmp_path: Path) -> StageTimes:
+    """A machine where a sample takes 2 s, OIDN 5 s; the second round is slow."""
+    times = StageTimes(tmp_path / "times.json")
+    denoise = {"HIGH-ACCURATE": 5.0, "HIGH-FAST": 1.0}
+    for slow in (1.0, 1.5, 1.0):
+        for request in anchors(SWEEP):
+            each = {"plain": 2.0, "low": 0.5, "guides": 1.0}[request.kind]
+            seconds = 0.1 + each * request.samples
+            if request.denoiser not in {None, OFF}:
+                part = denoise.get(request.denoiser, 3.0) / request.scale**2
+                seconds += part
+            run = {"seconds": slow * seconds, "cpu": 2 * slow * seconds, "peak": 100}
+            times.add(task_name(request), run)
+        for name in (PLAIN_FRAME, XRDS_FRAME):
+            times.add(name, {"seconds": 9.0, "cpu": 9.0, "peak": 50, "other": 0.25})
+        times.add("sync", {"seconds": 0.5, "cpu": 0.5, "peak": 10})
+        name = network_name(Config("xrds", 1, "", 2, "fast", "fast"))
+        times.add(name, {"seconds": 4.0, "cpu": 8.0, "peak": 300})
+        times.add(GUIDE_FILTER, {"seconds": 0.5, "cpu": 1.0, "peak": 300})
+    return times
+
+
+def test_seconds_are_sums_of_the_stages_medians(tmp_path: Path) -> None:
+    times = timed(tmp_path)
+    plain = times.cost(Config("oidn", 16, "HIGH-ACCURATE"))
+    assert plain.seconds == pytest.approx(
+        {
+            "sync": 0.5,
+            "beauty": 32.1,
+            "denoise": 5.0,
+            "guides": 0.0,
+            "network": 0.0,
+            "other": 0.25,
+            "total": 37.85,
+        }
+    )
+    assert plain.peak_memory == 100
+    own = times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", "fast", 4))
+    assert own.seconds["beauty"] == pytest.approx(4.1)
+    assert own.seconds["network"] == 4.0
+    few = times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", "fast", 3))
+    assert few.seconds["network"] == 4.5  # with their filter
+    assert own.seconds["denoise"] == pytest.approx(0.25)
+    assert own.seconds["guides"] == pytest.approx(4.1)
+    assert own.seconds["network"] == 4.0
+    assert own.cpu_seconds == pytest.approx(0.5 + 0.25 + 2 * (4.1 + 0.25 + 4.1) + 8)
+    assert own.peak_memory == 300
+
+
+def test_runs_are_kept(tmp_path: Path) -> None:
+    before = timed(tmp_path)
+    assert StageTimes(before.path).runs == before.runs
+
+
+def test_a_stage_that_failed_is_told_by_its_name(tmp_path: Path) -> None:
+    times = timed(tmp_path)
+    del times.runs[task_name(anchor("guides", more=True))]
+    with pytest.raises(KeyError, match="guides"):
+        times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", "fast", 4))
+    times.cost(Config("oidn", 1, "HIGH-ACCURATE"))
+
+
+# --- what fails -----------------------------------------------------------------------
+
+
+def test_one_failure_does_not_end_the_run(tmp_path: Path) -> None:
+    said: list[str] = []
+    journal = Journal(tmp_path / "journal.json", said.append)
+    with journal.attempt("one"):
+        raise ValueError("no such node")
+    assert journal.gives_up("one")
+    assert not journal.gives_up("two")
+    assert said == ["one failed and is left out: ValueError: no such node"]
+    assert not Journal(journal.path, print).gives_up("one")  # the next run tries again
+
+
+def test_an_interrupt_ends_the_run(tmp_path: Path) -> None:
+    journal = Journal(tmp_path / "journal.json", print)
+    with pytest.raises(Cancelled), journal.attempt("one"):
+        raise Cancelled
+    assert not Journal(journal.path, print).kills
+
+
+def test_what_kills_the_process_again_and_again_is_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "journal.json"
+    for kills in range(MOST_KILLS):
+        journal = Journal(path, print)
+        assert not journal.gives_up("deadly"), kills
+        journal._running = "deadly"  # and the process is gone
+        journal._write()
+    last = Journal(path, print)
+    assert last.gives_up("deadly")
+    assert "ended with its process 3 times" in last.failures["deadly"]
+
+
+@pytest.mark.skipif(machine.cores() < 2, reason="there is one core alone")
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="not Linux")
+def test_threads_are_held_to_cores_and_let_go_again() -> None:
+    before = os.sched_getaffinity(0)
+    with machine.only_cores(1):
+        assert machine.cores() == 1
+    assert os.sched_getaffinity(0) == before
+    with pytest.raises(OSError, match="cores, not 4096"), machine.only_cores(4096):
+        pass
+
+
+@pytest.mark.skipif(not machine.forget_peak(), reason="the system tells no peak")
+def test_peak_memory_is_of_the_task_alone() -> None:
+    megabytes = 64
+    machine.forget_peak()
+    before = machine.peak()
+    del bytearray(b"x" * (megabytes << 20))[:]
+    assert machine.peak() - before > megabytes << 19
+    machine.forget_peak()
+    assert machine.peak() - before < megabytes << 19
+
+
+# --- growth ---------------------------------------------------------------------------
+
+
+def row(task: str, pixels: int, cores: int, seconds: float) -> Any:
+    return {
+        "task": task,
+        "size": [pixels, 1],
+        "pixels": pixels,
+        "cores": cores,
+        "seconds": seconds,
+        "peak_memory": None,
+    }
+
+
+def test_exponents_are_found() -> None:
+    rows = [row("network", n, 2, 3e-6 * n**1.1) for n in (1000, 4000, 9000)]
+    (fit,) = growth.exponents([*rows, row("alone", 10, 2, 1.0)])
+    assert fit["seconds"] == pytest.approx(1.1)
+    assert fit["peak_memory"] is None
+
+
+def test_more_cores_are_extrapolated_and_marked() -> None:
+    rows = [row("network", 10, cores, 2 + 6 / cores) for cores in (1, 2)]
+    assert growth.seconds_on(rows, "network", 2) == 5
+    assert growth.seconds_on(rows, "network", 8) == pytest.approx(2.75)
+    assert growth.seconds_on(rows[:1], "network", 8) is None
+
+
+def test_break_even_sets_saved_against_paid() -> None:
+    name = "XRDS fast x2"
+    rows = []
+    for cores in (1, 2):
+        rows.append(row(PLAIN_FRAME, 10, cores, 40 / cores))
+        rows.append(row(f"whole frame, {name}, less the network", 10, cores, 8 / cores))
+        rows.append(row(name, 10, cores, 6 / cores))
+        rows.append(row("OIDN HIGH-ACCURATE alone", 10, cores, 30 / cores))
+        rows.append(row("OIDN HIGH-FAST alone", 10, cores, 2 / cores))
+    found = growth.break_even(rows, [("fast", 2, "fast")])
+    assert [(r["cores"], r["extrapolated"]) for r in found] == [
+        ("1", False),
+        ("2", False),
+        ("8", True),
+        ("32", True),
+    ]
+    assert found[2]["saved"] == pytest.approx(4)
+    assert found[2]["paid"] == pytest.approx(0.75)
+    assert found[1]["saved_quick"] == pytest.approx((40 - 30 + 2 - 8) / 2)

@@ -1,0 +1,78 @@
+"""The report of `xrds stability`: failures first, and what one run adds to another."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from xrds_core.errors import UsageError
+from xrds_lab.stability import report, suite
+from xrds_lab.stability.measured import Measured
+from xrds_lab.stability.subject import Subject
+
+
+def even(subject: Subject) -> Iterator[Measured]:
+    yield Measured("energy.smooth", 0.001)
+    yield Measured("firefly.far_change", 0.0, {1e2: 0.0, 1e4: 0.0})
+
+
+def uneven(subject: Subject) -> Iterator[Measured]:
+    yield Measured("energy.smooth", 0.5)
+    yield Measured("grey.chroma", float(subject.scale))
+
+
+def measure(monkeypatch: pytest.MonkeyPatch, out: Path, *works: suite.Work) -> dict:
+    monkeypatch.setattr(suite, "GROUPS", {"some": works})
+    return suite.stability(out, parts=["arrays"], device="cpu")
+
+
+def test_failures_come_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    told = measure(monkeypatch, tmp_path, uneven)
+    assert not told["passed"]
+    assert told == json.loads((tmp_path / "results.json").read_text())
+    page = (tmp_path / "report.md").read_text()
+    failures = page[page.index("## Failures") : page.index("## All values")]
+    assert "| `grey.chroma` | fast x4 bf16 | 4 | 0.001 | **none** |" in failures
+    assert {"name", "preset", "scale", "precision", "value", "bound", "passed"} < set(
+        told["checks"][0]
+    )
+
+
+def test_a_second_run_adds_to_the_first(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    first = measure(monkeypatch, tmp_path, even)
+    assert first["passed"]
+    assert (tmp_path / "firefly_far_change.png").is_file()
+    both = measure(monkeypatch, tmp_path, uneven)
+    names = [check["name"] for check in both["checks"]]
+    assert len(names) == 3 * len(first["checks"]) // 2
+    values = {c["value"] for c in both["checks"] if c["name"] == "energy.smooth"}
+    assert values == {0.5}
+    assert both["curves"] == first["curves"]
+
+
+def test_other_weights_start_anew(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    told = measure(monkeypatch, tmp_path, even)
+    told["weights"] = []
+    (tmp_path / "results.json").write_text(json.dumps(told))
+    names = {c["name"] for c in measure(monkeypatch, tmp_path, uneven)["checks"]}
+    assert names == {"energy.smooth", "grey.chroma"}
+
+
+def test_a_page_without_failures_says_so(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    measure(monkeypatch, tmp_path, even)
+    assert "## Failures\n\nNone." in (tmp_path / "report.md").read_text()
+    assert set(report.PLOTS[0]) >= {"firefly.far_change"}
+
+
+def test_unknown_parts_are_wrong_usage(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="everything"):
+        suite.stability(tmp_path, parts=["everything"])

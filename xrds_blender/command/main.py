@@ -1,0 +1,94 @@
+"""`xrds ...` and `blender --command xrds ...`: parse, call the work, print.
+
+Exit status: 0 done, 1 failed, 2 wrong usage, 130 interrupted. With --json, stdout
+holds the JSON alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from importlib.metadata import entry_points
+from typing import Any, NoReturn
+
+from . import console, info, render, upscale
+
+AddCommand = Callable[[Any], argparse.ArgumentParser]
+
+# The laboratory's commands join by entry points of this group, each a function that
+# adds a parser. Their names stand here for a better error where it is not installed.
+GROUP = "xrds.commands"
+LABORATORY = (
+    "evaluate",
+    "stability",
+    "plan-report",
+    "bench",
+    "dataset",
+    "train",
+    "ablate",
+    "train-filter",
+)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit status."""
+    words = sys.argv[1:] if argv is None else list(argv)
+    try:
+        options = _parser(words).parse_args(words)
+    except SystemExit as end:  # argparse has printed why
+        return int(end.code or 0)
+    if not options.json:
+        return console.status_of(lambda: _print_lines(options))
+    with console.stdout_for_json() as write:
+        return console.status_of(lambda: write(options.work(options)))
+
+
+def program() -> NoReturn:
+    """Run the console script `xrds`."""
+    console.interrupt_at_once()
+    console.leave(main())
+
+
+def _print_lines(options: argparse.Namespace) -> None:
+    result = options.work(options)
+    for line in options.lines(result) if result else ():
+        print(line)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Prints wrong usage in one line, like every other error."""
+
+    def error(self, message: str) -> NoReturn:
+        line = f"xrds: {message}; see {self.prog} --help\n"
+        self.exit(console.WRONG_USAGE, line)
+
+
+def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
+    parser = _Parser("xrds", description="Guided super-resolution of Cycles renders.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    added = (info.add_info, render.add_render, render.add_plan, upscale.add_upscale)
+    for add in (*added, *_laboratory()):
+        command = add(commands)
+        command.add_argument(
+            "--json", action="store_true", help="print JSON on stdout, all else beside"
+        )
+    asked = words[0] if words else ""
+    if asked in LABORATORY and asked not in commands.choices:
+        parser.error(
+            f"{asked} belongs to the laboratory, which is not installed: "
+            "pip install ./xrds_lab from the source of XRDS"
+        )
+    return parser
+
+
+def _laboratory() -> Iterator[AddCommand]:
+    """The laboratory's commands that are installed, in the order of their names."""
+    found = {entry.name: entry for entry in entry_points(group=GROUP)}
+    for name in LABORATORY:
+        if name in found:
+            yield found[name].load()
+
+
+if __name__ == "__main__":
+    program()

@@ -1,0 +1,85 @@
+"""`xrds render` and `xrds plan`: a .blend file's frames, or what they would take."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from xrds_core.errors import UsageError
+
+from . import arguments
+from .deferred import need_blender
+from .options import add_job, job_of
+
+
+def add_render(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds render`."""
+    command = commands.add_parser("render", help="render a .blend file")
+    add = command.add_argument
+    add_job(command)
+    add("-o", "--output", help=".exr or .png; # for frame numbers")
+    add("--explain", action="store_true", help="print the plan and render nothing")
+    add("--resume", action="store_true", help="skip frames that are there, complete")
+    which = command.add_mutually_exclusive_group()
+    which.add_argument("--frame", type=arguments.frame, dest="frames", metavar="F")
+    which.add_argument(
+        "--frames", type=arguments.frames, help="first-last", metavar="A-B"
+    )
+    command.set_defaults(work=_render, lines=_lines)
+    return command
+
+
+def add_plan(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds plan`."""
+    command = commands.add_parser("plan", help="what a render would do and leave out")
+    add_job(command)
+    command.set_defaults(work=_plan, lines=_plan_lines)
+    return command
+
+
+def _render(options: argparse.Namespace) -> dict[str, Any]:
+    if options.explain:
+        return _plan(options)
+    need_blender("render")
+    if options.output is None:
+        raise UsageError("name the output with -o, or ask for the plan with --explain")
+    from .render_file import render_file
+
+    return render_file(
+        options.scene,
+        options.output,
+        job_of(options),
+        frames=options.frames,
+        resolution=options.resolution,
+        resume=options.resume,
+    )
+
+
+def _plan(options: argparse.Namespace) -> dict[str, Any]:
+    need_blender("plan")
+    from ..frame.explain import explain
+    from .scene_file import open_scene
+
+    job = job_of(options)
+    return explain(open_scene(options.scene, options.resolution), job)
+
+
+def _plan_lines(result: dict[str, Any]) -> list[str]:
+    return [f"{_decision(each)}: {each['reason']}" for each in result["decisions"]]
+
+
+def _decision(decision: dict[str, Any]) -> str:
+    saving = decision["saving_seconds"]
+    estimate = f" (saves about {saving:.1f} s)" if saving else ""
+    return f"{decision['decision']}: {decision['value']}{estimate}"
+
+
+def _lines(result: dict[str, Any]) -> list[str]:
+    if "decisions" in result:
+        return _plan_lines(result)
+    lines = [f"frame {number}: skipped, complete" for number in result["kept"]]
+    lines += [
+        f"{frame['output']}: {frame['seconds']['total']:.1f} s"
+        for frame in result["frames"]
+    ]
+    return lines + [f"  {_decision(each)}" for each in result["plan"]]

@@ -1,0 +1,136 @@
+"""`xrds render`: a .blend file in, one picture file per frame out."""
+
+from __future__ import annotations
+
+import dataclasses
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xrds_core.atomic import sweep
+from xrds_core.errors import PictureError, XRDSError
+
+from ..cycles.size import picture_size
+from ..frame.job import NetworkFailed
+from ..frame.networks import known_networks, load_upscaler
+from . import picture_file
+from .scene_file import open_scene
+from .whole_file import is_whole
+
+if TYPE_CHECKING:
+    from ..frame.job import Picture, RenderJob
+
+
+def render_file(
+    path: Path,
+    output: str,
+    job: RenderJob,
+    *,
+    frames: Sequence[int] | None = None,
+    resolution: tuple[int, int] | None = None,
+    resume: bool = False,
+) -> dict[str, Any]:
+    """Render frames of a .blend file and return what `xrds render --json` prints.
+
+    Args:
+        path: the .blend file; whatever Blender has open is replaced by it.
+        output: .exr or .png; # stands for digits of the frame number.
+        job: scale, samples and the rest.
+        frames: numbers of the frames; the file's current one by default.
+        resolution: width and height in pixels instead of the file's.
+        resume: leave frames as they are that lie there whole and of their size.
+
+    Raises:
+        UsageError, SceneError, PictureError, WeightsError: before anything is
+            rendered, if it could not succeed. Later: PictureError for a frame that
+            cannot be written, NetworkFailed; both tell where what was rendered is
+            kept, and the frames before are there.
+    """
+    picture_file.check_output(output, len(frames or [0]))
+    scene = open_scene(path, resolution)
+    _check_network(job)
+    numbers = list(frames or [scene.frame_current])
+    if resume:
+        sweep(Path(output).parent)
+    kept, told, last = [], [], None
+    size = picture_size(scene.render)
+    for number in numbers:
+        # asked anew for each: another render may be writing the same frames
+        if resume and is_whole(picture_file.frame_path(output, number), size):
+            kept.append(number)
+            continue
+        entry, last = _frame(scene, job, output, number)
+        told.append(entry)
+    job = (last and last.job) or job
+    return {
+        "output": output,
+        "resolution": list(size),
+        "scale": 1 if job.is_plain else job.scale,
+        "preset": None if job.is_plain else job.preset,
+        "device": last.device if last else "",
+        "frames": told,
+        "kept": kept,
+        "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
+    }
+
+
+def _check_network(job: RenderJob) -> None:
+    """Raise XRDSError now rather than after the Cycles renders."""
+    if job.is_picked:
+        known_networks(job)  # and PyTorch is loaded before the budget begins
+    elif not job.is_plain:
+        load_upscaler(job)
+
+
+def _frame(
+    scene: Any, job: RenderJob, output: str, number: int
+) -> tuple[dict[str, Any], Picture]:
+    """Render and write one frame; its entry for the JSON, and the picture."""
+    from ..frame.rendering import render
+
+    scene.frame_set(number)
+    target = picture_file.frame_path(output, number)
+    try:
+        picture = render(scene, **vars(job))
+    except NetworkFailed as error:
+        low = target.with_stem(f"{target.stem}_low")
+        place = _keep(low, error.radiance, error.alpha, scene)
+        raise XRDSError(f"frame {number}: {error}, {place}") from error
+    start = time.perf_counter()
+    try:
+        picture_file.save(target, picture.radiance, picture.alpha, scene)
+    except PictureError as error:
+        place = _keep_elsewhere(target, picture.radiance, picture.alpha, scene)
+        raise PictureError(f"{error}; the frame is {place}") from error
+    written = time.perf_counter() - start
+    seconds = dict(picture.seconds)
+    seconds["write"] += written
+    seconds["total"] += written
+    told = {
+        "frame": number,
+        "output": str(target),
+        "seconds": seconds,
+        "peak_memory": picture.peak_memory,
+    }
+    return told, picture
+
+
+def _keep(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
+    """Write what was rendered and tell where it is."""
+    try:
+        picture_file.save(target, radiance, alpha, scene)
+    except PictureError:
+        return _keep_elsewhere(target, radiance, alpha, scene)
+    return f"kept as {target}"
+
+
+def _keep_elsewhere(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
+    """Write into the machine's own folder what its place does not take."""
+    try:
+        place = Path(tempfile.mkdtemp(prefix="xrds-")) / target.name
+        picture_file.save(place, radiance, alpha, scene)
+    except (OSError, PictureError):
+        return "lost: the folder for temporary files takes no file either"
+    return f"kept as {place}"

@@ -1,0 +1,51 @@
+"""`xrds upscale`: pictures out of EXR files, without Blender."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from . import arguments
+from .options import add_network
+
+
+def add_upscale(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds upscale`."""
+    command = commands.add_parser("upscale", help="enlarge a render from EXR files")
+    add = command.add_argument
+    add("beauty", type=Path, metavar="BEAUTY.exr", help="low-resolution picture")
+    add("guide_file", type=Path, metavar="GUIDES.exr", help="full-resolution passes")
+    add("-o", "--output", type=Path, required=True, metavar="OUT.exr")
+    add("--scale", type=int, choices=(1, 2, 4, 8), default=2)
+    add(
+        "--guide-samples",
+        type=arguments.positive,
+        metavar="N",
+        help="per pixel of GUIDES.exr: the noise of few is filtered; many by default",
+    )
+    add_network(command)
+    command.set_defaults(work=_upscale, lines=_lines)
+    return command
+
+
+def _upscale(options: argparse.Namespace) -> dict[str, Any]:
+    from ..frame.torch_folder import load
+
+    return load("exr_upscale").upscale_file(
+        options.beauty,
+        options.guide_file,
+        options.output,
+        scale=options.scale,
+        preset=options.preset,
+        guides=options.guides,
+        guide_samples=options.guide_samples,
+        exposure=options.exposure,
+        device=options.device,
+        memory_limit=options.memory_limit,
+        weights=options.weights,
+    )
+
+
+def _lines(result: dict[str, Any]) -> list[str]:
+    return [f"{result['output']}: {result['seconds']:.1f} s"]

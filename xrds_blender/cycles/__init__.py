@@ -1,0 +1,1 @@
+"""Cycles: its session, settings, passes and camera."""

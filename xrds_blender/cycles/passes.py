@@ -1,0 +1,389 @@
+"""The Cycles renders inside one `RenderEngine.render()`: beauty and guides.
+
+Arrays are float32 (height, width, channels), scene-linear, row 0 on top; Blender's
+rows are turned in `cycles_session` alone. The user's scene is never touched: samples,
+bounces and camera are set on the evaluated scene, sizes on the pipeline's own copy
+of the render settings, and all of it is given back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..planning.denoiser import Denoiser
+from ..planning.plan import GuideRender
+from . import session
+from .borrowed import Borrowed, PipelineSettings
+from .guide_settings import guide_settings
+from .low_camera import Frame, LowGrid, Region, is_exact, widen
+from .pass_names import ALBEDO, COMBINED, DEPTH, GUIDE_PASSES, NOISY, NORMAL, is_light
+from .settings import set_box_filter, set_denoising, set_sampling
+from .size import border_start, frame_size
+
+if TYPE_CHECKING:
+    from xrds_core.arrays import Array
+
+# The tiny whole frame that a border render takes its exposure from.
+OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
+
+
+@dataclass(frozen=True)
+class Beauty:
+    """The low-resolution radiance (h, w, 3), premultiplied, and alpha (h, w).
+
+    `offset` (dy, dx): where the region starts inside the coverage, in full-resolution
+    pixels. `seconds`: sync, beauty, denoise. `noisy` is None without denoising.
+    """
+
+    radiance: Array
+    alpha: Array
+    noisy: Array | None
+    offset: tuple[int, int]
+    seconds: dict[str, float] = field(default_factory=dict)
+    others: dict[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Guides:
+    """Full-resolution albedo and normal (H, W, 3), alpha and depth (H, W).
+
+    Albedo is as Cycles writes it, not clamped; normals are in camera space.
+    `radiance` (H, W, 3) is there for full guides only. `samples` are per pixel, None
+    for guides without noise. `seconds`: sync, guides.
+    """
+
+    albedo: Array
+    normal: Array
+    alpha: Array
+    depth: Array | None
+    radiance: Array | None
+    samples: int | None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+
+class CyclesPasses:
+    """Cycles renders of one view layer; a context manager inside `render()`.
+
+    Any number of `beauty` and `guides` calls, in any order. Raises Cancelled when the
+    user stops the render and SceneError when this Blender keeps its render settings
+    in an unknown way. On exit every setting is as before. `noisy` and `depth` ask for
+    what the file's own passes may not give.
+    """
+
+    def __init__(
+        self, engine: Any, depsgraph: Any, *, noisy: bool = False, depth: bool = False
+    ) -> None:
+        self._engine, self._depsgraph = engine, depsgraph
+        self._scene = depsgraph.scene_eval
+        self._layer_eval = depsgraph.view_layer_eval
+        self._layer_name = self._layer_eval.name
+        # The method of this name hides the property, so it is asked for by path.
+        self._render = engine.path_resolve("render")
+        self._borrowed = Borrowed()
+        self._extra = [(DEPTH, "Z")] * depth + [(NOISY, "RGBA")] * noisy
+        self.peak_memory = 0
+        render, result = self._render, engine.get_result()
+        self.width, self.height = frame_size(render)
+        self._size = result.resolution_x, result.resolution_y
+        self.region = self._find_region()
+        self.frame = Frame(
+            self.width, self.height, render.pixel_aspect_x, render.pixel_aspect_y
+        )
+        self.views = [view.name for view in result.views] or [""]
+
+    def _find_region(self) -> Region:
+        width, height = self._size
+        if not self._render.use_border:
+            return Region(0, 0, width, height)
+        x, bottom = border_start(self._render)
+        return Region(x, self.height - bottom - height, width, height)
+
+    def __enter__(self) -> CyclesPasses:
+        self._pipeline = PipelineSettings(self._render, self._scene)
+        self._keeps_session = self._render.use_persistent_data
+        # Else Cycles frees the dependency graph after its first sync.
+        self._pipeline.set(use_persistent_data=True)
+        session.prepare(self._engine, self._depsgraph)
+        self._scene = self._depsgraph.scene_eval
+        self._layer_eval = self._depsgraph.view_layer_eval
+        for name, letters in self._wanted_passes():
+            if name not in self._layer().passes:
+                self._engine.add_pass(
+                    name, len(letters), letters, layer=self._layer_name
+                )
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if error is not None or not self._keeps_session:
+                session.free(self._engine)
+        finally:
+            self._borrowed.give_back()
+            self._pipeline.give_back()
+
+    def _wanted_passes(self) -> list[tuple[str, str]]:
+        wanted = [(name, letters) for name, letters, _ in GUIDE_PASSES]
+        return wanted + self._extra
+
+    def _layer(self) -> Any:
+        return self._engine.get_result().layers[self._layer_name]
+
+    def beauty(
+        self,
+        scale: int,
+        samples: int | None = None,
+        *,
+        denoise: bool = True,
+        seed: int | None = None,
+        denoiser: Denoiser | None = None,
+    ) -> Beauty:
+        """Render the beauty at 1/scale of the size, filtered by a box of one pixel.
+
+        Scale 1 keeps the scene's own filter: plain Cycles. `samples` None takes the
+        scene's sampling, adaptive or not; `denoiser` None the scene's mode. Without a
+        denoiser in this Blender the picture stays noisy.
+        """
+        return self.beauties(
+            scale,
+            samples,
+            denoise=denoise,
+            seed=seed,
+            denoiser=denoiser,
+        )[self.views[0]]
+
+    def beauties(
+        self,
+        scale: int,
+        samples: int | None = None,
+        *,
+        denoise: bool = True,
+        seed: int | None = None,
+        denoiser: Denoiser | None = None,
+    ) -> dict[str, Beauty]:
+        """As `beauty`, for every view by name (one without stereo)."""
+        denoise = denoise and session.has_denoiser()
+        grid = self._grid(scale)
+        with Borrowed() as borrowed:
+            set_sampling(borrowed, self._scene, samples, seed)
+            set_denoising(borrowed, self._scene, self._layer_eval, denoise, denoiser)
+            clock = self._run_low(borrowed, grid)
+        seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
+        return {
+            view: self._read_beauty(view, grid, denoise, seconds) for view in self.views
+        }
+
+    def border_exposure(self) -> float | None:
+        """The exposure of the whole frame, where a border cuts a part out of it.
+
+        From a tiny picture of all of it, so that parts fit together. None without a
+        border: the picture itself then tells it.
+        """
+        if not self._render.use_border:
+            return None
+        from xrds_core.front_end import auto_exposure
+
+        width, height = self._size
+        scale = max(-(-self.width // width), -(-self.height // height))
+        scale = max(scale, -(-max(self.width, self.height) // OVERVIEW_SIDE))
+        low_width, low_height = self.frame.low_size(scale)
+        whole = Region(0, 0, low_width, low_height)
+        with Borrowed() as borrowed:
+            set_sampling(borrowed, self._scene, OVERVIEW_SAMPLES, None)
+            set_denoising(borrowed, self._scene, self._layer_eval, False)
+            grid = LowGrid(self.frame, scale, whole, exact=True)
+            self._run_low(borrowed, grid, exact=False)
+        picture = self._read_corner(self._radiance(self.views[0], False), whole)
+        return auto_exposure(np.ascontiguousarray(picture[..., :3]))
+
+    def hold_still(self) -> None:
+        """Render without motion blur, to be called before the first pass."""
+        self._borrowed.set(self._scene.render, use_motion_blur=False)
+
+    def pass_names(self) -> list[str]:
+        """All passes of the result, each once whatever its views."""
+        return list(dict.fromkeys(item.name for item in self._layer().passes))
+
+    def data_passes(self) -> dict[tuple[str, str], Array]:
+        """All passes by (view, name) but the picture and its light, as they are now."""
+        kept = [n for n in self.pass_names() if n != COMBINED and not is_light(n)]
+        found = {(view, n): self._read(n, view) for view in self.views for n in kept}
+        return {key: pixels for key, pixels in found.items() if pixels is not None}
+
+    def put_back(self, passes: dict[tuple[str, str], Array]) -> None:
+        """Write passes that `data_passes` gave into the result again."""
+        for (view, name), pixels in passes.items():
+            session.write_pass(self._layer(), name, view, pixels)
+
+    def guides(
+        self,
+        samples: int,
+        *,
+        full: bool = False,
+        denoise: bool = False,
+        seed: int | None = None,
+    ) -> Guides:
+        """Render albedo and normal at full size with the file's own filter.
+
+        Only mirror and glass bounces are followed, which is all that albedo and normal
+        need; `full` keeps every bounce and gives the radiance too, denoised if asked.
+        Beauty and full guides in order of rising samples share one sync of the scene.
+        """
+        return self.guides_by_view(samples, full=full, denoise=denoise, seed=seed)[
+            self.views[0]
+        ]
+
+    def guides_by_view(
+        self,
+        samples: int,
+        *,
+        full: bool = False,
+        denoise: bool = False,
+        seed: int | None = None,
+        how: GuideRender | None = None,
+    ) -> dict[str, Guides]:
+        """As `guides`, for every view by name; `how` tells what may be left out."""
+        denoise = denoise and full and session.has_denoiser()
+        how = how or GuideRender(shadows=False)
+        settings = nullcontext() if full else guide_settings(self._depsgraph, how)
+        with Borrowed() as borrowed, settings:
+            set_sampling(borrowed, self._scene, samples, seed)
+            set_denoising(borrowed, self._scene, self._layer_eval, denoise)
+            clock = self._run((self.width, self.height), self.region, exact=full)
+        seconds = {"sync": clock.sync, "guides": clock.render}
+        return {
+            view: self._read_guides(view, full, denoise, samples, seconds)
+            for view in self.views
+        }
+
+    def probe_guides(self, scale: int, samples: int) -> dict[str, float]:
+        """Seconds (sync, guides) of guides at 1/scale of the size; no pixels."""
+        settings = guide_settings(self._depsgraph, GuideRender(shadows=False))
+        with Borrowed() as borrowed, settings:
+            set_sampling(borrowed, self._scene, samples, None)
+            set_denoising(borrowed, self._scene, self._layer_eval, False)
+            clock = self._run_low(borrowed, self._grid(scale), exact=False)
+        return {"sync": clock.sync, "guides": clock.render}
+
+    def _cameras(self) -> list[Any]:
+        import bpy
+
+        ids = self._depsgraph.ids
+        return [item for item in ids if isinstance(item, bpy.types.Camera)]
+
+    def _grid(self, scale: int) -> LowGrid:
+        """The low-resolution pixels of the region."""
+        window = self.region if scale == 1 else self.region.low(scale)
+        exact = scale == 1 or is_exact(self._scene.camera.data)
+        return LowGrid(self.frame, scale, window, exact)
+
+    def _run_low(
+        self, borrowed: Borrowed, grid: LowGrid, *, exact: bool = True
+    ) -> session.StageClock:
+        if grid.scale > 1:
+            set_box_filter(borrowed, self._scene, grid.scale)
+            for camera in self._cameras():
+                widen(borrowed, camera, self.frame, grid.scale)
+        size = self.frame.low_size(grid.scale)
+        return self._run(size, grid.rendered(self._size), exact=exact)
+
+    def _run(
+        self, size: tuple[int, int], window: Region, *, exact: bool
+    ) -> session.StageClock:
+        """Render `window` of a frame of `size` into the lower left of the result."""
+        depth = self._pipeline.depth
+        with Borrowed() as borrowed:
+            try:
+                borrowed.set(self._render, resolution_percentage=100)
+                width, height = size
+                self._pipeline.set(resolution_x=width, resolution_y=height)
+                if self._render.use_border:
+                    # A quarter pixel in, so that truncation finds the same pixel.
+                    borrowed.set(
+                        self._render,
+                        border_min_x=(window.x + 0.25) / width,
+                        border_max_x=min(1.0, (window.x + window.width + 0.25) / width),
+                        border_min_y=(height - window.y - window.height + 0.25)
+                        / height,
+                        border_max_y=min(1.0, (height - window.y + 0.25) / height),
+                    )
+                clock = session.run(self._engine, self._depsgraph, exact=exact)
+            finally:
+                self._pipeline.give_back(keep=depth)
+        self.peak_memory = max(self.peak_memory, clock.peak)
+        session.stop_if_cancelled(self._engine)
+        return clock
+
+    def _read(self, name: str, view: str) -> Array | None:
+        return session.read_pass(self._layer(), name, view, self._size)
+
+    def _radiance(self, view: str, denoised: bool) -> Array:
+        """Radiance and alpha; undenoised Cycles leaves Combined black beside Noisy."""
+        pixels = None if denoised else self._read(NOISY, view)
+        if pixels is None:
+            pixels = self._read(COMBINED, view)
+        assert pixels is not None
+        return pixels
+
+    def _read_corner(self, pixels: Array, window: Region) -> Array:
+        """What a smaller render left in the lower left of the result."""
+        return pixels[-window.height :, : window.width]
+
+    def _read_beauty(
+        self, view: str, grid: LowGrid, denoised: bool, seconds: dict[str, float]
+    ) -> Beauty:
+        rendered = grid.rendered(self._size)
+
+        def low(pixels: Array) -> Array:
+            return grid.resample(self._read_corner(pixels, rendered), rendered)
+
+        picture = low(self._radiance(view, denoised))
+        noisy = self._read(NOISY, view) if denoised else None
+        return Beauty(
+            picture[..., :3].copy(),
+            picture[..., 3].copy(),
+            None if noisy is None else low(noisy)[..., :3],
+            grid.offset(self.region),
+            seconds,
+            {name: low(pixels) for name, pixels in self._light_passes(view)},
+        )
+
+    def _light_passes(self, view: str) -> Iterator[tuple[str, Array]]:
+        for name in self.pass_names():
+            if is_light(name):
+                pixels = self._read(name, view)
+                if pixels is not None:
+                    yield name, pixels
+
+    def _read_guides(
+        self,
+        view: str,
+        full: bool,
+        denoised: bool,
+        samples: int,
+        seconds: dict[str, float],
+    ) -> Guides:
+        albedo, normal = self._read(ALBEDO, view), self._read(NORMAL, view)
+        assert albedo is not None
+        assert normal is not None
+        depth = self._read(DEPTH, view)
+        radiance = self._radiance(view, denoised)
+        return Guides(
+            albedo,
+            normal,
+            radiance[..., 3].copy(),
+            None if depth is None else depth[..., 0],
+            radiance[..., :3].copy() if full else None,
+            samples,
+            seconds,
+        )

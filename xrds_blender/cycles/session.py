@@ -1,0 +1,153 @@
+"""Cycles run by hand on an engine object of our own, one session for several passes.
+
+Cycles writes into the render result of the engine that its session was made with.
+One session serves every pass: `reset` makes it take the new size and settings, and
+only what the dependency graph calls updated is synced again. The graph still calls
+everything updated when a render starts, so `prepare` lets it forget that; the second
+sync and its BVH then cost next to nothing.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from xrds_core.errors import Cancelled
+
+from .clock import StageClock
+
+if TYPE_CHECKING:
+    # numpy is imported where pixels are: Blender starts faster without it.
+    from xrds_core.arrays import Array
+
+
+def functions() -> Any:
+    """The functions module of the Cycles add-on that comes with Blender."""
+    import addon_utils
+
+    if not addon_utils.check("cycles")[1]:
+        addon_utils.enable("cycles", default_set=False)
+    from cycles import engine
+
+    return engine
+
+
+def has_denoiser() -> bool:
+    """Whether this build of Blender holds OpenImageDenoise."""
+    import _cycles
+
+    return bool(_cycles.with_openimagedenoise)
+
+
+def prepare(engine: Any, depsgraph: Any) -> None:
+    """Hand the graph's updates to a session kept from the frame before, then forget.
+
+    To be called before anything is set on evaluated data: should the graph hold
+    changes not yet evaluated, those are made now.
+    """
+    import bpy
+
+    if getattr(engine, "session", None):
+        functions().reset(engine, bpy.data, depsgraph)
+    handlers = bpy.app.handlers
+    # Nothing changed, so nobody is to hear of it.
+    held = [
+        (listeners, list(listeners))
+        for listeners in (handlers.depsgraph_update_pre, handlers.depsgraph_update_post)
+    ]
+    try:
+        for listeners, _ in held:
+            listeners.clear()
+        depsgraph.update()
+    finally:
+        for listeners, before in held:
+            listeners[:] = before
+
+
+def run(engine: Any, depsgraph: Any, *, exact: bool = True) -> StageClock:
+    """Render the current settings with the engine's session, made when missing.
+
+    A session lays its blue noise for the most samples it has been asked for: with
+    fewer the picture is right but worse to denoise (by up to 4 dB of what the denoiser
+    gains). So `exact` starts a new session then; albedo and normals do not care.
+    """
+    import bpy
+
+    cycles = functions()
+    samples = _samples(depsgraph)
+    with StageClock() as clock:
+        if getattr(engine, "session", None) and (
+            (exact and samples < engine.most_samples) or not _tagged(depsgraph)
+        ):
+            free(engine)
+        if not getattr(engine, "session", None):
+            cycles.create(engine, bpy.data)
+            engine.most_samples = 0
+        engine.most_samples = max(samples, engine.most_samples)
+        cycles.reset(engine, bpy.data, depsgraph)
+        cycles.render(engine, depsgraph)
+        # With tiles the pixels lie in a file until this call.
+        cycles.render_frame_finish(engine)
+    return clock
+
+
+def _samples(depsgraph: Any) -> int:
+    """Samples per pixel that Cycles will take: a view layer may have its own."""
+    cycles, layer = depsgraph.scene_eval.cycles, depsgraph.view_layer_eval
+    if layer.samples == 0 or cycles.use_layer_samples == "IGNORE":
+        return cycles.samples
+    if cycles.use_layer_samples == "BOUNDED":
+        return min(layer.samples, cycles.samples)
+    return layer.samples
+
+
+def _tagged(depsgraph: Any) -> bool:
+    """Tag the evaluated scene as updated; False if this Blender does not do so.
+
+    Without any update Cycles skips its sync and would keep bounces, filter and film.
+    """
+    depsgraph.scene_eval.update_tag()
+    return any(True for _ in depsgraph.updates)
+
+
+def is_stopped(engine: Any) -> bool:
+    """Whether the user has stopped the render."""
+    return bool(engine.test_break())
+
+
+def stop_if_cancelled(engine: Any) -> None:
+    """Raise Cancelled if the user has stopped the render."""
+    if is_stopped(engine):
+        raise Cancelled
+
+
+def free(engine: Any) -> None:
+    """End the engine's session if it has one."""
+    if getattr(engine, "session", None):
+        functions().free(engine)  # takes the attribute away
+    engine.session = None
+
+
+def read_pass(layer: Any, name: str, view: str, size: tuple[int, int]) -> Array | None:
+    """Pixels (height, width, channels), row 0 on top; None if there is no such pass.
+
+    `size` is the width and height of the whole render result.
+    """
+    found = layer.passes.find_by_name(name, view)
+    if found is None:
+        return None
+    import numpy as np
+
+    width, height = size
+    pixels = np.empty(width * height * found.channels, np.float32)
+    found.rect.foreach_get(pixels)
+    return pixels.reshape(height, width, found.channels)[::-1]
+
+
+def write_pass(layer: Any, name: str, view: str, pixels: Array) -> None:
+    """Replace the pixels (height, width, channels), row 0 on top, of a whole pass."""
+    import numpy as np
+
+    found = layer.passes.find_by_name(name, view)
+    if found is not None:
+        flipped = np.ascontiguousarray(pixels[::-1], dtype=np.float32)
+        found.rect.foreach_set(flipped.ravel())

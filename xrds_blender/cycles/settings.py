@@ -1,0 +1,62 @@
+"""What each Cycles render needs, set on the evaluated scene and given back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..planning.denoiser import Denoiser
+from .borrowed import Borrowed
+
+
+def set_sampling(
+    borrowed: Borrowed, scene: Any, samples: int | None, seed: int | None
+) -> None:
+    """Set seed and fixed samples per pixel; None keeps the scene's own."""
+    if seed is not None:
+        borrowed.set(scene.cycles, seed=seed, use_animated_seed=False)
+    if samples is not None:
+        borrowed.set(
+            scene.cycles,
+            samples=samples,
+            use_adaptive_sampling=False,
+            time_limit=0.0,
+            use_layer_samples="IGNORE",
+            sample_offset=0,
+            use_sample_subset=False,
+        )
+
+
+def set_denoising(
+    borrowed: Borrowed,
+    scene: Any,
+    layer: Any,
+    denoise: bool,
+    denoiser: Denoiser | None = None,
+) -> None:
+    """Switch the denoiser; `denoiser` None keeps the scene's own mode."""
+    borrowed.set(scene.cycles, use_denoising=denoise)
+    if denoise:
+        # The same denoiser as in the training set, whatever the scene uses.
+        borrowed.set(
+            scene.cycles,
+            denoiser="OPENIMAGEDENOISE",
+            denoising_input_passes="RGB_ALBEDO_NORMAL",
+        )
+        if denoiser is not None:
+            borrowed.set(
+                scene.cycles,
+                denoising_quality=denoiser.quality,
+                denoising_prefilter=denoiser.prefilter,
+            )
+        borrowed.set(layer.cycles, use_denoising=True)
+
+
+def set_box_filter(borrowed: Borrowed, scene: Any, scale: int) -> None:
+    """Make every low-resolution pixel the mean of the full ones under it."""
+    # Dicing is counted in pixels: the mesh is to be that of the full picture.
+    borrowed.set(
+        scene.cycles,
+        pixel_filter_type="BOX",
+        filter_width=1.0,
+        dicing_rate=scene.cycles.dicing_rate / scale,
+    )

@@ -1,0 +1,1 @@
+"""One frame, from a scene to a picture."""

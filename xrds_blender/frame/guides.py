@@ -1,0 +1,164 @@
+"""Where the guides of a picture come from: rendered, kept from before, or both."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..cycles.pass_names import ALBEDO, NORMAL, is_lasting
+from ..cycles.passes import Beauty, Guides
+from ..planning.plan import Decision
+from ..scene.guide_key import NotFollowed, guide_key
+from . import guide_cache
+from .guide_cache import CachedGuides
+
+if TYPE_CHECKING:
+    from xrds_core.arrays import Array
+
+    from ..cycles.passes import CyclesPasses
+    from ..planning.facts import Facts
+    from ..planning.plan import Plan
+    from .job import RenderJob
+
+_NAME = "guide cache"
+
+
+class GuideSource:
+    """Guides of one frame; `decision` tells afterwards where they came from."""
+
+    def __init__(
+        self,
+        passes: CyclesPasses,
+        depsgraph: Any,
+        job: RenderJob,
+        chosen: Plan,
+        facts: Facts,
+    ) -> None:
+        self._passes, self._graph, self._job = passes, depsgraph, job
+        self._chosen, self._facts = chosen, facts
+        self._folder = None if job.guide_cache is None else Path(job.guide_cache)
+        self.decision = Decision(_NAME, "off", "as asked for")
+
+    def guides(self, low: dict[str, Beauty] | None = None) -> dict[str, Guides]:
+        """Guides by view; the render result then holds their passes.
+
+        `low` is the picture by view, which an empty scene's guides are made of.
+        """
+        if low is not None and not self._chosen.render_guides:
+            self.decision = Decision(_NAME, "off", "there is nothing to keep")
+            return self._of_background(low)
+        if self._job.guides == "full" or _NAME not in self._job.savings:
+            return self._render(self._chosen.guide_samples)
+        started = time.perf_counter()
+        try:
+            key = self._key()
+        except NotFollowed as reason:
+            self.decision = Decision(_NAME, "not used", f"no key tells of {reason}")
+            return self._render(self._chosen.guide_samples)
+        kept = guide_cache.CACHE.get(key, self._folder)
+        looked = time.perf_counter() - started
+        missing = self._missing(0 if kept is None else kept.samples)
+        if not missing:
+            assert kept is not None
+            self._passes.put_back(kept.passes)
+            self._tell_hit(kept.samples, looked)
+            return _guides(kept, {"sync": 0.0, "guides": looked})
+        return self._add(key, kept, missing, looked)
+
+    def _of_background(self, low: dict[str, Beauty]) -> dict[str, Guides]:
+        """What Cycles writes where it sees nothing: its light as albedo, no normal."""
+        scale, region = self._job.scale, self._passes.region
+        found = {}
+        for view, beauty in low.items():
+            rows, columns = beauty.offset
+            rows, columns = (
+                slice(rows, rows + region.height),
+                slice(columns, columns + region.width),
+            )
+
+            def large(x: Array, rows: slice = rows, columns: slice = columns) -> Array:
+                return x.repeat(scale, 0).repeat(scale, 1)[rows, columns]
+
+            albedo, alpha = large(beauty.radiance), large(beauty.alpha)
+            normal = np.zeros_like(albedo)
+            seconds = {"sync": 0.0, "guides": 0.0}
+            found[view] = Guides(albedo, normal, alpha, None, None, None, seconds)
+            self._passes.put_back({(view, ALBEDO): albedo, (view, NORMAL): normal})
+        return found
+
+    def _key(self) -> str:
+        names = sorted(self._passes.pass_names())
+        light = [name for name in names if not is_lasting(name)]
+        if light:
+            raise NotFollowed(f"the pass {', '.join(light)}")
+        passes, scene = self._passes, self._facts.scene
+        how = sorted(asdict(self._chosen.guides).items())
+        frame = passes.frame, passes.region, passes.views, names, how
+        return guide_key(self._graph, scene, frame)
+
+    def _missing(self, kept: int) -> int:
+        """Samples to render beside those that are there."""
+        asked = self._chosen.guide_samples
+        if kept < asked:
+            return asked - kept
+        return max(0, min(asked, self._job.guide_limit - kept))
+
+    def _render(self, samples: int, kept: int = 0) -> dict[str, Guides]:
+        seed = None if self._job.seed is None else self._job.seed + 1
+        if kept:  # samples of the same seed would be the same samples
+            first = self._graph.scene_eval.cycles.seed if seed is None else seed
+            seed = first + kept
+        return self._passes.guides_by_view(
+            samples,
+            full=self._job.guides == "full",
+            seed=seed,
+            how=self._chosen.guides,
+        )
+
+    def _add(
+        self, key: str, kept: CachedGuides | None, samples: int, looked: float
+    ) -> dict[str, Guides]:
+        """Render samples, join them with those kept, and keep the result."""
+        rendered = self._render(samples, 0 if kept is None else kept.samples)
+        seconds = dict(next(iter(rendered.values())).seconds)
+        seconds["guides"] += looked
+        alphas = {view: guides.alpha for view, guides in rendered.items()}
+        guides = CachedGuides(samples, self._passes.data_passes(), alphas)
+        reason = "nothing kept yet has this camera, geometry and materials"
+        value = f"kept {samples} samples"
+        if kept is not None:
+            guides = kept.merged(guides)
+            self._passes.put_back(guides.passes)
+            reason = f"{samples} samples more for the same view"
+            value = f"added up to {guides.samples} samples"
+        try:
+            guide_cache.CACHE.put(key, guides, self._folder)
+        except OSError as error:  # the picture is worth more than the guides kept
+            reason = f"in memory alone: {self._folder} takes no file ({error.strerror})"
+        self.decision = Decision(_NAME, value, reason)
+        return _guides(guides, seconds)
+
+    def _tell_hit(self, samples: int, looked: float) -> None:
+        reason = "camera, geometry, materials and textures are as they were"
+        expected = self._facts.guide_seconds
+        saving = None if expected is None else max(0.0, expected - looked)
+        self.decision = Decision(_NAME, f"used {samples} samples", reason, saving)
+
+
+def _guides(kept: CachedGuides, seconds: dict[str, float]) -> dict[str, Guides]:
+    return {
+        view: Guides(
+            kept.passes[view, ALBEDO],
+            kept.passes[view, NORMAL],
+            alpha,
+            None,
+            None,
+            kept.samples,
+            seconds,
+        )
+        for view, alpha in kept.alphas.items()
+    }

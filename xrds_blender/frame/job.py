@@ -1,0 +1,136 @@
+"""What a render is asked for, and what it returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from xrds_core.errors import UsageError, XRDSError
+
+from ..planning.denoiser import Denoiser
+from ..planning.plan import SAVINGS, Decision, Facts, Plan, decide, plain
+
+if TYPE_CHECKING:
+    from xrds_core.arrays import Array
+
+SCALES = (1, 2, 4, 8)
+
+
+@dataclass(frozen=True)
+class RenderJob:
+    """Everything that can be chosen about one render.
+
+    `samples` and `seed` None leave Cycles' own; `exposure` None is found in the
+    picture; `weights` is a folder of weights files or one file in place of the shipped
+    ones; `memory_limit` in bytes and `threads` are the network's; `savings` names what
+    the plan may leave out where the scene does not need it. `guide_cache` is a folder
+    for guides beside those in memory; each render of the same view adds its samples to
+    them until they are `guide_limit`.
+    `denoiser` is a mode of Cycles' denoiser or its name, None the scene's own. With
+    `time_budget` (seconds a frame) or `quality` (PSNR in dB) scale, samples, guides,
+    network and denoiser are chosen anew for the scene.
+    Raises UsageError on values out of range.
+    """
+
+    scale: int = 2
+    samples: int | None = None
+    guide_samples: int = 4
+    guides: str = "fast"
+    preset: str = "fast"
+    device: str = "auto"
+    exposure: float | None = None
+    seed: int | None = None
+    plain: bool = False
+    memory_limit: int | None = None
+    weights: str | Path | None = None
+    savings: tuple[str, ...] = SAVINGS
+    guide_cache: str | Path | None = None
+    guide_limit: int = 0
+    denoiser: Denoiser | str | None = None
+    time_budget: float | None = None
+    quality: float | None = None
+    threads: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.scale not in SCALES:
+            known = ", ".join(map(str, SCALES))
+            raise UsageError(f"scale {self.scale} is not one of {known}")
+        for name in ("samples", "guide_samples", "threads"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise UsageError(f"{name} {value} is below 1")
+        unknown = set(self.savings) - set(SAVINGS)
+        if unknown:
+            known = ", ".join(SAVINGS)
+            raise UsageError(f"no savings {sorted(unknown)}; there are {known}")
+        if self.denoiser is not None:
+            # The class is frozen; a name is as good as the mode it names.
+            object.__setattr__(self, "denoiser", _denoiser(self.denoiser))
+        if self.time_budget is not None and not self.time_budget > 0:
+            raise UsageError(f"time budget {self.time_budget} s is not above 0")
+        if self.time_budget is not None and self.quality is not None:
+            raise UsageError("give a time budget or a quality, not both")
+
+    @property
+    def is_picked(self) -> bool:
+        """Whether what is rendered is still to be chosen."""
+        return self.time_budget is not None or self.quality is not None
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether Cycles renders alone."""
+        return self.plain or self.scale == 1
+
+    def plan(self, facts: Facts | None = None) -> Plan:
+        """What is decided for this job; plain ones rest on no facts."""
+        if self.is_plain:
+            reason = "asked for" if self.plain else "scale 1 leaves nothing to enlarge"
+            return plain(reason)
+        assert facts is not None
+        return decide(facts, self.savings)
+
+
+def _denoiser(name: str) -> Denoiser:
+    try:
+        return Denoiser(name)
+    except ValueError as error:
+        known = ", ".join(Denoiser)
+        raise UsageError(f"denoiser {name!r} is not one of {known}") from error
+
+
+class NetworkFailed(XRDSError):
+    """The network gave no picture; what Cycles rendered for it is kept.
+
+    `radiance` (h, w, 3), premultiplied, and `alpha` (h, w): low resolution, as
+    `Picture.low_resolution`.
+    """
+
+    def __init__(self, message: str, radiance: Array, alpha: Array) -> None:
+        super().__init__(message)
+        self.radiance, self.alpha = radiance, alpha
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A rendered region: arrays float32, scene-linear, row 0 on top.
+
+    `radiance` (H, W, 3) is premultiplied by `alpha` (H, W); `albedo` and `normal`
+    (H, W, 3) and `low_resolution` (h, w, 3) are None for a plain render. `seconds` by
+    stage: total, sync, beauty, denoise, guides, network, write; Cycles does not tell
+    denoising from sampling, so `beauty` holds both and `denoise` is 0. `peak_memory`
+    is the largest in bytes that the process has taken so far; `device` is what the
+    network ran on, empty for a plain render; `job` what was rendered, as a time budget
+    chose it.
+    """
+
+    radiance: Array
+    alpha: Array
+    albedo: Array | None = None
+    normal: Array | None = None
+    low_resolution: Array | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    plan: tuple[Decision, ...] = ()
+    peak_memory: int = 0
+    device: str = ""
+    job: RenderJob | None = None

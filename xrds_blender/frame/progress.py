@@ -1,0 +1,45 @@
+"""What a running render is doing now, and how long the last one took.
+
+Blender asks an engine for nothing like this, so it is kept here for the status bar and
+the panel to show.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+LOW, GUIDES, NETWORK = "Low resolution", "Guides", "Network"
+STAGES = ("total", "sync", "beauty", "denoise", "guides", "network", "write")
+
+_current: str | None = None
+_last_seconds: dict[str, float] = {}
+
+
+def begin(engine: Any, stage: str, number: int) -> None:
+    """Note that the stage of this number has begun."""
+    global _current
+    _current = f"XRDS {number}/3: {stage}"
+    engine.update_stats("XRDS", stage)
+    engine.update_progress(0.0)
+
+
+def end() -> None:
+    """Note that the render is over, however it ended."""
+    global _current
+    _current = None
+
+
+def current() -> str | None:
+    """What is being done, None between renders."""
+    return _current
+
+
+def keep(seconds: dict[str, float]) -> None:
+    """Remember the seconds by stage of a finished render."""
+    global _last_seconds
+    _last_seconds = dict(seconds)
+
+
+def last_seconds() -> dict[str, float]:
+    """Seconds by stage of the last render since Blender started."""
+    return _last_seconds

@@ -1,0 +1,133 @@
+"""The one path from a scene to a picture; every button and command ends here."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from xrds_core.errors import Cancelled, SceneError, XRDSError
+
+from ..cycles.borrowed import Borrowed
+from ..cycles.passes import CyclesPasses
+from .job import Picture, RenderJob
+from .layer import render_layer
+
+ENGINE = "XRDS"
+T = TypeVar("T")
+
+
+@dataclass
+class _Task:
+    """Work that waits for Blender to call the engine, and how it ended."""
+
+    work: Callable[[Any, Any], Any]
+    results: list[Any] = field(default_factory=list)
+    error: BaseException | None = None
+
+
+_task: _Task | None = None
+
+
+def render(
+    scene: Any, scale: int = 2, *, layer: str | None = None, **choices: Any
+) -> Picture:
+    """As `xrds_blender.render`; the engine must be registered."""
+    job, start = RenderJob(scale=scale, **choices), time.perf_counter()
+
+    def work(engine: Any, depsgraph: Any) -> Picture:
+        return render_layer(engine, depsgraph, job, start)
+
+    return _run(scene, work, layer)
+
+
+def run_job(
+    scene: Any, job: Callable[[CyclesPasses], T], *, layer: str | None = None
+) -> T:
+    """As `xrds_blender.run_job`; the engine must be registered."""
+
+    def work(engine: Any, depsgraph: Any) -> T:
+        with CyclesPasses(engine, depsgraph, noisy=True, depth=True) as passes:
+            return job(passes)
+
+    return _run(scene, work, layer)
+
+
+def evaluate(scene: Any, look: Callable[[Any], T]) -> T:
+    """Return what `look` finds in the dependency graph of a render of `scene`.
+
+    Nothing is rendered. Raises SceneError without a camera.
+    """
+    return _run(scene, lambda _, depsgraph: look(depsgraph), None)
+
+
+def render_in(engine: Any, depsgraph: Any, asked: Callable[[], RenderJob]) -> None:
+    """Do the work that waits for the engine, or what Blender asks of it.
+
+    `asked` finds the job that the scene's settings describe.
+    """
+    if _task is not None:
+        try:
+            _task.results.append(_task.work(engine, depsgraph))
+        except BaseException as error:  # Blender would print it; the caller gets it
+            _task.error = error
+        return
+    try:
+        render_layer(engine, depsgraph, asked())
+    except Cancelled:
+        return  # it was Blender that cancelled
+    except XRDSError as error:
+        _fail(engine, str(error))
+    except Exception as error:  # Blender calls: show it beside the black picture
+        traceback.print_exc()
+        _fail(engine, f"XRDS failed: {type(error).__name__}: {error}")
+
+
+def _fail(engine: Any, message: str) -> None:
+    """One line in Blender's log and reports; nothing is saved then."""
+    engine.report({"ERROR"}, message)
+
+
+def _run(scene: Any, work: Callable[[Any, Any], T], layer: str | None) -> T:
+    """Let Blender render one layer of `scene` with `work` as the engine's."""
+    import bpy
+
+    global _task
+    if _task is not None:
+        raise SceneError("a render is running already; wait for its end")
+    if not hasattr(bpy.types.Scene, "xrds"):
+        raise SceneError("the engine is not registered; call xrds_blender.register()")
+    name = _layer_name(scene, layer)
+    task = _task = _Task(work)
+    try:
+        with Borrowed() as borrowed:
+            borrowed.set(
+                scene.render, engine=ENGINE, use_compositing=False, use_sequencer=False
+            )
+            bpy.ops.render.render(scene=scene.name, layer=name)
+    except RuntimeError as error:
+        message = str(error).removeprefix("Error: ").strip()
+        task.error = task.error or SceneError(message)
+    finally:
+        _task = None
+    if task.error is not None:
+        raise task.error
+    if not task.results:
+        raise XRDSError(f"scene {scene.name!r} was not rendered; see Blender's log")
+    return task.results[0]  # type: ignore[no-any-return]
+
+
+def _layer_name(scene: Any, wanted: str | None) -> str:
+    if scene.camera is None:
+        raise SceneError(f"scene {scene.name!r} has no camera; add one")
+    names = [layer.name for layer in scene.view_layers if layer.use]
+    if wanted is not None and wanted not in scene.view_layers:
+        known = ", ".join(layer.name for layer in scene.view_layers)
+        raise SceneError(
+            f"scene {scene.name!r} has no layer {wanted!r}; it has {known}"
+        )
+    if wanted is None and not names:
+        raise SceneError(f"scene {scene.name!r} renders no view layer; switch one on")
+    return wanted or names[0]

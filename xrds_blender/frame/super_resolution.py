@@ -1,0 +1,273 @@
+"""The paper's way: low-resolution light, full-resolution guides, and the network."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_core.errors import OutOfMemory
+
+from ..cycles import session
+from ..cycles.colour import converted, to_rec709, working_space
+from ..cycles.pass_names import COMBINED
+from ..cycles.passes import Beauty, CyclesPasses, Guides
+from ..planning import plan
+from . import progress
+from .frame_facts import find_facts
+from .guides import GuideSource
+from .job import NetworkFailed, Picture, RenderJob
+from .memory import peak_memory
+
+if TYPE_CHECKING:
+    from xrds_core import Upscaled, Upscaler
+    from xrds_core.arrays import Array
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What Cycles rendered of one layer for the network; by name of the view.
+
+    `exposure` is the factor that brings radiance to middle grey, None to be found in
+    the picture.
+    """
+
+    beauties: dict[str, Beauty]
+    guides: dict[str, Guides]
+    exposure: float | None
+    decisions: tuple[plan.Decision, ...]
+    skip_idle: bool
+
+    @property
+    def first(self) -> tuple[Beauty, Guides]:
+        """Those of the first view."""
+        name = next(iter(self.beauties))
+        return self.beauties[name], self.guides[name]
+
+
+def render_enlarged(
+    engine: Any, depsgraph: Any, job: RenderJob, upscaler: Upscaler
+) -> Picture:
+    """Render into the engine's result and return the first view's picture.
+
+    Raises Cancelled when the user stops it, and NetworkFailed with the low-resolution
+    picture in the result, enlarged.
+    """
+    layer = depsgraph.view_layer_eval.name
+    inputs = render_inputs(engine, depsgraph, job)
+    seconds = _seconds(inputs)
+    with _Timed(seconds, "network"):
+        pictures = _run_network(engine, layer, job, upscaler, inputs)
+    session.stop_if_cancelled(engine)
+    with _Timed(seconds, "write"):
+        _write(engine, layer, job.scale, pictures, inputs.beauties)
+    beauty, guides = inputs.first
+    picture = next(iter(pictures.values()))
+    return Picture(
+        radiance=np.ascontiguousarray(picture[..., :3]),
+        alpha=np.ascontiguousarray(picture[..., 3]),
+        albedo=guides.albedo,
+        normal=guides.normal,
+        low_resolution=beauty.radiance,
+        seconds=seconds,
+        plan=inputs.decisions,
+        peak_memory=peak_memory(),
+        device=str(upscaler.device),
+    )
+
+
+def render_inputs(engine: Any, depsgraph: Any, job: RenderJob) -> Inputs:
+    """Render light and guides; the result then holds the guides' data passes.
+
+    Raises Cancelled when the user stops it.
+    """
+    with CyclesPasses(engine, depsgraph, noisy=True) as passes:
+        facts = find_facts(depsgraph, job)
+        chosen = job.plan(facts)
+        if not chosen.motion_blur:
+            passes.hold_still()
+        source = GuideSource(passes, depsgraph, job, chosen, facts)
+        order = _guides_first if job.guides == "full" else _light_first
+        beauties, guides, exposure = order(engine, job, chosen, passes, source)
+    first = passes.views[0]
+    syncs = sorted(each.seconds["sync"] for each in (beauties[first], guides[first]))
+    decisions = (*chosen.decisions, source.decision)
+    if syncs[0]:
+        decisions += plan.after(syncs[1], syncs[0])
+    return Inputs(beauties, guides, exposure, decisions, chosen.skip_idle)
+
+
+_Rendered = tuple[dict[str, Beauty], dict[str, Guides], float | None]
+
+
+def _light_first(
+    engine: Any,
+    job: RenderJob,
+    chosen: plan.Plan,
+    passes: CyclesPasses,
+    source: GuideSource,
+) -> _Rendered:
+    progress.begin(engine, progress.LOW, 1)
+    beauties, exposure = _light(job, chosen, passes)
+    progress.begin(engine, progress.GUIDES, 2)
+    return beauties, source.guides(beauties), exposure
+
+
+def _guides_first(
+    engine: Any,
+    job: RenderJob,
+    chosen: plan.Plan,
+    passes: CyclesPasses,
+    source: GuideSource,
+) -> _Rendered:
+    """Fewer samples first: noise that matters, and one sync all the same."""
+    progress.begin(engine, progress.GUIDES, 1)
+    guides, data = source.guides(), passes.data_passes()
+    progress.begin(engine, progress.LOW, 2)
+    beauties, exposure = _light(job, chosen, passes)
+    passes.put_back(data)
+    return beauties, guides, exposure
+
+
+def _light(
+    job: RenderJob, chosen: plan.Plan, passes: CyclesPasses
+) -> tuple[dict[str, Beauty], float | None]:
+    beauties = passes.beauties(
+        job.scale,
+        job.samples,
+        denoise=chosen.denoise,
+        seed=job.seed,
+        denoiser=job.denoiser,
+    )
+    return beauties, job.exposure or passes.border_exposure()
+
+
+def _seconds(inputs: Inputs) -> dict[str, float]:
+    """Seconds by stage of what was rendered."""
+    seconds = dict.fromkeys(progress.STAGES, 0.0)
+    for rendered in inputs.first:
+        for stage, value in rendered.seconds.items():
+            seconds[stage] += value
+    return seconds
+
+
+class _Timed:
+    """Sets the seconds of a stage to what passes inside the `with`."""
+
+    def __init__(self, seconds: dict[str, float], stage: str) -> None:
+        self._seconds, self._stage = seconds, stage
+
+    def __enter__(self) -> None:
+        self._start = time.perf_counter()
+
+    def __exit__(self, *_: object) -> None:
+        self._seconds[self._stage] = time.perf_counter() - self._start
+
+
+def _run_network(
+    engine: Any, layer: str, job: RenderJob, upscaler: Upscaler, inputs: Inputs
+) -> dict[str, Array]:
+    """Pictures by view, (H, W, 4); NetworkFailed leaves enlarged ones in the result."""
+    progress.begin(engine, progress.NETWORK, 3)
+    try:
+        return {
+            view: _upscale(engine, upscaler, job, inputs, view)
+            for view in inputs.beauties
+        }
+    except (OutOfMemory, RuntimeError, MemoryError) as error:  # as torch raises them
+        bilinear = _bilinear_pictures(job.scale, inputs)
+        _write(engine, layer, job.scale, bilinear, inputs.beauties)
+        reason = str(error).partition("\n")[0] or "out of memory"
+        low, _ = inputs.first
+        raise NetworkFailed(
+            f"the network failed ({reason}); the picture is the low-resolution one",
+            low.radiance,
+            low.alpha,
+        ) from error
+
+
+def _upscale(
+    engine: Any, upscaler: Upscaler, job: RenderJob, inputs: Inputs, view: str
+) -> Array:
+    """The region's radiance and alpha, (H, W, 4)."""
+    beauty, guides = inputs.beauties[view], inputs.guides[view]
+    rows, columns = beauty.offset
+    matrix = to_rec709(working_space())
+
+    def placed(guide: Array | None) -> Array | None:
+        """Guides start where the first low-resolution pixel does."""
+        if guide is None:
+            return None
+        margin = ((rows, 0), (columns, 0), *[(0, 0)] * (guide.ndim - 2))
+        return np.pad(guide, margin, mode="edge")
+
+    def seen(colour: Array | None) -> Array | None:
+        """In the network's colour space."""
+        if matrix is None or colour is None:
+            return colour
+        return converted(colour, matrix)
+
+    def report(done: float) -> bool:
+        engine.update_stats("XRDS", f"Network {done:.0%}")
+        engine.update_progress(done)
+        return not session.is_stopped(engine)
+
+    upscaled: Upscaled = upscaler(
+        seen(np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1)),
+        placed(seen(guides.albedo)),
+        placed(guides.normal),
+        noisy=seen(beauty.noisy),
+        guide_radiance=placed(seen(guides.radiance)),
+        guide_alpha=placed(guides.alpha),
+        guide_samples=guides.samples,
+        exposure=inputs.exposure,
+        memory_limit=job.memory_limit,
+        progress=report,
+        skip_idle=inputs.skip_idle,
+    )
+    region = upscaled.radiance[rows:, columns:]
+    return region if matrix is None else converted(region, np.linalg.inv(matrix))
+
+
+def _write(
+    engine: Any,
+    layer_name: str,
+    scale: int,
+    pictures: dict[str, Array],
+    beauties: dict[str, Beauty],
+) -> None:
+    """Put the pictures and the enlarged light passes into the engine's result."""
+    result = engine.get_result()
+    layer = result.layers[layer_name]
+    for view, picture in pictures.items():
+        session.write_pass(layer, COMBINED, view, picture)
+        for name, low in beauties[view].others.items():
+            large = _bilinear(low, scale, beauties[view].offset, picture.shape)
+            session.write_pass(layer, name, view, large)
+    engine.update_result(result)
+
+
+def _bilinear_pictures(scale: int, inputs: Inputs) -> dict[str, Array]:
+    """By view, the region's radiance and alpha without a network, (H, W, 4)."""
+    return {
+        view: _bilinear(
+            np.dstack((low.radiance, low.alpha)),
+            scale,
+            low.offset,
+            inputs.guides[view].alpha.shape,
+        )
+        for view, low in inputs.beauties.items()
+    }
+
+
+def _bilinear(
+    low: Array, scale: int, offset: tuple[int, int], shape: tuple[int, ...]
+) -> Array:
+    """Enlarge (h, w, channels) and cut the region out."""
+    from xrds_core.baselines import bilinear
+
+    rows, columns = offset
+    large = bilinear(low, scale)
+    return large[rows : rows + shape[0], columns : columns + shape[1]]

@@ -1,0 +1,1 @@
+"""What an artist sees in Blender: engine, operators, panels, preferences."""

@@ -1,0 +1,99 @@
+"""The render engine XRDS: what Blender calls, handed on to our path or to Cycles."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from typing import Any
+
+import bpy
+
+from ..cycles import session
+from . import write_lock
+
+
+class XRDSRender(bpy.types.RenderEngine):
+    """Cycles at low resolution, enlarged under full-resolution guides."""
+
+    bl_idname = "XRDS"
+    bl_label = "XRDS"
+    bl_use_preview = True
+    bl_use_eevee_viewport = True
+    bl_use_exclude_layers = True
+    bl_use_spherical_stereo = True
+    bl_use_custom_freestyle = True
+    bl_use_alembic_procedural = True
+    bl_use_shading_nodes_custom = False
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        self.session = None
+        self.most_samples = 0
+
+    def __del__(self) -> None:
+        # Blender may have taken its half of the object away already.
+        with suppress(ReferenceError):
+            session.free(self)
+
+    # What renders is imported when Blender first asks for it: Blender starts faster.
+
+    def update_render_passes(self, scene: Any, layer: Any) -> None:
+        from ..cycles.pass_names import GUIDE_PASSES
+
+        cycles = session.functions()
+        cycles.register_passes(self, scene, layer)
+        known = {name for name, *_ in cycles.list_render_passes(scene, layer)}
+        for name, letters, kind in GUIDE_PASSES:
+            if not scene.xrds.plain and name not in known:
+                self.register_pass(scene, layer, name, len(letters), letters, kind)
+
+    def update(self, data: Any, depsgraph: Any) -> None:
+        # A final render makes its sessions itself, with their own sizes.
+        if self.is_preview:
+            cycles = session.functions()
+            if not self.session:
+                cycles.create(self, data)
+            cycles.reset(self, data, depsgraph)
+
+    def render(self, depsgraph: Any) -> None:
+        if self.is_preview:
+            session.functions().render(self, depsgraph)
+        else:
+            with write_lock.shared():
+                from ..frame.rendering import render_in
+                from .properties import job_of
+
+                render_in(self, depsgraph, lambda: job_of(depsgraph.scene_eval.xrds))
+
+    def render_frame_finish(self) -> None:
+        if self.session:
+            session.functions().render_frame_finish(self)
+
+    def draw(self, context: Any, depsgraph: Any) -> None:
+        session.functions().draw(self, depsgraph, context.space_data)
+
+    def bake(
+        self,
+        depsgraph: Any,
+        item: Any,
+        pass_type: str,
+        pass_filter: int,
+        width: int,
+        height: int,
+    ) -> None:
+        cycles = session.functions()
+        if not self.session:
+            cycles.create(self, bpy.data)
+            cycles.reset(self, bpy.data, depsgraph)
+        cycles.bake(self, depsgraph, item, pass_type, pass_filter, width, height)
+
+    def view_update(self, context: Any, depsgraph: Any) -> None:
+        cycles = session.functions()
+        if not self.session:
+            place = context.region, context.space_data, context.region_data
+            cycles.create(self, context.blend_data, *place)
+        cycles.reset(self, context.blend_data, depsgraph)
+        cycles.sync(self, depsgraph, context.blend_data)
+
+    def view_draw(self, context: Any, depsgraph: Any) -> None:
+        place = context.region, context.space_data, context.region_data
+        session.functions().view_draw(self, depsgraph, *place)

@@ -1,0 +1,31 @@
+"""Facts of the scene for the panel, which is drawn often."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..frame.frame_facts import join_facts
+from ..frame.job import RenderJob
+from ..planning.facts import Facts, SceneFacts
+from ..scene.scene_facts import scene_facts
+
+
+class Glance:
+    """Looks at a scene anew only after a change."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, SceneFacts] = {}
+
+    def forget(self, *_: Any) -> None:
+        """For Blender's handlers: something has changed."""
+        self._known.clear()
+
+    def facts(self, scene: Any, layer: Any, job: RenderJob) -> Facts:
+        """Facts of a scene as the viewport shows it."""
+        graph = layer.depsgraph
+        if graph is None:
+            return join_facts(scene, job, SceneFacts())
+        name = f"{scene.name} {layer.name}"
+        if name not in self._known:
+            self._known[name] = scene_facts(graph)
+        return join_facts(scene, job, self._known[name])

@@ -1,0 +1,49 @@
+"""The preferences as plain values: torch, device, memory and weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+MEBIBYTE = 1 << 20
+
+package = "xrds_blender"
+"""The add-on's module name, under which Blender keeps its preferences."""
+
+
+@dataclass(frozen=True)
+class Machine:
+    """The preferences as plain values; the defaults hold where there is no add-on."""
+
+    device: str = "auto"
+    memory_limit: int | None = None
+    """Bytes that the network may add; None leaves it to the device."""
+    weights: Path | None = None
+    """Folder of weights files; None means the shipped ones."""
+    threads: int | None = None
+    """Of the network on the processor; None leaves it to PyTorch."""
+    torch: Path | None = None
+    """Folder that PyTorch is taken from; None means the one that Python finds."""
+
+
+def machine() -> Machine:
+    """The preferences of the enabled add-on, or the defaults."""
+    entry = bpy.context.preferences.addons.get(package)
+    kept: Any = entry and entry.preferences
+    if kept is None:
+        return Machine()
+    return Machine(
+        device=kept.device or "auto",
+        memory_limit=kept.memory_limit * MEBIBYTE or None,
+        weights=folder(kept.weights),
+        threads=kept.threads or None,
+        torch=folder(kept.torch),
+    )
+
+
+def folder(text: str) -> Path | None:
+    """A folder as the preferences hold it; None where the field is empty."""
+    return Path(bpy.path.abspath(text)) if text else None

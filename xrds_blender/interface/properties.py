@@ -1,0 +1,116 @@
+"""The settings of XRDS that a scene keeps; samples stay with Cycles."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+
+from ..frame.job import RenderJob
+from .machine import machine
+from .translations import CONTEXT
+
+_SCALES = [
+    ("2", "2×", "A quarter of the pixels are path traced"),
+    ("4", "4×", "A sixteenth of the pixels are path traced"),
+    ("8", "8×", "One pixel in 64 is path traced"),
+]
+_PRESETS = [
+    ("fast", "Fast", "Quickest network"),
+    ("balanced", "Balanced", "Larger network, better at gloss and fine detail"),
+    ("paper", "Paper", "The network of the paper; far slower"),
+]
+_GUIDES = [
+    ("fast", "Fast", "Albedo and normal, rendered without diffuse light"),
+    ("full", "Full", "Also a noisy picture of full size; dearer, sharper light"),
+]
+
+
+def _ask_for_passes(settings: bpy.types.PropertyGroup, _: Any) -> None:
+    """Plain renders have no guides: the Render Layers nodes lose their sockets."""
+    for layer in settings.id_data.view_layers:
+        layer.update_render_passes()
+
+
+class XRDSSettings(bpy.types.PropertyGroup):
+    """How the engine XRDS renders a scene."""
+
+    scale: EnumProperty(
+        name="Scale",
+        translation_context=CONTEXT,
+        items=_SCALES,
+        description="Enlargement along each side",
+    )
+    preset: EnumProperty(
+        name="Quality",
+        translation_context=CONTEXT,
+        items=_PRESETS,
+        description="Which network enlarges",
+    )
+    guides: EnumProperty(
+        name="Guides",
+        translation_context=CONTEXT,
+        items=_GUIDES,
+        description="What is rendered at full size",
+    )
+    guide_samples: IntProperty(
+        name="Guide Samples",
+        translation_context=CONTEXT,
+        default=4,
+        min=1,
+        soft_max=64,
+        description="Samples per pixel of albedo and normal",
+    )
+    use_exposure: BoolProperty(
+        name="Fixed Exposure",
+        translation_context=CONTEXT,
+        description="Hold the network's exposure, for animations and border renders",
+    )
+    exposure: FloatProperty(
+        name="Exposure",
+        translation_context=CONTEXT,
+        default=1.0,
+        min=1e-12,
+        soft_min=1e-3,
+        soft_max=1e3,
+        description="Factor that brings the radiance to about 0.18",
+    )
+    plain: BoolProperty(
+        name="Plain Cycles",
+        translation_context=CONTEXT,
+        description="Render with Cycles alone, as if the engine were Cycles",
+        update=_ask_for_passes,
+    )
+    use_time_budget: BoolProperty(
+        name="Time Budget",
+        translation_context=CONTEXT,
+        description="Let XRDS choose scale, samples, guides, network and denoiser",
+    )
+    time_budget: FloatProperty(
+        name="Time Budget",
+        translation_context=CONTEXT,
+        default=60.0,
+        min=0.1,
+        soft_max=3600.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds that a frame may take; least error expected within them",
+    )
+
+
+def job_of(settings: XRDSSettings) -> RenderJob:
+    """The job that a scene's settings and the preferences describe."""
+    here = machine()
+    return RenderJob(
+        scale=int(settings.scale),
+        guide_samples=settings.guide_samples,
+        guides=settings.guides,
+        preset=settings.preset,
+        device=here.device,
+        exposure=settings.exposure if settings.use_exposure else None,
+        plain=settings.plain,
+        time_budget=settings.time_budget if settings.use_time_budget else None,
+        memory_limit=here.memory_limit,
+        weights=here.weights,
+        threads=here.threads,
+    )

@@ -1,0 +1,1 @@
+"""What to render, compute and leave out: pure functions of facts."""

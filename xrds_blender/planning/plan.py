@@ -1,0 +1,258 @@
+"""What is rendered, computed and left out, each with its reason.
+
+Pure functions of facts: neither Blender nor torch is needed here. A saving that
+is not allowed is not made; with none allowed, a render is the baseline that seconds and
+differences are measured against.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+from .facts import Facts, SceneFacts
+
+__all__ = [
+    "SAVINGS",
+    "Decision",
+    "Facts",
+    "GuideRender",
+    "Plan",
+    "SceneFacts",
+    "after",
+    "decide",
+    "guide_bounces",
+    "plain",
+    "savings_but",
+]
+
+# Mirrors and glass show other things' albedo and normals; four bounces hold them.
+GUIDE_BOUNCES = 4
+# What may be left out where a scene does not need it, by the names of the decisions.
+SAVINGS = (
+    "denoise",
+    "guides",
+    "guide samples",
+    "guide bounces",
+    "guide lights",
+    "guide cache",
+    "motion blur",
+    "network",
+)
+# Shares of a guide render's seconds that a saving takes off: docs/performance.md.
+LIGHT_SHARE = 0.45
+BOUNCE_SHARE = 0.12
+# Guide samples where nothing is finer than an edge.
+CRISP_SAMPLES = 2
+# Cryptomatte counts what covers a pixel by samples: fewer give ragged masks.
+CRYPTOMATTE_SAMPLES = 16
+
+
+@dataclass(frozen=True)
+class Decision:
+    """One choice; `saving_seconds` is an estimate, None where there is none."""
+
+    decision: str
+    value: str
+    reason: str
+    saving_seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class GuideRender:
+    """How albedo and normal are rendered.
+
+    Lights that are not sampled still shine where a ray meets them: the camera, mirrors
+    and glass see worlds and emitting surfaces as before. Lamps are left out wholly.
+    """
+
+    bounces: int = GUIDE_BOUNCES
+    sample_world: bool = True
+    sample_emitters: bool = True
+    lamps: bool = True
+    shadows: bool = True
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What was decided: the choices, and what to tell of them."""
+
+    render_guides: bool
+    guides: GuideRender
+    guide_samples: int
+    denoise: bool
+    motion_blur: bool
+    skip_idle: bool
+    decisions: tuple[Decision, ...]
+
+
+def plain(reason: str) -> Plan:
+    """The plan where Cycles renders alone, as the file has it."""
+    told = (Decision("method", "plain", reason),)
+    return Plan(False, GuideRender(), 0, True, True, False, told)
+
+
+def savings_but(*names: str) -> tuple[str, ...]:
+    """All savings but those named."""
+    return tuple(name for name in SAVINGS if name not in names)
+
+
+def decide(facts: Facts, savings: Collection[str] = SAVINGS) -> Plan:
+    """Every decision about one picture, before it is rendered.
+
+    `savings` names those that may be made.
+    """
+    denoise, of_denoiser = _denoise(facts, "denoise" in savings)
+    rendered, of_guides = _render_guides(facts, "guides" in savings)
+    samples, of_samples = _samples(facts, "guide samples" in savings)
+    bounces, of_bounces = _bounces(facts, "guide bounces" in savings)
+    lights, of_lights = _lights(facts, "guide lights" in savings)
+    blurred, of_blur = _motion_blur(facts, "motion blur" in savings)
+    idle, of_network = _idle("network" in savings)
+    told = (of_denoiser, of_guides)
+    if rendered:
+        told += (of_samples, of_bounces, of_lights)
+    return Plan(
+        render_guides=rendered,
+        guides=replace(lights, bounces=bounces),
+        guide_samples=samples,
+        denoise=denoise,
+        motion_blur=blurred,
+        skip_idle=idle,
+        decisions=(*told, *of_blur, of_network, _low_frame(facts)),
+    )
+
+
+def after(first_sync: float, second_sync: float) -> tuple[Decision, ...]:
+    """What the render itself showed: seconds of scene sync and BVH of both passes."""
+    reason = "the second render keeps geometry, images and BVH of the first"
+    saving = max(first_sync - second_sync, 0.0)
+    return (Decision("sessions", "one", reason, saving),)
+
+
+def guide_bounces(max_bounces: int) -> int:
+    """Bounces of the guide render, never more than the scene's own."""
+    return min(max_bounces, GUIDE_BOUNCES)
+
+
+def _denoise(facts: Facts, allowed: bool) -> tuple[bool, Decision]:
+    scene, name = facts.scene, "denoise"
+    if not facts.has_denoiser:
+        reason = "this Blender was built without OpenImageDenoise; expect noise"
+        return False, Decision(name, "skipped", reason)
+    blurred = scene.depth_of_field or (scene.motion_blur and scene.moving)
+    if allowed and not (scene.scatters or scene.volumes or blurred):
+        reason = "every surface only emits: the low-resolution picture has no noise"
+        return False, Decision(name, "skipped", reason)
+    reason = "the networks were trained on denoised low-resolution pictures"
+    return True, Decision(name, "low resolution", reason)
+
+
+def _render_guides(facts: Facts, allowed: bool) -> tuple[bool, Decision]:
+    scene, name = facts.scene, "guides"
+    seen = scene.surfaces or scene.volumes or scene.world == "varies"
+    seen = seen or bool(scene.passes)  # they come with the guides
+    if facts.guides == "full":
+        reason = "albedo, normal and radiance are asked for"
+        return True, Decision(name, "rendered", reason)
+    if seen or not allowed:
+        reason = "albedo and normal carry what the low resolution cannot"
+        return True, Decision(name, "rendered", reason)
+    reason = "nothing but an even background: the picture itself is the guide"
+    return False, Decision(name, "none", reason, facts.guide_seconds)
+
+
+def _samples(facts: Facts, allowed: bool) -> tuple[int, Decision]:
+    asked, name = facts.guide_samples, "guide samples"
+    masks = any(each.startswith("cryptomatte") for each in facts.scene.passes)
+    if masks and asked < CRYPTOMATTE_SAMPLES:
+        reason = f"Cryptomatte is on: its masks need more than the {asked} asked for"
+        told = Decision(name, str(CRYPTOMATTE_SAMPLES), reason)
+        return CRYPTOMATTE_SAMPLES, told
+    fine = _fine_detail(facts.scene)
+    if facts.guides == "full":
+        return asked, Decision(name, str(asked), "full guides hold light, so noise")
+    if fine or masks or not allowed or asked <= CRISP_SAMPLES:
+        reason = f"as asked for; the scene has {fine}" if fine else "as asked for"
+        return asked, Decision(name, str(asked), reason)
+    saving = _part(facts, 1 - CRISP_SAMPLES / asked)
+    reason = "even colours on sharp surfaces: only edges need samples"
+    return CRISP_SAMPLES, Decision(name, str(CRISP_SAMPLES), reason, saving)
+
+
+def _fine_detail(scene: SceneFacts) -> str:
+    """What makes albedo and normal vary within a pixel, or noisy; empty if nothing."""
+    found = {
+        "textures": scene.textures or scene.world == "varies",
+        "bump": scene.bump,
+        "displacement": scene.displacement,
+        "hair": scene.hair,
+        "mirrors or glass": scene.smooth,
+        "transparency": scene.transparent,
+        "volumes": scene.volumes,
+        "depth of field": scene.depth_of_field,
+        "motion blur": scene.motion_blur and scene.moving,
+    }
+    return ", ".join(name for name, there in found.items() if there)
+
+
+def _bounces(facts: Facts, allowed: bool) -> tuple[int, Decision]:
+    scene, name = facts.scene, "guide bounces"
+    if facts.guides == "full":
+        reason = "full guides hold the light of every bounce"
+        return facts.max_bounces, Decision(name, str(facts.max_bounces), reason)
+    # A ray that glances off a part-transparent surface carries its features along.
+    if not allowed or scene.smooth or scene.transparent or scene.volumes:
+        bounces = guide_bounces(facts.max_bounces)
+        reason = "albedo and normal follow mirrors and glass, never diffuse light"
+        return bounces, Decision(name, f"{bounces}, none diffuse", reason)
+    reason = "no mirror, glass, alpha or volume: the first surface tells all"
+    return 0, Decision(name, "0", reason, _part(facts, BOUNCE_SHARE))
+
+
+def _lights(facts: Facts, allowed: bool) -> tuple[GuideRender, Decision]:
+    scene, name = facts.scene, "guide lights"
+    if not allowed or facts.guides == "full":
+        return GuideRender(), Decision(name, "all", "as in the picture")
+    saving = _part(facts, LIGHT_SHARE)
+    # Without lamps volumes would be sampled by other random numbers.
+    lamps = scene.seen_lamps > 0 or (scene.volumes and scene.lamps > 0)
+    dark = GuideRender(0, False, False, lamps, False)
+    if lamps:
+        reason = "lamps stay, without shadows: mirrors, glass or volumes may show them"
+        return dark, Decision(name, "lamps alone", reason, saving)
+    reason = "light does not change albedo or normal; what shines is seen all the same"
+    return dark, Decision(name, "none sampled", reason, saving)
+
+
+def _motion_blur(facts: Facts, allowed: bool) -> tuple[bool, tuple[Decision, ...]]:
+    scene, name = facts.scene, "motion blur"
+    if not scene.motion_blur:
+        return False, ()
+    if scene.moving or not allowed:
+        told = ", ".join(scene.moving) or "not looked for"
+        return True, (Decision(name, "on", f"moving: {told}"),)
+    return False, (Decision(name, "skipped", "asked for, but nothing moves"),)
+
+
+def _idle(allowed: bool) -> tuple[bool, Decision]:
+    name = "network"
+    if not allowed:
+        return False, Decision(name, "whole picture", "as asked for")
+    reason = "where nothing is seen but an even background the base is the picture"
+    return True, Decision(name, "without empty parts", reason)
+
+
+def _low_frame(facts: Facts) -> Decision:
+    width, height = -(-facts.width // facts.scale), -(-facts.height // facts.scale)
+    size = f"{width}x{height}"
+    if not facts.exact_camera:
+        reason = "a panorama cannot be widened: resampled by normalised coordinates"
+        return Decision("low frame", size, reason)
+    covered = f"{width * facts.scale}x{height * facts.scale}"
+    reason = f"covers {covered} of the {facts.width}x{facts.height} frame's pixels"
+    return Decision("low frame", size, reason)
+
+
+def _part(facts: Facts, share: float) -> float | None:
+    return None if facts.guide_seconds is None else share * facts.guide_seconds

@@ -1,0 +1,1 @@
+"""What a scene holds, read from Blender's data without rendering."""

@@ -1,0 +1,197 @@
+"""Facts of a scene, read from Blender's data without rendering."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import islice
+from typing import Any
+
+from ..planning.facts import SceneFacts
+from .closures import Closures, of_tree, reachable
+
+_SURFACES = {
+    "MESH",
+    "CURVE",
+    "SURFACE",
+    "FONT",
+    "META",
+    "CURVES",
+    "POINTCLOUD",
+    "VOLUME",
+}
+_HAIR = {"CURVES"}
+# Modifiers whose result is the same in every frame unless something they use moves,
+# which then is found by itself.
+_STILL_MODIFIERS = (
+    "ARMATURE ARRAY BEVEL BOOLEAN CAST CORRECTIVE_SMOOTH CURVE DATA_TRANSFER DECIMATE "
+    "DISPLACE EDGE_SPLIT HOOK LAPLACIANDEFORM LAPLACIANSMOOTH LATTICE MASK MESH_DEFORM "
+    "MIRROR MULTIRES NODES NORMAL_EDIT REMESH SCREW SHRINKWRAP SIMPLE_DEFORM SKIN "
+    "SMOOTH SMOOTH_BY_ANGLE SOLIDIFY SUBSURF SURFACE_DEFORM TRIANGULATE UV_PROJECT "
+    "UV_WARP VERTEX_WEIGHT_EDIT VERTEX_WEIGHT_MIX VERTEX_WEIGHT_PROXIMITY WARP "
+    "WEIGHTED_NORMAL WELD WIREFRAME"
+)
+_TIMED_NODES = {"INPUT_SCENE_TIME", "SIMULATION_INPUT", "SIMULATION_OUTPUT"}
+_NAMED = 3  # of what moves; more would not help a reader
+
+
+def scene_facts(depsgraph: Any) -> SceneFacts:
+    """Look at an evaluated scene once; cheap, nothing is rendered or changed."""
+    import bpy
+
+    scene, ids = depsgraph.scene_eval, list(depsgraph.ids)
+    objects = [item for item in ids if isinstance(item, bpy.types.Object)]
+    materials = [item for item in ids if isinstance(item, bpy.types.Material)]
+    found = {item.name: of_material(item) for item in materials}
+    solid = [item for item in objects if item.type in _SURFACES]
+    surface = Closures(scatters=bool(solid))  # what has no material is white
+    for closures in found.values():
+        surface |= closures
+    if solid and found and not _bare(solid):
+        surface = _together(found.values())
+    kind, air = _world(scene.world)
+    lamps = [item for item in objects if item.type == "LIGHT"]
+    return SceneFacts(
+        surfaces=bool(solid),
+        scatters=surface.scatters or air.scatters,
+        smooth=surface.smooth,
+        transparent=surface.transparent,
+        volumes=surface.volume or air.volume or any(o.type == "VOLUME" for o in solid),
+        emitters=tuple(sorted(name for name, each in found.items() if each.emits)),
+        lamps=len(lamps),
+        seen_lamps=sum(_is_seen(lamp, surface.smooth) for lamp in lamps),
+        world=kind,
+        textures=surface.varies,
+        bump=surface.bump,
+        displacement=surface.displaced or any(_is_diced(item) for item in solid),
+        subsurface=surface.subsurface,
+        hair=any(item.type in _HAIR or _has_hair(item) for item in objects),
+        depth_of_field=scene.camera is None or _has_blur(scene.camera.data),
+        motion_blur=scene.render.use_motion_blur,
+        moving=tuple(islice(_moving(ids, objects), _NAMED)),
+        film_transparent=scene.render.film_transparent,
+        shadow_catchers=any(item.is_shadow_catcher for item in solid),
+        passes=requested_passes(depsgraph.view_layer_eval),
+        materials=len(materials),
+        unknown_nodes=surface.unknown,
+    )
+
+
+def of_material(material: Any) -> Closures:
+    """What a material can do; one without nodes is diffuse."""
+    if not _uses_nodes(material):
+        return Closures(scatters=True)
+    return of_tree(material.node_tree)
+
+
+def _uses_nodes(item: Any) -> bool:
+    """Whether a material's or a world's tree counts; from Blender 5.0 on it does."""
+    import bpy
+
+    return item.node_tree is not None and (bpy.app.version >= (5,) or item.use_nodes)
+
+
+def requested_passes(layer: Any) -> tuple[str, ...]:
+    """Names of the view layer's switches that are on, but for the picture's own."""
+    owners = layer, layer.cycles
+    names = [
+        item.identifier.removeprefix("use_pass_")
+        for owner in owners
+        for item in owner.bl_rna.properties
+        if item.identifier.startswith("use_pass_") and getattr(owner, item.identifier)
+    ]
+    # Accuracy is an option of cryptomatte, not a pass.
+    return tuple(n for n in names if n not in {"combined", "cryptomatte_accurate"})
+
+
+def _together(found: Iterable[Closures]) -> Closures:
+    merged = Closures()
+    for closures in found:
+        merged |= closures
+    return merged
+
+
+def _bare(objects: list[Any]) -> bool:
+    """Whether an object has a slot without a material, or no slot."""
+    slots = [[slot.material for slot in item.material_slots] for item in objects]
+    return any(not each or None in each for each in slots)
+
+
+def _world(world: Any) -> tuple[str, Closures]:
+    if world is None:
+        return "none", Closures()
+    if not _uses_nodes(world):
+        return ("constant" if any(world.color) else "none"), Closures()
+    found = of_tree(world.node_tree)
+    if found.varies or any(n.type == "LIGHT_PATH" for n in reachable(world.node_tree)):
+        return "varies", found
+    return ("constant" if found.emits else "none"), found
+
+
+def _is_seen(item: Any, smooth: bool) -> bool:
+    """Whether rays that albedo and normal follow can end on a lamp.
+
+    Lamps without extent are never hit, nor those left out of forward paths.
+    """
+    lamp = item.data
+    if not getattr(lamp.cycles, "use_multiple_importance_sampling", True):
+        return False
+    if getattr(lamp.cycles, "is_portal", False):
+        return False
+    extent = {"SUN": "angle", "POINT": "shadow_soft_size", "SPOT": "shadow_soft_size"}
+    if lamp.type in extent and not getattr(lamp, extent[lamp.type]):
+        return False
+    mirrored = item.visible_glossy or item.visible_transmission
+    return item.visible_camera or (smooth and mirrored)
+
+
+def _is_diced(item: Any) -> bool:
+    return bool(getattr(item.cycles, "use_adaptive_subdivision", False))
+
+
+def _has_hair(item: Any) -> bool:
+    return any(each.settings.type == "HAIR" for each in item.particle_systems)
+
+
+def _has_blur(camera: Any) -> bool:
+    return camera.type == "PANO" or (camera.type != "ORTHO" and camera.dof.use_dof)
+
+
+def _moving(ids: list[Any], objects: list[Any]) -> Iterator[str]:
+    """Names of what may differ in the next frame."""
+    import bpy
+
+    handlers = bpy.app.handlers
+    if handlers.frame_change_pre or handlers.frame_change_post:
+        yield "a script at frame changes"
+    for item in ids:
+        trees = [item, getattr(item, "node_tree", None)]
+        if any(tree is not None and _is_animated(tree) for tree in trees):
+            yield item.name
+        if isinstance(item, bpy.types.Image) and item.source in {"SEQUENCE", "MOVIE"}:
+            yield item.name
+        if isinstance(item, bpy.types.NodeTree) and _is_timed(item):
+            yield item.name
+        if isinstance(item, bpy.types.CacheFile):
+            yield item.name
+        if isinstance(item, bpy.types.Volume) and item.is_sequence:
+            yield item.name
+    for item in objects:
+        if item.rigid_body or item.soft_body or _is_simulated(item):
+            yield item.name
+
+
+def _is_animated(owner: Any) -> bool:
+    told = getattr(owner, "animation_data", None)
+    return bool(told and (told.action or told.drivers or told.nla_tracks))
+
+
+def _is_timed(tree: Any) -> bool:
+    return any(node.type in _TIMED_NODES for node in tree.nodes)
+
+
+def _is_simulated(item: Any) -> bool:
+    modifiers = [each.type for each in item.modifiers]
+    emitting = any(each.settings.type != "HAIR" for each in item.particle_systems)
+    # A particle system left is hair: what is emitted was asked for.
+    still = {*_STILL_MODIFIERS.split(), "PARTICLE_SYSTEM"}
+    return emitting or any(m not in still for m in modifiers)

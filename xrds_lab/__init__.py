@@ -1,0 +1,1 @@
+"""What makes XRDS: training, measuring, demonstrations. Never shipped."""

@@ -1,0 +1,241 @@
+"""From points to what the report says: frontiers, budgets, crossings, the model."""
+
+from __future__ import annotations
+
+import statistics
+from typing import TYPE_CHECKING, Any
+
+from xrds_blender.planning import budget
+from xrds_blender.planning.budget import Choice, Curve, Network
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
+from . import pareto
+from .stages import PLAIN_FRAME, XRDS_FRAME, network_name
+from .sweep import DENOISERS, Config
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .measure import SceneBench
+
+    Point = dict[str, Any]
+    Report = dict[str, Any]
+
+OURS, CACHED, RIVAL = "XRDS", pareto.CACHED, "OIDN, best mode"
+
+
+def analysed(report: Report, budgets: Sequence[float]) -> Report:
+    """The report with frontier, budgets, mean and crossings of its points."""
+    by_scene = {
+        scene["scene"]: [p for p in report["points"] if p["scene"] == scene["scene"]]
+        for scene in report["scenes"]
+        if "default_seconds" in scene
+    }
+    units = {s["scene"]: s.get("default_seconds") for s in report["scenes"]}
+    told = [
+        entry
+        for name, points in by_scene.items()
+        for entry in _budgets(name, points, units[name], budgets, _picks(report, name))
+    ]
+    return report | {
+        "frontier": {
+            name: [p["label"] for p in pareto.frontier(points)]
+            for name, points in by_scene.items()
+        },
+        "budgets": told,
+        "mean": _means(told, budgets),
+        "crossings": [
+            _crossing(name, points, units[name]) for name, points in by_scene.items()
+        ],
+        "picker": _picker(told),
+    }
+
+
+def _picks(report: Report, scene: str) -> dict[str, Any]:
+    return next(
+        (s.get("picks", {}) for s in report["scenes"] if s["scene"] == scene), {}
+    )
+
+
+def _budgets(
+    scene: str,
+    points: Sequence[Point],
+    unit: float,
+    budgets: Sequence[float],
+    picks: dict[str, Any],
+) -> list[dict[str, Any]]:
+    """The best of each group at each budget, and what the picker took."""
+    found = []
+    for multiple in budgets:
+        best = {
+            name: _short(pareto.best_within(members, multiple * unit))
+            for name, members in pareto.groups(points).items()
+        }
+        entry = {"scene": scene, "budget": multiple, "seconds": multiple * unit}
+        found.append(entry | {"best": best, "picker": picks.get(f"{multiple:g}")})
+    return found
+
+
+def _short(point: Point | None) -> dict[str, Any] | None:
+    """What a table needs of a point."""
+    if point is None:
+        return None
+    measures = [key for key in point if key.startswith(("psnr", "relmse", "flip"))]
+    return {
+        "label": point["label"],
+        "seconds": point["seconds"]["total"],
+        **{key: point[key] for key in measures},
+    }
+
+
+def _means(
+    entries: Sequence[dict[str, Any]], budgets: Sequence[float]
+) -> list[dict[str, Any]]:
+    """Mean PSNR and trimmed RelMSE by group at each budget, of scenes with one."""
+    found = []
+    for multiple in budgets:
+        here = [e for e in entries if e["budget"] == multiple]
+        names = dict.fromkeys(name for e in here for name in e["best"])
+        groups = {name: _mean([e["best"].get(name) for e in here]) for name in names}
+        picked = _mean([e["picker"] for e in here])
+        found.append({"budget": multiple, "groups": groups, "picker": picked})
+    return found
+
+
+def _mean(rows: Sequence[dict[str, Any] | None]) -> dict[str, float] | None:
+    known = [row for row in rows if row is not None]
+    if not known:
+        return None
+    keys = ("psnr", "relmse_trimmed")
+    return {key: statistics.fmean(row[key] for row in known) for key in keys} | {
+        "scenes": len(known)
+    }
+
+
+def _crossing(scene: str, points: Sequence[Point], unit: float) -> dict[str, Any]:
+    """Where XRDS and the best OIDN mode cross, with guides rendered and cached."""
+    groups = pareto.groups(points)
+    rivals = groups.get(RIVAL, [])
+    told: dict[str, Any] = {"scene": scene}
+    for name, group in (("rendered", OURS), ("cached", CACHED)):
+        ours = groups.get(group, [])
+        changes = pareto.crossings(ours, rivals)
+        for change in changes:
+            change["budget"] = change["seconds"] / unit
+        told[name] = changes
+    best = pareto.best_within(groups.get(OURS, []), unit)
+    told["dearest_stage"] = None if best is None else pareto.dearest_stage(best)
+    return told
+
+
+def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+    """How the picker kept to its budgets, and what its choices cost in error."""
+    made = [e for e in entries if e["picker"]]
+    if not made:
+        return None
+    ratios = [e["picker"]["seconds"]["total"] / e["seconds"] for e in made]
+    behind = [
+        {
+            "budget": multiple,
+            "behind_best": _behind(made, multiple, None),
+            "behind_oidn": _behind(made, multiple, RIVAL),
+        }
+        for multiple in dict.fromkeys(e["budget"] for e in made)
+    ]
+    return {
+        "runs": len(made),
+        "within": sum(0.6 <= ratio <= 1.1 for ratio in ratios) / len(ratios),
+        "latest": max(ratios),
+        "ratios": ratios,
+        "budgets": behind,
+    }
+
+
+def _behind(
+    entries: Sequence[dict[str, Any]], multiple: float, group: str | None
+) -> float | None:
+    """Mean dB by which the picker is below a group's best, or the best of all."""
+    gaps = []
+    for entry in (e for e in entries if e["budget"] == multiple):
+        best = [
+            point["psnr"]
+            for name, point in entry["best"].items()
+            if point is not None and name != CACHED and group in {None, name}
+        ]
+        if best:
+            gaps.append(max(best) - entry["picker"]["psnr"])
+    return statistics.fmean(gaps) if gaps else None
+
+
+# --- the picker's model ---------------------------------------------------------------
+
+
+def fitted(scenes: Sequence[SceneBench], points: Sequence[Point]) -> budget.Model:
+    """The picker's model from these scenes: mean error curves, relative speeds.
+
+    A choice counts where every scene has it, so that all means are over the same
+    scenes. Speeds stay the shipped model's where nothing was timed.
+    """
+    errors: dict[tuple[Choice, int], list[float]] = {}
+    for point in points:
+        if point["method"] in {"oidn", "xrds"}:
+            fields = dict(point["settings"])
+            samples = fields.pop("samples")
+            key = Choice(samples=0, **fields), samples
+            errors.setdefault(key, []).append(point["psnr"])
+    curves: dict[Choice, dict[int, float]] = {}
+    for (choice, samples), psnr in errors.items():
+        if len(psnr) == len(scenes):
+            curves.setdefault(choice, {})[samples] = statistics.fmean(psnr)
+    model = budget.ErrorModel({c: Curve.of(points) for c, points in curves.items()})
+    names = ", ".join(scene.name for scene in scenes)
+    source = f"mean over {len(scenes)} scenes: {names}; weights: "
+    return _speeds(scenes, model, source + _weights(scenes[0]))
+
+
+def _weights(scene: SceneBench) -> str:
+    """The networks with the beginnings of their files' checksums."""
+    chosen = scene.settings
+    return ", ".join(
+        f"{preset} x{scale} {guides} {chosen.networks.digest((preset, scale, guides))}"
+        for preset, scale, guides in chosen.sweep.networks
+    )
+
+
+def _speeds(
+    scenes: Sequence[SceneBench], errors: budget.ErrorModel, source: str
+) -> budget.Model:
+    timed = [s for s in scenes if s.times.count(XRDS_FRAME)]
+    if not timed:
+        old = budget.shipped()
+        return budget.Model(
+            errors,
+            old.denoiser_speed,
+            old.network_speed,
+            old.other_per_megapixel,
+            source,
+        )
+    denoisers = {mode: _ratio(timed, lambda s, m=mode: s.times.denoising(m))
+                 for mode in DENOISERS}  # fmt: skip
+    networks = {
+        network: _ratio(timed, lambda s, n=network: s.times.median(_name(n)))
+        for network in timed[0].settings.sweep.networks
+    }
+    other = statistics.median(
+        s.times.median(name, "other") / s.megapixels
+        for s in timed
+        for name in (PLAIN_FRAME, XRDS_FRAME)
+    )
+    return budget.Model(errors, denoisers, networks, other, source)
+
+
+def _ratio(scenes: Sequence[SceneBench], seconds: Any) -> float:
+    """Median over scenes of seconds over those of the denoiser that is probed."""
+    unit = DEFAULT_DENOISER
+    ratios = [seconds(s) / max(s.times.denoising(unit), 1e-6) for s in scenes]
+    return round(statistics.median(ratios), 4)
+
+
+def _name(network: Network) -> str:
+    preset, scale, guides = network
+    return network_name(Config("xrds", 1, "", scale, preset, guides))

@@ -1,0 +1,301 @@
+"""How seconds and memory grow with the frame, and where the network pays.
+
+Over frames of one scene and over the cores of this machine: a whole frame by Cycles
+with OIDN, one by each network, and what OIDN, the networks and single samples take
+alone. The break-even sets what the small render saves against what the network takes.
+"""
+
+from __future__ import annotations
+
+import math
+from contextlib import nullcontext
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.planning.budget import Network
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
+from . import machine, tasks
+from .inputs import Request
+from .stages import PLAIN_FRAME, StageTimes, Stopwatch, clocked, network_name
+from .sweep import Config, anchor
+from .windows import Window
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from .measure import Settings
+    from .stages import Run, Task
+    from .windows import Shot
+
+    Size = tuple[int, int]
+    Row = dict[str, Any]
+
+# Cores that no machine at hand has; each stage's line in 1/cores is drawn on to them.
+MORE_CORES = (8, 32)
+MEMORY_LIMIT = 1 << 30
+QUICK_DENOISER = "HIGH-FAST"
+NOTE = (
+    "Break-even at equal rays: saved is a frame of one sample + OIDN less the "
+    "low-resolution render of scale² samples, its OIDN and one guide sample; paid is "
+    f"the network. OIDN at full size is Blender's default ({DEFAULT_DENOISER}) or the "
+    f"quicker {QUICK_DENOISER}. More cores than this machine has are extrapolated: "
+    "every stage as a + b / cores through its runs on fewer. There was no graphics "
+    "card to fit."
+)
+
+
+def growth(
+    shot: Shot,
+    sizes: Sequence[Size],
+    settings: Settings,
+    tell: Callable[[float, str], object],
+) -> dict[str, Any]:
+    """Measure one scene at every size with 1 to all cores; the report's ``growth``.
+
+    ``tell`` hears megapixels done and what they were.
+    """
+    counts = _core_counts()
+    rows: list[Row] = []
+    for size in sizes:
+        for cores in counts:
+            rows += _measured(_resized(shot, size), cores, counts, settings, tell)
+    return {
+        "scene": shot.name,
+        "sizes": [list(size) for size in sizes],
+        "rows": rows,
+        "exponents": exponents(rows),
+        "break_even": break_even(rows, settings.sweep.networks),
+        "note": NOTE,
+    }
+
+
+def _core_counts() -> list[int]:
+    """One core and all of them, where threads can be held to cores (Linux)."""
+    most = machine.cores()
+    if not Path("/proc/self/task").is_dir() or most == 1:
+        return [most]
+    return [1, most]
+
+
+def _resized(shot: Shot, size: Size) -> Shot:
+    return replace(shot, window=Window(*size, 0, 0, *size), reference=None)
+
+
+def _measured(
+    shot: Shot,
+    cores: int,
+    counts: Sequence[int],
+    settings: Settings,
+    tell: Callable[[float, str], object],
+) -> list[Row]:
+    """Rows of one frame size on so many cores."""
+    size = shot.window.frame_width, shot.window.frame_height
+    directory = settings.folder.directory
+    assert directory is not None
+    name = f"{shot.name}-{shot.digest}-{size[0]}x{size[1]}-{cores}cores-growth"
+    times = StageTimes(directory / f"{name}.json")
+    watch = Stopwatch(shot, times, _renders(settings), settings.journal)
+    for task, call in _tasks(shot, settings).items():
+        watch.add(task, call)
+    all_of_them = cores == max(counts)
+    with nullcontext() if all_of_them else machine.only_cores(cores):
+        pixels = size[0] * size[1] / 1e6
+        watch.measure(
+            settings.rounds, lambda what: tell(pixels, f"{size[0]}x{size[1]}: {what}")
+        )
+    return [
+        {
+            "task": task,
+            "size": list(size),
+            "pixels": size[0] * size[1],
+            "cores": cores,
+            "seconds": seconds,
+            "peak_memory": peak,
+        }
+        for task, seconds, peak in _rows(times, settings)
+    ]
+
+
+def _renders(settings: Settings) -> list[Request]:
+    found = [anchor("plain", more=more) for more in (False, True)]
+    found += [anchor("plain", 1, mode) for mode in (DEFAULT_DENOISER, QUICK_DENOISER)]
+    return [*found, anchor("guides"), anchor("guides", more=True)]
+
+
+def _tasks(shot: Shot, settings: Settings) -> dict[str, Task]:
+    """Networks alone, without and with a memory limit, and whole frames by each."""
+    sweep, networks = settings.sweep, settings.networks
+    timed = tasks.tasks(shot, sweep, networks)
+    names = {network_name(_config(n)): n for n in sweep.networks}
+    found = {name: timed[name] for name in [PLAIN_FRAME, *names]}
+    for name, network in names.items():
+        found[_limited(name)] = _limited_network(shot, settings, network)
+        found[_frame(name)] = _xrds_frame(shot, settings, network)
+    return found
+
+
+def _config(network: Network) -> Config:
+    preset, scale, guides = network
+    return Config("xrds", 1, "", scale, preset, guides)
+
+
+def _limited(name: str) -> str:
+    return f"{name}, limit {MEMORY_LIMIT >> 20} MiB"
+
+
+def _frame(name: str) -> str:
+    return f"whole frame, {name}"
+
+
+def _less_network(name: str) -> str:
+    return f"{_frame(name)}, less the network"
+
+
+def _alone(denoiser: str) -> str:
+    return f"OIDN {denoiser} alone"
+
+
+def _limited_network(shot: Shot, settings: Settings, network: Network) -> Task:
+    def task() -> Run:
+        low, full = tasks.noise(shot.window, network[1])
+        extra = full if network[2] == "full" else None
+        upscaler = settings.networks[network]
+        return clocked(
+            lambda: upscaler(
+                low, full, full, guide_radiance=extra, memory_limit=MEMORY_LIMIT
+            )
+        )
+
+    return task
+
+
+def _xrds_frame(shot: Shot, settings: Settings, network: Network) -> Task:
+    """A frame with the rays of one full-resolution sample and one guide sample."""
+    preset, scale, guides = network
+    job = RenderJob(
+        scale=scale,
+        preset=preset,
+        guides=guides,
+        samples=scale**2,
+        guide_samples=1,
+        device=settings.networks.device,
+        weights=settings.networks.weights,
+        denoiser=QUICK_DENOISER,
+    )
+
+    def task() -> Run:
+        picture, run = tasks.frame(shot, job)
+        return run | {stage: picture.seconds[stage] for stage in ("network", "guides")}
+
+    return task
+
+
+def _rows(
+    times: StageTimes, settings: Settings
+) -> Iterator[tuple[str, float, int | None]]:
+    """Task, seconds and peak memory; what failed is left out."""
+    if times.count(PLAIN_FRAME):
+        yield PLAIN_FRAME, times.median(PLAIN_FRAME), times.peak(PLAIN_FRAME)
+    for network in settings.sweep.networks:
+        name = network_name(_config(network))
+        for task in (name, _limited(name), _frame(name)):
+            if times.count(task):
+                yield task, times.median(task), times.peak(task)
+        if times.count(_frame(name)):
+            seconds = times.median(_frame(name)) - times.median(_frame(name), "network")
+            yield _less_network(name), seconds, None
+    for mode in (DEFAULT_DENOISER, QUICK_DENOISER):
+        try:
+            seconds = times.denoising(mode)
+        except KeyError:
+            continue
+        yield _alone(mode), seconds, None
+    for kind in ("plain", "guides"):
+        try:
+            yield f"one sample, {kind}", times.line(kind)[1], None
+        except KeyError:
+            continue
+
+
+# --- fits -----------------------------------------------------------------------------
+
+
+def exponents(rows: Sequence[Row]) -> list[dict[str, Any]]:
+    """Power of the pixels by which each task's seconds and memory grow."""
+    found = []
+    for task, cores in dict.fromkeys((row["task"], row["cores"]) for row in rows):
+        mine = [r for r in rows if (r["task"], r["cores"]) == (task, cores)]
+        fits = {key: _power(mine, key) for key in ("seconds", "peak_memory")}
+        if fits["seconds"] is not None:
+            found.append({"task": task, "cores": cores} | fits)
+    return found
+
+
+def _power(rows: Sequence[Row], key: str) -> float | None:
+    """Slope of the least-squares line through the logarithms; None for one point."""
+    known = [(r["pixels"], r[key]) for r in rows if r[key]]
+    if len({pixels for pixels, _ in known}) < 2:
+        return None
+    x, y = (np.log([pair[i] for pair in known]) for i in (0, 1))
+    return float(np.polyfit(x, y, 1)[0])
+
+
+def break_even(rows: Sequence[Row], networks: Sequence[Network]) -> list[Row]:
+    """Seconds saved by the small render against seconds paid for the network."""
+    found = []
+    sizes = dict.fromkeys(tuple(row["size"]) for row in rows)
+    known = sorted({row["cores"] for row in rows})
+    for network in networks:
+        name = network_name(_config(network))
+        for size in sizes:
+            here = [row for row in rows if tuple(row["size"]) == size]
+            for cores in [*known, *(c for c in MORE_CORES if c > max(known))]:
+                plain, rest, paid, default, quick = (
+                    seconds_on(here, task, cores)
+                    for task in (
+                        PLAIN_FRAME,
+                        _less_network(name),
+                        name,
+                        _alone(DEFAULT_DENOISER),
+                        _alone(QUICK_DENOISER),
+                    )
+                )
+                if plain is None or rest is None or paid is None:
+                    continue
+                known_oidn = default is not None and quick is not None
+                found.append(
+                    {
+                        "network": name,
+                        "size": list(size),
+                        "cores": str(cores),
+                        "extrapolated": cores not in known,
+                        "saved": plain - rest,
+                        "saved_quick": plain - default + quick - rest
+                        if known_oidn
+                        else None,
+                        "paid": paid,
+                    }
+                )
+    return found
+
+
+def seconds_on(rows: Sequence[Row], task: str, cores: int) -> float | None:
+    """Seconds of a task on so many cores: measured, or as a + b / cores.
+
+    None where it was not measured, or on one count of cores alone.
+    """
+    known = {row["cores"]: row["seconds"] for row in rows if row["task"] == task}
+    if cores in known:
+        return float(known[cores])
+    if len(known) < 2:
+        return None
+    few, many = min(known), max(known)
+    slope = (known[few] - known[many]) / (1 / few - 1 / many)
+    fixed = known[many] - slope / many
+    seconds = fixed + slope / cores
+    return seconds if math.isfinite(seconds) and seconds > 0 else None

@@ -1,0 +1,330 @@
+"""One scene of the report: its seconds, its errors, and the picker at its budgets."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.frame.picking import probe
+from xrds_blender.planning import budget
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_core.atomic import write_json
+
+from . import tasks, workload
+from .inputs import OFF, Folder, open_scene
+from .pictures import Networks, Pictures
+from .stages import PLAIN_FRAME, StageTimes, Stopwatch
+from .sweep import DENOISERS, Config, Sweep, anchors, describe
+
+if TYPE_CHECKING:
+    from .inputs import Request
+    from .journal import Journal
+    from .windows import Shot
+    from .workload import Meter
+
+    Point = dict[str, Any]
+
+# Configurations a little above the largest budget still shape the curves.
+MOST_OVER_BUDGET = 1.3
+DEFAULT = Config("oidn", 1, DEFAULT_DENOISER)  # the unit of the budgets
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What every scene of a run is measured by."""
+
+    sweep: Sweep
+    folder: Folder
+    networks: Networks
+    journal: Journal
+    budgets: tuple[float, ...]
+    rounds: int
+    reference_samples: int
+    timing: bool = True
+    picker: bool = True
+
+
+class SceneBench:
+    """Measures one shot; everything that is done is kept in files and not redone."""
+
+    def __init__(self, shot: Shot, settings: Settings) -> None:
+        self.shot, self.settings = shot, settings
+        self._configs = settings.sweep.configurations()
+        directory = settings.folder.directory
+        assert directory is not None
+        frame = f"{shot.window.frame_width}x{shot.window.frame_height}"
+        identity = f"{shot.name}-{shot.digest}-{frame}"
+        self.times = StageTimes(directory / f"{identity}-stages.json")
+        self._picks_file = directory / f"{identity}-picks.json"
+        # Encoded, by label: the report is written again after every scene.
+        self.crops: dict[str, str] = {}
+        self.pictures = Pictures(
+            shot, settings.folder, settings.networks, settings.reference_samples
+        )
+
+    @property
+    def name(self) -> str:
+        """Of the scene."""
+        return self.shot.name
+
+    @property
+    def configs(self) -> list[Config]:
+        """All that is compared: what takes longer than any budget is left out."""
+        if not self.settings.timing:
+            return self._configs
+        limit = MOST_OVER_BUDGET * max(self.settings.budgets) * self.unit()
+        return [c for c in self._configs if self._predicted(c) <= limit]
+
+    def _predicted(self, config: Config) -> float:
+        """Seconds of its frame: as timed, or by the probes before anything was."""
+        try:
+            return self.times.cost(config).total
+        except KeyError:
+            return workload.config_seconds(config, self.costs)
+
+    # --- estimate ---------------------------------------------------------------------
+
+    @cached_property
+    def costs(self) -> budget.Costs:
+        """Of the scene's whole frame, from the product's own probes."""
+        from xrds_blender import run_job
+
+        model = budget.shipped()
+        slowest = max(model.network_speed.values())
+        known = list(self.settings.sweep.networks)
+        speeds = {n: model.network_speed.get(n, slowest) for n in known}
+        model = replace(model, network_speed=speeds)
+        scene = open_scene(self.shot.path, self.shot.window.whole)
+        start = time.perf_counter()
+        return run_job(scene, lambda passes: probe(passes, model, known, start))
+
+    def estimate(self) -> float:
+        """Predicted seconds of what is left to do."""
+        part, window = workload.share(self.shot.window), self.shot.window
+        found = [
+            workload.render_seconds(request, self.costs, part)
+            for request in self.pictures.missing(self.configs)
+        ]
+        found += [
+            workload.picture_seconds(config, self.costs, window)
+            for config in self.configs
+            if not self.pictures.knows(config)
+        ]
+        if self.settings.timing:
+            left = self._stopwatch.left(self.settings.rounds)
+            found += [self._task_seconds(name) for name in left]
+            found += [multiple * self.unit() for multiple in self._budgets_left()]
+        return sum(found)
+
+    def unit(self) -> float:
+        """Seconds of 1 spp + OIDN with Blender's defaults: predicted, then measured."""
+        try:
+            return self.times.cost(DEFAULT).total
+        except KeyError:
+            return self.costs.seconds(budget.Choice(DEFAULT_DENOISER, 1))
+
+    @property
+    def megapixels(self) -> float:
+        """Of the whole frame."""
+        return self.shot.window.frame_width * self.shot.window.frame_height / 1e6
+
+    def growth_estimate(self, megapixels: float) -> float:
+        """Predicted seconds of `growth` over frames of so many megapixels in all."""
+        chosen = self.settings
+        runs = chosen.rounds * (7 + 3 * len(chosen.sweep.networks)) * 3  # 1 and 2 cores
+        return runs * megapixels * self.unit() / self.megapixels / 2
+
+    def _task_seconds(self, name: str) -> float:
+        request = self._stopwatch.renders.get(name)
+        if request is not None:
+            return workload.render_seconds(request, self.costs)
+        if name == PLAIN_FRAME:
+            return self.unit()
+        return self.costs.beauty + 2.0  # a network, a baseline or a small frame
+
+    # --- measuring --------------------------------------------------------------------
+
+    @cached_property
+    def _stopwatch(self) -> Stopwatch:
+        chosen = self.settings
+        watch = Stopwatch(self.shot, self.times, anchors(chosen.sweep), chosen.journal)
+        for name, task in tasks.tasks(self.shot, chosen.sweep, chosen.networks).items():
+            watch.add(name, task)
+        return watch
+
+    def measure(self, meter: Meter) -> None:
+        """Time, render and compare whatever is missing."""
+        if self.settings.timing:
+            rounds = self.settings.rounds
+            # All foreseen first: the costs' own probe must not render inside a render.
+            seconds = {n: self._task_seconds(n) for n in self._stopwatch.left(rounds)}
+            self._stopwatch.measure(
+                rounds, lambda n: meter.done(seconds[n], f"{self.name}: {n}")
+            )
+        self._render(self.configs, meter)
+        self._compare(meter)
+        if self.settings.timing:
+            for multiple in self._budgets_left():
+                with self.settings.journal.attempt(f"{self.name}: budget {multiple:g}"):
+                    self._pick(multiple, meter)
+                meter.done(multiple * self.unit(), f"{self.name}: budget {multiple:g}")
+
+    def _render(self, configs: list[Config], meter: Meter) -> None:
+        part = workload.share(self.shot.window)
+        seconds = {  # before anything is rendered, as in `measure`
+            request: workload.render_seconds(request, self.costs, part)
+            for request in self.pictures.missing(configs)
+        }
+
+        def tell(request: Request) -> None:
+            what = f"{self.name}: {request.kind}, {request.samples} spp"
+            meter.done(seconds[request], what)
+
+        self.pictures.render(list(seconds), self.settings.journal, tell)
+
+    def _compare(self, meter: Meter) -> None:
+        saved = time.perf_counter()
+        for config in self.configs:
+            if self.pictures.knows(config):
+                continue
+            what = f"{self.name}: {config.label}"
+            with self.settings.journal.attempt(what):
+                self.pictures.errors(config)
+            window = self.shot.window
+            meter.done(workload.picture_seconds(config, self.costs, window), what)
+            if time.perf_counter() - saved > 10:
+                self.pictures.save()
+                saved = time.perf_counter()
+        self.pictures.save()
+
+    # --- the picker -------------------------------------------------------------------
+
+    @property
+    def picks(self) -> dict[str, Any]:
+        """What the picker did at each budget, by the budget's multiple."""
+        if not self._picks_file.is_file():
+            return {}
+        return dict(json.loads(self._picks_file.read_text("utf-8")))
+
+    def _budgets_left(self) -> list[float]:
+        done = self.picks if self.settings.picker else {}
+        wanted = self.settings.budgets if self.settings.picker else ()
+        return [multiple for multiple in wanted if f"{multiple:g}" not in done]
+
+    def _pick(self, multiple: float, meter: Meter) -> None:
+        """Let the product keep to a budget, whole frame; its error on the window."""
+        seconds = multiple * self.unit()
+        networks = self.settings.networks
+        job = RenderJob(
+            time_budget=seconds, device=networks.device, weights=networks.weights
+        )
+        picture, run = tasks.frame(self.shot, job)
+        assert picture.job is not None
+        config = picked_config(picture.job)
+        told = {
+            "budget": seconds,
+            "seconds": picture.seconds | {"total": run["seconds"]},
+            "peak_memory": run["peak"],
+            "settings": asdict(config),
+            "label": config.label,
+            "reason": picture.plan[0].reason,
+        }
+        del picture
+        self._render([config], meter)
+        told |= self.pictures.errors(config)
+        write_json(self._picks_file, self.picks | {f"{multiple:g}": told})
+
+    # --- results ----------------------------------------------------------------------
+
+    def points(self) -> list[Point]:
+        """Every configuration whose seconds and error are known."""
+        found = []
+        for config in self.configs:
+            if not self.pictures.knows(config):
+                continue
+            point = {
+                "scene": self.name,
+                "method": config.method,
+                "settings": describe(config),
+                "label": config.label,
+            }
+            if self.settings.timing:
+                try:
+                    cost = self.times.cost(config)
+                except KeyError:  # a stage failed; it is among the failures
+                    continue
+                point |= {
+                    "seconds": cost.seconds,
+                    "cpu_seconds": cost.cpu_seconds,
+                    "peak_memory": cost.peak_memory,
+                }
+            found.append(point | self.pictures.errors(config))
+        return found
+
+    def summary(self) -> dict[str, Any]:
+        """The scene's entry under ``scenes``."""
+        window = self.shot.window
+        told: dict[str, Any] = {
+            "scene": self.name,
+            "frame": [window.frame_width, window.frame_height],
+            "window": [window.x, window.y, window.width, window.height],
+            "reference": _named(self.shot, self.settings.reference_samples),
+            "reference_psnr_floor": self.pictures.floor(),
+        }
+        return told | self._timed() if self.settings.timing else told
+
+    def _timed(self) -> dict[str, Any]:
+        """What was timed; nothing where a stage that all else rests on failed."""
+        try:
+            beauty, guide = (self.times.line(k)[1] for k in ("plain", "guides"))
+            modes = {mode: self.times.denoising(mode) for mode in DENOISERS}
+            check = {
+                "composed": self.times.cost(DEFAULT).total,
+                "whole": self.times.median(PLAIN_FRAME),
+            }
+        except KeyError:
+            return {}
+        return {
+            "default_seconds": self.unit(),
+            "seconds_per_sample": beauty,
+            "seconds_per_guide_sample": guide,
+            "rho": guide / beauty,
+            "denoise_seconds": modes,
+            "check": check,
+            "network_load_seconds": self._loads(),
+            "stages": self.times.runs,
+        }
+
+    def _loads(self) -> dict[str, float]:
+        """Seconds of loading each network's weights: the first time of a process."""
+        return {
+            name: max(run.get("load") or 0.0 for run in runs)
+            for name, runs in self.times.runs.items()
+            if name.startswith("XRDS")
+        }
+
+
+def picked_config(job: RenderJob) -> Config:
+    """The configuration of a job that the picker made."""
+    denoiser, samples = job.denoiser or OFF, job.samples or 0
+    if job.is_plain:
+        return Config("oidn", samples, denoiser)
+    return Config(
+        "xrds",
+        samples,
+        denoiser,
+        job.scale,
+        job.preset,
+        job.guides,
+        job.guide_samples,
+    )
+
+
+def _named(shot: Shot, samples: int) -> str:
+    if shot.reference is not None:
+        return shot.reference.name
+    return f"mean of two renders of {samples} samples, OIDN"

@@ -1,0 +1,159 @@
+"""Which method has the least error for its seconds; pure functions of points.
+
+A point is one entry of ``points`` in results.json: scene, method, settings, seconds
+by stage with total, and the error measures.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    Point = dict[str, Any]
+
+# Measures where more is better; of all others less is.
+RISING = ("psnr",)
+CACHED = "XRDS, guides cached"
+STEPS = 96  # of a curve over log seconds
+
+
+def _oidn_default(point: Point) -> bool:
+    return (
+        point["method"] == "oidn" and point["settings"]["denoiser"] == DEFAULT_DENOISER
+    )
+
+
+# What is drawn and compared, by name; "XRDS, guides cached" is "XRDS" without theirs.
+GROUPS: dict[str, Callable[[Point], bool]] = {
+    "Cycles": lambda p: p["method"] == "cycles",
+    "OIDN, default": _oidn_default,
+    "OIDN, best mode": lambda p: p["method"] == "oidn",
+    "bicubic": lambda p: p["method"] == "bicubic",
+    "demodulated bilinear": lambda p: p["method"] == "demodulated_bilinear",
+    "XRDS": lambda p: p["method"] == "xrds",
+}
+
+
+def groups(points: Sequence[Point]) -> dict[str, list[Point]]:
+    """Points by group; XRDS also by scale, by guides and with them for nothing."""
+    found = {name: [p for p in points if has(p)] for name, has in GROUPS.items()}
+    ours = found["XRDS"]
+    for scale in sorted({p["settings"]["scale"] for p in ours}):
+        found[f"XRDS x{scale}"] = [p for p in ours if p["settings"]["scale"] == scale]
+    guides = {
+        f"XRDS, {kind} guides": [p for p in ours if p["settings"]["guides"] == kind]
+        for kind in ("fast", "full")
+    }
+    found[CACHED] = [without_guides(p) for p in guides["XRDS, fast guides"]]
+    if all(guides.values()):  # one alone is all of XRDS
+        found |= guides
+    return {name: members for name, members in found.items() if members}
+
+
+def without_guides(point: Point) -> Point:
+    """The point as if its guides had been rendered before."""
+    seconds = dict(point["seconds"])
+    seconds["total"] -= seconds["guides"]
+    return point | {"seconds": seconds | {"guides": 0.0}}
+
+
+def better(a: Point, b: Point, measure: str = "psnr") -> bool:
+    """Whether the first has less error."""
+    if measure in RISING:
+        return bool(a[measure] > b[measure])
+    return bool(a[measure] < b[measure])
+
+
+def frontier(points: Iterable[Point], measure: str = "psnr") -> list[Point]:
+    """Those that no other beats in both seconds and error, by rising seconds."""
+    found: list[Point] = []
+    for point in sorted(points, key=lambda p: (p["seconds"]["total"], -p["psnr"])):
+        if not found or better(point, found[-1], measure):
+            found.append(point)
+    return found
+
+
+def best_within(
+    points: Iterable[Point], seconds: float, measure: str = "psnr"
+) -> Point | None:
+    """The least error of those that take no longer; None where none does."""
+    inside = frontier((p for p in points if p["seconds"]["total"] <= seconds), measure)
+    return inside[-1] if inside else None
+
+
+def at(points: Sequence[Point], seconds: float, measure: str = "psnr") -> float | None:
+    """The frontier's error at ``seconds``, between its points linear in log seconds.
+
+    None before its first point; beyond its last, that one's.
+    """
+    line = frontier(points, measure)
+    if not line or seconds < line[0]["seconds"]["total"] * (1 - 1e-9):
+        return None
+    for low, high in pairwise(line):
+        start, end = low["seconds"]["total"], high["seconds"]["total"]
+        if seconds < end:
+            share = math.log(seconds / start) / math.log(end / start)
+            return float(
+                low[measure] + max(share, 0.0) * (high[measure] - low[measure])
+            )
+    return float(line[-1][measure])
+
+
+def crossings(
+    ours: Sequence[Point], rivals: Sequence[Point], measure: str = "psnr"
+) -> list[dict[str, float | bool]]:
+    """Where the better of two frontiers changes: seconds, and who is better after.
+
+    The first entry is where both exist for the first time.
+    """
+    if not ours or not rivals:
+        return []
+    totals = [p["seconds"]["total"] for p in [*ours, *rivals]]
+    found: list[dict[str, float | bool]] = []
+    for seconds in spaced(min(totals), max(totals)):
+        a, b = at(ours, seconds, measure), at(rivals, seconds, measure)
+        if a is None and b is None:
+            continue
+        wins = b is None or (a is not None and (a > b if measure in RISING else a < b))
+        if not found or found[-1]["ours_better"] != wins:
+            found.append({"seconds": seconds, "ours_better": wins})
+    return found
+
+
+def spaced(first: float, last: float, steps: int = STEPS) -> list[float]:
+    """Values from ``first`` to ``last`` in equal ratios."""
+    ratio = last / first
+    return [first * ratio ** (i / (steps - 1)) for i in range(steps)]
+
+
+def mean_curve(
+    scenes: dict[str, tuple[Sequence[Point], float]],
+    measure: str = "psnr",
+    span: tuple[float, float] = (0.125, 16.0),
+) -> list[tuple[float, float]]:
+    """(budget, mean error) over scenes of (points, seconds of 1 spp + OIDN).
+
+    Only budgets at which every scene has a point.
+    """
+    found = []
+    for budget in spaced(*span):
+        errors = [
+            at(points, budget * unit, measure) for points, unit in scenes.values()
+        ]
+        known = [error for error in errors if error is not None]
+        if known and len(known) == len(errors):
+            found.append((budget, statistics.fmean(known)))
+    return found
+
+
+def dearest_stage(point: Point) -> str:
+    """The stage that takes most of a point's seconds."""
+    stages = {k: s for k, s in point["seconds"].items() if k != "total"}
+    return max(stages, key=stages.__getitem__)

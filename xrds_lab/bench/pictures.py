@@ -1,0 +1,250 @@
+"""The picture of every configuration on one shot, and its errors."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_blender.planning.budget import Network
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_core import baselines, exr, front_end, metrics
+from xrds_core.atomic import replacing
+from xrds_core.errors import SceneError
+
+from .inputs import Folder, Request, open_scene
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from .inputs import Arrays
+    from .journal import Journal
+    from .sweep import Config
+    from .windows import Shot
+
+HALF_SEEDS = (11, 12)  # of a reference's two halves
+CACHE_BYTES = 600e6  # of rendered inputs held in memory
+HALVES_GAIN = 3.01  # dB by which the mean of two halves is better than either
+
+
+class Networks:
+    """Upscalers by network, each loaded once."""
+
+    def __init__(self, weights: Path | None, device: str) -> None:
+        from xrds_core import weights as files
+
+        self.weights, self.device = weights, device
+        self._loaded: dict[Network, Any] = {}
+        self.records = {
+            (record["preset"], record["scale"], record["guides"]): record
+            for record in files.available(weights)
+        }
+        self.filter_digest = files.guide_filter_record(weights)["sha256"][:12]
+
+    def digest(self, network: Network) -> str:
+        """Of the weights file."""
+        return str(self.records[network]["sha256"])[:12]
+
+    def __getitem__(self, network: Network) -> Any:
+        if network not in self._loaded:
+            from xrds_core.upscaler import Upscaler
+
+            preset, scale, guides = network
+            self._loaded[network] = Upscaler(
+                preset, scale, guides, self.device, weights=self.weights
+            )
+        return self._loaded[network]
+
+
+class Pictures:
+    """Makes pictures of rendered inputs and measures them against the reference."""
+
+    def __init__(
+        self, shot: Shot, folder: Folder, networks: Networks, reference_samples: int
+    ) -> None:
+        self.shot, self.folder, self.networks = shot, folder, networks
+        self.reference_samples = reference_samples
+        assert folder.directory is not None
+        self._errors_file = folder.directory / f"{_identity(shot)}-errors.json"
+        self._errors = _stored(self._errors_file)
+        pixels = shot.window.width * shot.window.height
+        kept = min(max(int(CACHE_BYTES / (24 * pixels)), 4), 64)
+        self._read = lru_cache(maxsize=kept)(self._from_folder)
+
+    # --- rendering --------------------------------------------------------------------
+
+    def halves(self) -> list[Request]:
+        """The reference's two halves, where the shot brings none."""
+        if self.shot.reference is not None:
+            return []
+        samples = self.reference_samples
+        return [
+            Request("plain", samples, 1, DEFAULT_DENOISER, seed) for seed in HALF_SEEDS
+        ]
+
+    def missing(self, configs: Sequence[Config]) -> list[Request]:
+        """What is still to be rendered for them and the reference, fewest rays first.
+
+        In this order one session of Cycles serves them all.
+        """
+        wanted = dict.fromkeys(r for config in configs for r in config.requests())
+        for half in self.halves():
+            wanted[half] = None
+        known = [r for r in wanted if not self.folder.has(r.file_name(self.shot))]
+        return sorted(known, key=lambda r: r.samples)
+
+    def render(
+        self,
+        requests: Sequence[Request],
+        journal: Journal,
+        tell: Callable[[Request], object],
+    ) -> None:
+        """Render requests into the folder; one that fails is left out."""
+        from xrds_blender import run_job
+
+        names = {r: f"{self.shot.name}: {r.file_name(self.shot)}" for r in requests}
+        left = [r for r in requests if not journal.gives_up(names[r])]
+        if not left:
+            return
+
+        def job(passes: Any) -> None:
+            for request in left:
+                with journal.attempt(names[request]):
+                    arrays, seconds = request.render(passes)
+                    arrays["view_exposure"] = exposure
+                    name = request.file_name(self.shot)
+                    self.folder.write(name, arrays, seconds)
+                tell(request)
+
+        with journal.attempt(f"{self.shot.name}: rendering its inputs"):
+            scene = open_scene(self.shot.path, self.shot.window)
+            exposure = np.float32(scene.view_settings.exposure)
+            run_job(scene, job)
+
+    # --- pictures ---------------------------------------------------------------------
+
+    def picture(self, config: Config) -> np.ndarray:
+        """Radiance (H, W, 3) of the shot's window; raises SceneError for what lacks."""
+        beauty, *guide = (self._read(request) for request in config.requests())
+        radiance = front_end.clean_radiance(beauty["radiance"])[0]
+        if config.scale == 1:
+            return radiance
+        height, width = self.reference().shape[:2]
+        if not guide:
+            return baselines.bicubic(radiance, config.scale)[:height, :width]
+        albedo = front_end.clean_albedo(guide[0]["albedo"])[0]
+        if config.method == "demodulated_bilinear":
+            padded = front_end.pad_guide(albedo, radiance, config.scale)
+            picture = front_end.demodulated_base(radiance, padded, config.scale)
+            return picture[:height, :width]
+        light = {
+            name: None if x is None else front_end.clean_radiance(x)[0]
+            for name, x in (
+                ("noisy", beauty.get("noisy")),
+                ("guide_radiance", guide[0].get("radiance")),
+            )
+        }
+        network = self.networks[config.preset, config.scale, config.guides]
+        picture = network(
+            radiance,
+            albedo,
+            front_end.clean_normal(guide[0]["normal"])[0],
+            guide_samples=config.guide_samples,
+            **light,
+        )
+        return np.asarray(picture.radiance[..., :3])
+
+    def reference(self) -> np.ndarray:
+        """The reference (H, W, 3): the shot's own, or the mean of two halves."""
+        if self.shot.reference is not None:
+            return _reference_file(self.shot.reference)
+        first, second = (self._read(half)["radiance"] for half in self.halves())
+        return (first + second) / 2
+
+    def floor(self) -> float | None:
+        """PSNR (dB) of the reference itself, by how its halves differ."""
+        if self.shot.reference is not None:
+            return self.shot.window.floor_psnr
+        first, second = (self._read(half) for half in self.halves())
+        stops = float(first["view_exposure"])
+        apart = metrics.psnr(first["radiance"], second["radiance"], stops)
+        return apart + HALVES_GAIN
+
+    def knows(self, config: Config) -> bool:
+        """Whether its errors were measured before."""
+        return self._key(config) in self._errors
+
+    def _key(self, config: Config) -> str:
+        if config.method != "xrds":
+            return config.key
+        network = config.preset, config.scale, config.guides
+        key = f"{config.key}-{self.networks.digest(network)}"
+        if config.has_noisy_guides:
+            key += f"-{self.networks.filter_digest}"
+        return key
+
+    def errors(self, config: Config) -> dict[str, float]:
+        """Error measures, computed once for these weights."""
+        key = self._key(config)
+        if key not in self._errors:
+            stops = float(self._read(config.beauty())["view_exposure"])
+            self._errors[key] = measured(self.picture(config), self.reference(), stops)
+        return dict(self._errors[key])
+
+    def save(self) -> None:
+        """Keep the errors for the next run."""
+        with replacing(self._errors_file) as part:
+            part.write_text(json.dumps(self._errors), "utf-8")
+
+    def exposure(self, config: Config) -> float:
+        """Stops of the scene's view."""
+        return float(self._read(config.beauty())["view_exposure"])
+
+    def _from_folder(self, request: Request) -> Arrays:
+        name = request.file_name(self.shot)
+        arrays = self.folder.read(name)
+        if arrays is None:
+            raise SceneError(f"{name} was not rendered; run again to try it anew")
+        return arrays
+
+
+def measured(
+    picture: np.ndarray, reference: np.ndarray, stops: float
+) -> dict[str, float]:
+    """All error measures; LPIPS where its package and weights are installed."""
+    told = metrics.all_metrics(picture, reference, stops)
+    if has_lpips():
+        told["lpips"] = metrics.lpips(picture, reference, stops)
+    return told
+
+
+@lru_cache(maxsize=1)
+def has_lpips() -> bool:
+    """Whether LPIPS can be computed without fetching anything."""
+    if importlib.util.find_spec("lpips") is None:
+        return False
+    import torch
+
+    folder = Path(torch.hub.get_dir()) / "checkpoints"
+    return any(folder.glob("alexnet-*.pth"))
+
+
+@lru_cache(maxsize=2)
+def _reference_file(path: Path) -> np.ndarray:
+    return np.asarray(exr.read_beauty(path).radiance[..., :3])
+
+
+def _identity(shot: Shot) -> str:
+    reference = "own" if shot.reference is None else shot.reference.stem
+    return f"{shot.name}-{shot.digest}-{shot.window.label}-{reference}"
+
+
+def _stored(path: Path) -> dict[str, dict[str, float]]:
+    try:
+        return dict(json.loads(path.read_text("utf-8")))
+    except (OSError, ValueError):
+        return {}

@@ -1,0 +1,233 @@
+"""`xrds evaluate --table samples`: how error falls with samples, beside OIDN.
+
+Low-resolution renders of s * s * n samples cast as many rays as full-resolution ones of
+n, guides not counted in; seconds are of the window's renders and network, without the
+scene's sync.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import sys
+import tempfile
+import time
+from contextlib import nullcontext
+from dataclasses import asdict
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_core.atomic import write_json
+
+from .inputs import Folder, rendered, silent
+from .pictures import Networks, Pictures
+from .sweep import Config
+from .windows import find_shots
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from .inputs import Say
+    from .windows import Shot
+
+    Record = dict[str, Any]
+
+RATES = (1, 2, 4, 8)
+"""Full-resolution samples n of OIDN, and n * scale * scale of the low resolution."""
+LOW_SAMPLES = (4, 16, 64)
+AVERAGES = (2, 4, 8)
+"""Samples per full-resolution pixel with `full` guides, which get a half of them."""
+GUIDE_SAMPLES = 4
+OIDN = {"default": DEFAULT_DENOISER, "fast": "FAST-FAST"}
+
+
+def samples_table(
+    scenes: Sequence[Path],
+    *,
+    windows: Path,
+    references: Path,
+    cache: Path | None = None,
+    scale: int = 2,
+    preset: str = "fast",
+    out: Path | None = None,
+    weights: Path | None = None,
+    device: str = "auto",
+    progress: Say | None = None,
+) -> dict[str, Any]:
+    """Measure scene files over their samples; returns the JSON's content.
+
+    Arguments as of `evaluate`; ``out`` gets samples.json, stderr the table. Raises
+    UsageError for missing files.
+    """
+    shots = find_shots(scenes, windows, references)
+    networks = Networks(weights, device)
+    full = (preset, scale, "full") in networks.records
+    configs = list(configurations(scale, preset, full))
+    records: list[Record] = []
+    folder = nullcontext(str(cache)) if cache else tempfile.TemporaryDirectory()
+    with folder as directory:
+        for shot in shots:
+            kept = Folder(Path(directory))
+            records += _measured(shot, kept, networks, configs, progress or silent)
+    report = {"scale": scale, "preset": preset, "records": records}
+    report |= {"summary": summary(records)}
+    print(text(report), file=sys.stderr)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        write_json(out / "samples.json", report)
+    return report
+
+
+def configurations(scale: int, preset: str, full: bool) -> Iterator[Config]:
+    """All that the table compares, each once."""
+    low = sorted({*LOW_SAMPLES, *(n * scale**2 for n in RATES)})
+    for n in low:
+        yield _xrds(n, scale, preset, "fast", GUIDE_SAMPLES)
+    for n in RATES:
+        for denoiser in OIDN.values():
+            yield Config("oidn", n, denoiser)
+    if full:
+        for average in AVERAGES:
+            yield _full(average, scale, preset)
+
+
+def _xrds(samples: int, scale: int, preset: str, guides: str, spp: int) -> Config:
+    return Config("xrds", samples, DEFAULT_DENOISER, scale, preset, guides, spp)
+
+
+def _full(average: int, scale: int, preset: str) -> Config:
+    """Half of the rays for the guides, half for the low-resolution picture."""
+    return _xrds(average * scale**2 // 2, scale, preset, "full", average // 2)
+
+
+def _measured(
+    shot: Shot, folder: Folder, networks: Networks, configs: list[Config], say: Say
+) -> list[Record]:
+    """One record per configuration."""
+    pictures = Pictures(shot, folder, networks, reference_samples=0)
+    rendered(shot, pictures.missing(configs), folder, say)
+    records = []
+    for config in configs:
+        errors = pictures.errors(config)
+        start = time.perf_counter()
+        pictures.picture(config)  # its inputs are read, its network loaded
+        seconds = time.perf_counter() - start if config.method == "xrds" else 0.0
+        files = [request.file_name(shot) for request in config.requests()]
+        seconds += sum(_render_seconds(folder, name) for name in files)
+        records.append(
+            asdict(config) | {"scene": shot.name, "seconds": seconds, **errors}
+        )
+        say(f"{shot.name}: {config.label}: {errors['psnr']:.2f} dB, {seconds:.1f} s")
+    pictures.save()
+    return records
+
+
+def _render_seconds(folder: Folder, name: str) -> float:
+    """Of a kept render, without sync."""
+    arrays = folder.read(name)
+    assert arrays is not None
+    stages = json.loads(str(arrays["seconds"]))
+    return float(sum(seconds for stage, seconds in stages.items() if stage != "sync"))
+
+
+def summary(records: list[Record]) -> dict[str, Any]:
+    """What the table asks, scene by scene and on the mean.
+
+    ``over_oidn``: dB over OIDN of n samples, and of its seconds the product's share;
+    ``full_over_oidn``: the same for `full` guides at so many samples on the average;
+    ``more_samples``: PSNR over LOW_SAMPLES.
+    """
+    by_scene: dict[str, dict[tuple[Any, ...], Record]] = {}
+    for record in records:
+        key = (record["method"], record["guides"], record["samples"])
+        key += (record["denoiser"],) if record["method"] == "oidn" else ()
+        by_scene.setdefault(record["scene"], {})[key] = record
+    area = max(record["scale"] for record in records) ** 2
+    full = any(record["guides"] == "full" for record in records)
+    return {
+        "over_oidn": {
+            mode: {
+                str(n): _against(
+                    by_scene, ("xrds", "fast", area * n), ("oidn", "", n, d)
+                )
+                for n in RATES
+            }
+            for mode, d in OIDN.items()
+        },
+        "full_over_oidn": {
+            mode: {
+                str(n): _against(
+                    by_scene, ("xrds", "full", area * n // 2), ("oidn", "", n, d)
+                )
+                for n in AVERAGES
+                if full
+            }
+            for mode, d in OIDN.items()
+        },
+        "more_samples": {
+            scene: [found["xrds", "fast", n]["psnr"] for n in LOW_SAMPLES]
+            for scene, found in by_scene.items()
+        },
+    }
+
+
+def _against(
+    by_scene: dict[str, dict[tuple[Any, ...], Record]],
+    ours: tuple[Any, ...],
+    theirs: tuple[Any, ...],
+) -> dict[str, Any]:
+    """By scene dB better and the share of their seconds; the means of both."""
+    gains, shares = {}, {}
+    for scene, found in by_scene.items():
+        gains[scene] = found[ours]["psnr"] - found[theirs]["psnr"]
+        shares[scene] = found[ours]["seconds"] / found[theirs]["seconds"]
+    return {
+        "gain": gains,
+        "seconds": shares,
+        "mean_gain": statistics.fmean(gains.values()),
+        "median_seconds": statistics.median(shares.values()),
+    }
+
+
+def text(report: dict[str, Any]) -> str:
+    """The summary to be read."""
+    told, scale = report["summary"], report["scale"]
+    name = f"XRDS {report['preset']} x{scale}"
+    blocks = [
+        _block(f"{name}, {scale**2} n spp + {GUIDE_SAMPLES}", told["over_oidn"]),
+        _block(f"{name}, full guides, n spp on average", told["full_over_oidn"]),
+        "\n".join(_growth(name, told["more_samples"])),
+    ]
+    return "\n\n".join(block for block in blocks if block)
+
+
+def _block(title: str, by_mode: dict[str, dict[str, Any]]) -> str:
+    columns = [(m, n, found) for m, row in by_mode.items() for n, found in row.items()]
+    if not columns:
+        return ""
+    lines = [
+        f"{title}: dB over OIDN of n spp (seconds, of OIDN's)",
+        _row("", [f"{mode} {n}" for mode, n, _ in columns]),
+    ]
+    for scene in columns[0][2]["gain"]:
+        cells = [
+            f"{found['gain'][scene]:+.2f} ({found['seconds'][scene]:.2f})"
+            for *_, found in columns
+        ]
+        lines.append(_row(scene, cells))
+    means = [f"{f['mean_gain']:+.2f} ({f['median_seconds']:.2f})" for *_, f in columns]
+    return "\n".join([*lines, _row("mean (median)", means)])
+
+
+def _growth(name: str, by_scene: dict[str, list[float]]) -> Iterator[str]:
+    yield f"{name}: PSNR by low-resolution samples, worst step"
+    yield _row("", [f"{n} spp" for n in LOW_SAMPLES])
+    for scene, values in by_scene.items():
+        worst = min(after - before for before, after in pairwise(values))
+        yield _row(scene, [*(f"{value:.2f}" for value in values), f"{worst:+.2f}"])
+
+
+def _row(title: str, cells: list[str]) -> str:
+    return (f"{title:<14}" + "".join(f"{cell:>14}" for cell in cells)).rstrip()

@@ -1,0 +1,247 @@
+"""Seconds of every configuration's whole frame, from stages timed in turns.
+
+A sweep has hundreds of configurations and a frame takes many seconds. So the stages
+are timed: two sample counts of each kind of render (Cycles' time is a line in its
+samples), each mode of the denoiser, each network. All of them run once per round, in
+another order each time, so that a slow minute of the machine hits all. A
+configuration's seconds are the sums of its stages' medians; whole frames rendered by
+the product stand beside them as a check.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import time
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from xrds_core.atomic import write_json
+
+from . import machine
+from .inputs import OFF, open_scene
+from .sweep import anchor
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from .inputs import Request
+    from .journal import Journal
+    from .sweep import Config
+    from .windows import Shot
+
+    Run = dict[str, float | None]
+    Task = Callable[[], object]
+
+ROUNDS = 3
+PLAIN_FRAME, XRDS_FRAME = "whole frame, plain", "whole frame, XRDS"
+GUIDE_FILTER = "filter of guides of few samples"
+STAGES = ("sync", "beauty", "denoise", "guides", "network", "other")
+
+
+@dataclass
+class Cost:
+    """What one configuration's frame takes."""
+
+    seconds: dict[str, float]
+    cpu_seconds: float
+    peak_memory: int | None
+
+    @property
+    def total(self) -> float:
+        """Seconds of the whole frame."""
+        return self.seconds["total"]
+
+
+@dataclass
+class StageTimes:
+    """Runs of one scene's stages at one frame size, kept in a file."""
+
+    path: Path
+    runs: dict[str, list[Run]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.path.is_file():
+            self.runs = json.loads(self.path.read_text("utf-8"))
+
+    def add(self, name: str, run: Run) -> None:
+        """Keep a run."""
+        self.runs.setdefault(name, []).append(run)
+        self.path.parent.mkdir(parents=True, exist_ok=True)
+        write_json(self.path, self.runs)
+
+    def count(self, name: str) -> int:
+        """How often it has run."""
+        return len(self.runs.get(name, ()))
+
+    def median(self, name: str, key: str = "seconds") -> float:
+        """Median over the runs; raises KeyError for what has none."""
+        return statistics.median(run[key] for run in self.runs[name])
+
+    def peak(self, *names: str) -> int | None:
+        """Largest memory of several tasks; None where it is not known."""
+        peaks = [run["peak"] for n in names for run in self.runs[n]]
+        return None if None in peaks else int(max(peaks))
+
+    def paired(self, name: str, less: str, key: str = "seconds") -> float:
+        """Median over the rounds of what ``name`` takes more than ``less``."""
+        pairs = zip(self.runs[name], self.runs[less], strict=False)
+        return statistics.median(a[key] - b[key] for a, b in pairs)
+
+    # --- composition ------------------------------------------------------------------
+
+    def cost(self, config: Config) -> Cost:
+        """Seconds by stage, CPU seconds and peak memory of a configuration's frame.
+
+        Raises KeyError when a stage of it could not be timed.
+        """
+        wall, cpu = (self._stages(config, key) for key in ("seconds", "cpu"))
+        beauty, *guide = config.requests()
+        names = [task_name(anchor(beauty.kind, beauty.scale, beauty.denoiser))]
+        names += [task_name(anchor(request.kind, more=True)) for request in guide]
+        names += [network_name(config)] * (config.scale > 1)
+        total = sum(wall.values())
+        return Cost(wall | {"total": total}, sum(cpu.values()), self.peak(*names))
+
+    def _stages(self, config: Config, key: str) -> dict[str, float]:
+        plain = config.scale == 1
+        stages = dict.fromkeys(STAGES, 0.0)
+        stages["sync"] = self.median("sync", key)
+        stages["other"] = self.median(PLAIN_FRAME if plain else XRDS_FRAME, "other")
+        beauty, *guide = config.requests()
+        stages["beauty"] = self._line(beauty, key)
+        if config.denoiser != OFF:
+            stages["denoise"] = self.denoising(config.denoiser, config.scale, key)
+        if guide:
+            stages["guides"] = self._line(guide[0], key)
+        if not plain:
+            stages["network"] = self.median(network_name(config), key)
+        if config.has_noisy_guides:
+            stages["network"] += self.median(GUIDE_FILTER, key)
+        return stages
+
+    def line(
+        self, kind: str, scale: int = 1, key: str = "seconds"
+    ) -> tuple[float, float]:
+        """Fixed seconds and seconds per sample of one kind of undenoised render."""
+        few, more = (anchor(kind, scale, more=more) for more in (False, True))
+        low, high = task_name(few), task_name(more)
+        slope = max(self.paired(high, low, key) / (more.samples - few.samples), 1e-6)
+        return max(self.median(low, key) - few.samples * slope, 0.0), slope
+
+    def denoising(self, denoiser: str, scale: int = 1, key: str = "seconds") -> float:
+        """Seconds of the denoiser on a frame of 1/scale of the size."""
+        kind = "plain" if scale == 1 else "low"
+        on, off = (task_name(anchor(kind, scale, mode)) for mode in (denoiser, OFF))
+        return max(self.paired(on, off, key), 0.0)
+
+    def _line(self, request: Request, key: str) -> float:
+        fixed, slope = self.line(request.kind, request.scale, key)
+        return fixed + slope * request.samples
+
+
+def task_name(request: Request) -> str:
+    """As a render stands in the file of runs."""
+    denoiser = "" if request.denoiser in {None, OFF} else f" {request.denoiser}"
+    return f"{request.kind} x{request.scale}, {request.samples} spp{denoiser}"
+
+
+def network_name(config: Config) -> str:
+    """As an enlargement stands in the file of runs."""
+    if config.method != "xrds":
+        return f"{config.method} x{config.scale}"
+    full = " full" if config.guides == "full" else ""
+    return f"XRDS {config.preset}{full} x{config.scale}"
+
+
+class Stopwatch:
+    """Times one shot's whole frame, round by round."""
+
+    def __init__(
+        self,
+        shot: Shot,
+        times: StageTimes,
+        requests: Sequence[Request],
+        journal: Journal,
+    ) -> None:
+        self.shot, self.times, self.journal = shot, times, journal
+        self.renders = {task_name(request): request for request in requests}
+        self.tasks: dict[str, Task] = {}
+
+    def add(self, name: str, task: Task) -> None:
+        """Put something beside the renders on the list; it may tell its own figures."""
+        self.tasks.setdefault(name, task)
+
+    def left(self, rounds: int) -> list[str]:
+        """Names of the runs still to be made, as often as they are."""
+        names = [*self.renders, *self.tasks]
+        return [n for n in names for _ in range(rounds - self.times.count(n))]
+
+    def measure(self, rounds: int, tell: Callable[[str], object]) -> None:
+        """Make the missing runs; ``tell`` hears the name of each one made."""
+        for turn in range(rounds):
+            missing = [n for n in self.renders if self._missing(n, turn)]
+            if missing:
+                self._render(missing[turn:] + missing[:turn], tell)
+            for name in [n for n in self.tasks if self._missing(n, turn)]:
+                with self.journal.attempt(self._job(name)):
+                    self.times.add(name, clocked(self.tasks[name]))
+                tell(name)
+
+    def _missing(self, name: str, turn: int) -> bool:
+        gone = self.journal.gives_up(self._job(name))
+        return self.times.count(name) <= turn and not gone
+
+    def _job(self, name: str) -> str:
+        return f"{self.times.path.stem}: {name}"
+
+    def _render(self, names: list[str], tell: Callable[[str], object]) -> None:
+        """All renders of a round in one session of Cycles, so that sync shows apart."""
+        from xrds_blender import run_job
+
+        def job(passes: Any) -> None:
+            synced = False
+            for name in names:
+                with self.journal.attempt(self._job(name)):
+                    run = self._clocked(self.renders[name], passes)
+                    if not synced:  # later ones find the scene there
+                        sync = run["sync"]
+                        self.times.add(
+                            "sync", {"seconds": sync, "cpu": sync, "peak": run["peak"]}
+                        )
+                        synced = True
+                    self.times.add(name, run)
+                tell(name)
+
+        with self.journal.attempt(f"{self.shot.name}: opening the scene"):
+            scene = open_scene(self.shot.path, self.shot.window.whole)
+            run_job(scene, job)
+
+    def _clocked(self, request: Request, passes: Any) -> Run:
+        """Sync apart from the rest, which holds the reading back of the pixels."""
+        stages: dict[str, float] = {}
+
+        def task() -> None:
+            stages.update(request.render(passes)[1])
+
+        run = clocked(task)
+        sync = stages.pop("sync")
+        return run | {
+            "seconds": sum(stages.values()),
+            "cpu": max(run["cpu"] - sync, 0.0),  # sync runs on one core
+            "sync": sync,
+        }
+
+
+def clocked(task: Task) -> Run:
+    """Seconds, CPU seconds and peak memory of a call; a dict it returns goes before."""
+    known = machine.forget_peak()
+    wall, cpu = time.perf_counter(), time.process_time()
+    told = task()
+    own = told if isinstance(told, dict) else {}
+    return {
+        "seconds": time.perf_counter() - wall,
+        "cpu": time.process_time() - cpu,
+        "peak": machine.peak() if known else None,
+    } | own

@@ -1,0 +1,176 @@
+"""Which configurations are compared: every method over its range of samples."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from itertools import product
+from typing import Any
+
+from xrds_blender.planning.budget import Network
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, LOW_DENOISERS, Denoiser
+
+from .inputs import OFF, Request
+
+METHODS = ("cycles", "oidn", "bicubic", "demodulated_bilinear", "xrds")
+PLAIN_SAMPLES = (1, 2, 4, 8, 16, 32, 64)
+# Every mode of the denoiser is tried on few samples; on many only those that can
+# still win: there the denoiser's own seconds count for little.
+FEW_SAMPLES = 4
+DENOISERS = tuple(Denoiser)
+MANY_DENOISERS = (Denoiser.HIGH_ACCURATE, Denoiser.HIGH_FAST)
+LOW_SAMPLES = {
+    2: (2, 4, 8, 16, 32, 64),
+    4: (4, 8, 16, 32, 64, 128),
+    8: (16, 32, 64, 128, 256),
+}
+GUIDE_SAMPLES = (1, 2, 4, 8, 16)
+FULL_SAMPLES = (1, 2, 4)
+
+
+@dataclass(frozen=True)
+class Config:
+    """One way to a picture; ``denoiser`` is OFF for none.
+
+    ``samples`` are per pixel of the beauty render, at 1/``scale`` of the size.
+    """
+
+    method: str
+    samples: int
+    denoiser: str = OFF
+    scale: int = 1
+    preset: str = ""
+    guides: str = ""
+    guide_samples: int = 0
+
+    @property
+    def label(self) -> str:
+        """As it is named in plots and tables."""
+        if self.method in {"cycles", "oidn"}:
+            name = "Cycles" if self.method == "cycles" else f"OIDN {self.denoiser}"
+            return f"{name}, {self.samples} spp"
+        name = {"xrds": f"XRDS {self.preset}"}.get(self.method, self.method)
+        full = "full " if self.guides == "full" else ""
+        samples = f"{self.samples}"
+        if self.guides:
+            samples += f" + {full}{self.guide_samples}"
+        return f"{name} x{self.scale}, {samples} spp, {self.denoiser}"
+
+    @property
+    def key(self) -> str:
+        """Unlike that of every other configuration; in file names and journals."""
+        return "_".join(str(value) for value in asdict(self).values() if value != "")
+
+    @property
+    def has_noisy_guides(self) -> bool:
+        """Whether the noise of its guides is filtered before the network sees them."""
+        from xrds_core.guide_filter import FEW_SAMPLES
+
+        return self.method == "xrds" and 0 < self.guide_samples < FEW_SAMPLES
+
+    def beauty(self) -> Request:
+        """The render that the picture's light comes from."""
+        kind = "plain" if self.scale == 1 else "low"
+        return Request(kind, self.samples, self.scale, self.denoiser)
+
+    def guide(self) -> Request | None:
+        """The guides' render, None for methods that need none."""
+        if not self.guides:
+            return None
+        return Request(
+            "full" if self.guides == "full" else "guides", self.guide_samples
+        )
+
+    def requests(self) -> list[Request]:
+        """All that must be rendered for it."""
+        guide = self.guide()
+        return [self.beauty()] + ([] if guide is None else [guide])
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """Sample counts and networks of a run: (preset, scale, guides) of the weights."""
+
+    networks: tuple[Network, ...]
+    plain_samples: tuple[int, ...] = PLAIN_SAMPLES
+    low_samples: dict[int, tuple[int, ...]] = field(
+        default_factory=lambda: dict(LOW_SAMPLES)
+    )
+    guide_samples: tuple[int, ...] = GUIDE_SAMPLES
+    full_samples: tuple[int, ...] = FULL_SAMPLES
+
+    @property
+    def scales(self) -> list[int]:
+        """Scales of the networks, each once."""
+        return sorted({scale for _, scale, _ in self.networks})
+
+    def configurations(self) -> list[Config]:
+        """Everything that is compared, the rivals first."""
+        found = [Config("cycles", n) for n in self.plain_samples]
+        found += [
+            Config("oidn", n, denoiser)
+            for n in self.plain_samples
+            for denoiser in DENOISERS
+            if n <= FEW_SAMPLES or denoiser in MANY_DENOISERS
+        ]
+        for scale in self.scales:
+            found += self._baselines(scale)
+        for network in self.networks:
+            found += self._enlarged(*network)
+        return found
+
+    def _baselines(self, scale: int) -> list[Config]:
+        found = []
+        for n in self.low_samples[scale]:
+            found.append(Config("bicubic", n, DEFAULT_DENOISER, scale))
+            found += [
+                Config(
+                    "demodulated_bilinear",
+                    n,
+                    DEFAULT_DENOISER,
+                    scale,
+                    guides="fast",
+                    guide_samples=guides,
+                )
+                for guides in self.guide_samples
+            ]
+        return found
+
+    def _enlarged(self, preset: str, scale: int, guides: str) -> list[Config]:
+        counts = self.full_samples if guides == "full" else self.guide_samples
+        return [
+            Config("xrds", n, denoiser, scale, preset, guides, guide)
+            for n, denoiser, guide in product(
+                self.low_samples[scale], LOW_DENOISERS, counts
+            )
+        ]
+
+
+def anchor(
+    kind: str, scale: int = 1, denoiser: str = OFF, more: bool = False
+) -> Request:
+    """A render that is timed: of few samples, or of ``more`` for the line's slope."""
+    samples = (scale if kind == "low" else 1) * (4 if more else 1)
+    is_guide = kind in {"guides", "full"}
+    return Request(kind, samples, scale, None if is_guide else denoiser)
+
+
+def anchors(sweep: Sweep) -> list[Request]:
+    """Renders of a whole frame that tell the seconds of every configuration.
+
+    Two sample counts for the line through each kind of render, and every mode of the
+    denoiser once.
+    """
+    kinds = [("plain", 1), *(("low", scale) for scale in sweep.scales), ("guides", 1)]
+    if any(guides == "full" for *_, guides in sweep.networks):
+        kinds.append(("full", 1))
+    found = [anchor(*kind, more=more) for kind in kinds for more in (False, True)]
+    found += [anchor("plain", 1, denoiser) for denoiser in DENOISERS]
+    return found + [
+        anchor("low", scale, denoiser)
+        for scale, denoiser in product(sweep.scales, LOW_DENOISERS)
+    ]
+
+
+def describe(config: Config) -> dict[str, Any]:
+    """The configuration as it stands in results.json under ``settings``."""
+    return {key: value for key, value in asdict(config).items() if key != "method"}

@@ -1,0 +1,144 @@
+"""What is timed beside Cycles' renders: networks, baselines, frames of the product."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.planning.budget import Network
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.plan import savings_but
+
+from .contenders import ENLARGEMENTS
+from .inputs import open_scene
+from .stages import GUIDE_FILTER, PLAIN_FRAME, XRDS_FRAME, clocked, network_name
+from .sweep import Config
+
+if TYPE_CHECKING:
+    from xrds_blender.frame.job import Picture
+
+    from .contenders import Enlargement
+    from .pictures import Networks
+    from .stages import Run, Task
+    from .sweep import Sweep
+    from .windows import Shot, Window
+
+    Arrays = tuple[np.ndarray, np.ndarray]
+
+BASELINES = ("bicubic", "demodulated_bilinear")
+
+
+def tasks(shot: Shot, sweep: Sweep, networks: Networks) -> dict[str, Task]:
+    """By name, everything that `Stopwatch` is to time beside the renders."""
+    window = shot.window.whole
+    found: dict[str, Task] = {}
+    for scale in sweep.scales:
+        for method in BASELINES:
+            name = network_name(Config(method, 1, scale=scale))
+            found[name] = _baseline(ENLARGEMENTS[method], window, scale)
+    for network in sweep.networks:
+        preset, scale, guides = network
+        name = network_name(Config("xrds", 1, "", scale, preset, guides))
+        found[name] = _network(networks, network, window)
+    found[PLAIN_FRAME] = lambda: frame(shot, plain_job())[1]
+    if sweep.networks:
+        found[GUIDE_FILTER] = _guide_filter(networks, sweep.networks[0], window)
+        job = _quick_job(networks, sweep.networks[0])
+        found[XRDS_FRAME] = lambda: frame(shot, job)[1]
+    return found
+
+
+def plain_job() -> RenderJob:
+    """1 spp + OIDN with Blender's defaults: the unit of all budgets."""
+    return RenderJob(plain=True, samples=1, denoiser=DEFAULT_DENOISER)
+
+
+def frame(shot: Shot, job: RenderJob) -> tuple[Picture, Run]:
+    """Render a whole frame as a user does, from a freshly opened file.
+
+    Every frame pays for its own guides. `other` is what no stage holds; weights
+    are loaded before.
+    """
+    from xrds_blender import render
+    from xrds_blender.frame.networks import load_upscaler
+
+    scene = open_scene(shot.path, shot.window.whole)
+    if not job.is_picked and not job.is_plain:
+        load_upscaler(job)
+    pictures: list[Picture] = []
+    choices = vars(job) | {"savings": savings_but("guide cache")}
+    run = clocked(lambda: pictures.append(render(scene, **choices)))
+    stages = {k: s for k, s in pictures[0].seconds.items() if k != "total"}
+    return pictures[0], run | {"other": run["seconds"] - sum(stages.values())}
+
+
+def noise(window: Window, scale: int) -> Arrays:
+    """Low-resolution picture and guide of the frame's size, in [0, 1)."""
+    random = np.random.default_rng(0)
+    low = -(-window.frame_height // scale), -(-window.frame_width // scale), 3
+    full = low[0] * scale, low[1] * scale, 3
+    return random.random(low, np.float32), random.random(full, np.float32)
+
+
+def _baseline(enlarge: Enlargement, window: Window, scale: int) -> Task:
+    def task() -> Run:
+        low, full = noise(window, scale)
+        return clocked(lambda: enlarge(low, low, full, full, scale))
+
+    return task
+
+
+def _guide_filter(networks: Networks, network: Network, window: Window) -> Task:
+    """Of a whole frame; the same whatever the network."""
+    import torch
+
+    from xrds_core.guide_filter import filter_guides
+
+    def task() -> Run:
+        upscaler, (_, full) = networks[network], noise(window, network[1])
+        guides = torch.from_numpy(np.concatenate((full, full), axis=-1))
+        guides = guides.permute(2, 0, 1)[None].contiguous().to(upscaler.device)
+
+        def run() -> None:
+            with torch.inference_mode():
+                filter_guides(upscaler.guide_filter, guides)
+
+        run()
+        return clocked(run)
+
+    return task
+
+
+def _network(networks: Networks, network: Network, window: Window) -> Task:
+    """Loading shows apart, as `load`; the first run of a process is thrown away."""
+    warm: list[bool] = []
+
+    def task() -> Run:
+        load = clocked(lambda: networks[network])["seconds"]
+        upscaler, (low, full) = networks[network], noise(window, network[1])
+        extra = full if network[2] == "full" else None
+
+        def run() -> Any:
+            return upscaler(low, full, full, guide_radiance=extra)
+
+        if not warm:
+            warm.append(bool(run()))
+        return clocked(run) | {"load": load}
+
+    return task
+
+
+def _quick_job(networks: Networks, network: Network) -> RenderJob:
+    preset, scale, guides = network
+    return RenderJob(
+        scale=scale,
+        preset=preset,
+        guides=guides,
+        samples=scale,
+        guide_samples=1,
+        device=networks.device,
+        weights=networks.weights,
+        denoiser="HIGH-FAST",
+    )

@@ -1,0 +1,227 @@
+"""The commands that measure: error, speed, stability and what the plan saves."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from xrds_blender.command import arguments
+from xrds_blender.command.deferred import need_blender, no_lines
+from xrds_blender.command.options import DEVICE_HELP, GUIDES, PRESETS
+from xrds_core.errors import XRDSError
+
+STABILITY = ("arrays", "large", "scenes", "shots", "load")
+
+
+def add_evaluate(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds evaluate`."""
+    command = commands.add_parser("evaluate", help="measure error against references")
+    add = command.add_argument
+    add("scenes", type=Path, nargs="+", metavar="SCENE.blend")
+    add("--windows", type=Path, required=True, help="JSON file of windows")
+    add("--references", type=Path, required=True, help="folder of NAME.exr")
+    add("--cache", type=Path, help="folder that keeps rendered inputs")
+    add("--scale", type=arguments.integers, default=(2, 4), help="as 2,4")
+    add(
+        "--preset",
+        type=arguments.names(PRESETS),
+        default=("fast",),
+        help="as fast,balanced",
+    )
+    add(
+        "--guides", type=arguments.names(GUIDES), default=("fast",), help="as fast,full"
+    )
+    add("--table", choices=("standard", "samples"), default="standard")
+    add("--timing", action="store_true", help="also time whole frames")
+    add("--timing-scenes", type=arguments.words, help="of these alone, as bmw27,house")
+    add("--weights", type=Path, help="folder of weights files")
+    add("--out", type=Path, help="folder for results.json")
+    add("--sheets", type=Path, help="folder for a JPEG of crops for each scene")
+    command.set_defaults(work=_evaluate, lines=no_lines)
+    return command
+
+
+def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
+    need_blender("evaluate")
+    from ..bench.evaluate import evaluate
+    from ..bench.samples import samples_table
+
+    if options.table == "samples":
+        return samples_table(
+            options.scenes,
+            windows=options.windows,
+            references=options.references,
+            cache=options.cache,
+            scale=options.scale[0],
+            preset=options.preset[0],
+            out=options.out,
+            weights=options.weights,
+            progress=say,
+        )
+    return evaluate(
+        options.scenes,
+        windows=options.windows,
+        references=options.references,
+        cache=options.cache,
+        scales=options.scale,
+        presets=options.preset,
+        guides=options.guides,
+        timing=options.timing,
+        timing_scenes=options.timing_scenes,
+        out=options.out,
+        sheets=options.sheets,
+        weights=options.weights,
+        progress=say,
+    )
+
+
+def add_stability(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds stability`."""
+    command = commands.add_parser("stability", help="measure stiff and extreme cases")
+    add = command.add_argument
+    add("--out", type=Path, required=True, help="folder for results.json and report")
+    add(
+        "--parts",
+        type=arguments.names(STABILITY),
+        default=STABILITY,
+        help="as arrays,large",
+    )
+    add("--cache", type=Path, help="folder that keeps rendered pictures")
+    add("--device", default="auto", help=DEVICE_HELP)
+    add("--weights", type=Path, help="folder of weights files")
+    command.set_defaults(work=_stability, lines=no_lines)
+    return command
+
+
+def _stability(options: argparse.Namespace) -> dict[str, Any]:
+    if {"scenes", "shots", "load"} & set(options.parts):
+        need_blender("stability")
+    from ..stability.suite import stability
+
+    result = stability(
+        options.out,
+        parts=options.parts,
+        cache=options.cache,
+        device=options.device,
+        weights=options.weights,
+        progress=say,
+    )
+    if not result["passed"]:
+        raise XRDSError(f"some bounds are not held: see {options.out / 'report.md'}")
+    return result
+
+
+def add_plan_report(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds plan-report`."""
+    command = commands.add_parser("plan-report", help="measure what the plan saves")
+    add = command.add_argument
+    add("scenes", nargs="+", help="SCENE.blend, or a small scene of the laboratory")
+    kinds = ("still", "animation", "look-dev")
+    add(
+        "--kind",
+        type=arguments.names(kinds),
+        default=("still",),
+        help="as still,look-dev",
+    )
+    add("--scale", type=int, choices=(2, 4, 8), default=2)
+    add("--samples", type=arguments.positive, default=16)
+    add("--guide-samples", type=arguments.positive, default=4)
+    add("--resolution", type=arguments.size, metavar="WxH", default=(960, 540))
+    add("--rounds", type=arguments.positive, default=1, help="pairs of runs")
+    add("--out", type=Path, required=True, help="path of the .json and .md")
+    command.set_defaults(work=_plan_report, lines=no_lines)
+    return command
+
+
+def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
+    need_blender("plan-report")
+    from ..bench.plan_report import Setting, report
+
+    setting = Setting(
+        options.scale,
+        options.samples,
+        options.guide_samples,
+        *options.resolution,
+        options.rounds,
+    )
+    return report(options.scenes, options.kind, setting, options.out, say)
+
+
+def add_bench(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds bench`."""
+    command = commands.add_parser("bench", help="error against run time, a report")
+    add = command.add_argument
+    add("scenes", type=Path, nargs="+", metavar="SCENE.blend")
+    add("--out", type=Path, required=True, help="folder; an unfinished run resumes")
+    add(
+        "--budgets",
+        type=arguments.factors,
+        default=(0.5, 1.0, 2.0, 4.0, 8.0),
+        help="multiples of each scene's 1 spp + OIDN, as 0.5,1,2",
+    )
+    add(
+        "--resolution",
+        type=arguments.size,
+        metavar="WxH",
+        help="in place of the files' own",
+    )
+    add(
+        "--reference-samples", type=arguments.positive, default=128, help="of each half"
+    )
+    add("--windows", type=Path, help="JSON file of windows that errors are taken on")
+    add("--references", type=Path, help="folder of NAME.exr, for the windows")
+    add("--cache", type=Path, help="folder of rendered inputs; OUT/cache")
+    add(
+        "--preset",
+        type=arguments.names(PRESETS),
+        help="as fast,balanced; all with weights",
+    )
+    add("--rounds", type=arguments.positive, default=3, help="runs of each timed stage")
+    add("--errors-only", action="store_true", help="time nothing")
+    add(
+        "--growth",
+        type=arguments.sizes,
+        default=(),
+        help="frames, as 512x512,1920x1080",
+    )
+    add("--model", type=Path, help="where to write what --time-budget goes by")
+    add("--device", default="auto", help=DEVICE_HELP)
+    add("--weights", type=Path, help="folder of weights files")
+    command.set_defaults(work=_bench, lines=_bench_lines)
+    return command
+
+
+def _bench(options: argparse.Namespace) -> dict[str, Any]:
+    need_blender("bench")
+    from ..bench.bench import bench
+
+    return bench(
+        options.scenes,
+        options.out,
+        budgets=options.budgets,
+        resolution=options.resolution,
+        reference_samples=options.reference_samples,
+        windows=options.windows,
+        references=options.references,
+        cache=options.cache,
+        presets=options.preset,
+        rounds=options.rounds,
+        timing=not options.errors_only,
+        picker=not options.errors_only,
+        growth=options.growth,
+        model=options.model,
+        weights=options.weights,
+        device=options.device,
+    )
+
+
+def _bench_lines(result: dict[str, Any]) -> list[str]:
+    failed = [f"left out: {name}: {why}" for name, why in result["failures"].items()]
+    return [f"{len(result['points'])} points", *failed]
+
+
+def say(line: str) -> None:
+    """Print a line of progress beside the result."""
+    print(line, file=sys.stderr, flush=True)

@@ -1,0 +1,130 @@
+"""The commands that make training sets and train."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from xrds_blender.command import arguments
+from xrds_blender.command.deferred import lines_of, need_blender
+
+
+def _dataset(options: argparse.Namespace) -> dict[str, Any]:
+    need_blender("dataset")
+    from ..studio import datasheet
+    from ..studio.dataset import generate
+
+    written = generate(
+        options.out,
+        seed=options.seed,
+        count=options.count,
+        assets=options.assets,
+        scales=options.scales,
+    )
+    found = datasheet.files(options.out)
+    if options.contact is not None:
+        datasheet.contact_sheet(found, options.contact)
+    result = {"out": str(options.out), "written": written}
+    return result | datasheet.datasheet(found)
+
+
+def _train(options: argparse.Namespace) -> dict[str, Any] | None:
+    from ..training.config import read_config
+    from ..training.train import train
+
+    folder = options.out or Path("runs") / options.config.stem
+    return train(read_config(options.config, options.changes), folder)
+
+
+def _train_lines(result: dict[str, Any]) -> list[str]:
+    best = result["best"]
+    return [
+        f"{result['out']}: {result['step']} steps, weights of step {best['step']} are "
+        f"{best['gain']:+.2f} dB on the better of bicubic and demodulated"
+    ]
+
+
+def _ablate(options: argparse.Namespace) -> dict[str, Any]:
+    from ..training.ablations import ablate
+
+    seeds, changes = options.seeds, options.changes
+    return ablate(
+        options.config, options.table, options.out, seeds=seeds, changes=changes
+    )
+
+
+def _train_filter(options: argparse.Namespace) -> dict[str, Any]:
+    from ..training.guide_filter import train_guide_filter
+
+    steps, seed = options.steps, options.seed
+    return train_guide_filter(options.data, options.out, steps=steps, seed=seed)
+
+
+def add_dataset(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds dataset`."""
+    command = commands.add_parser("dataset", help="render a training set")
+    add = command.add_argument
+    add("--out", type=Path, required=True)
+    add("--seed", type=int, default=0, help="first scene's seed")
+    add("--count", type=arguments.positive, default=1, help="number of scenes")
+    add("--assets", type=Path, help="folder of models, textures and skies")
+    add("--scales", type=arguments.integers, default=(2, 4, 8), help="as 2,4,8")
+    add("--contact", type=Path, metavar="FILE.jpg", help="a look at the windows")
+    command.set_defaults(work=_dataset, lines=lines_of("xrds_lab.studio.datasheet"))
+    return command
+
+
+def add_train(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds train`."""
+    command = commands.add_parser("train", help="train or resume a network")
+    command.add_argument("config", type=Path, metavar="CONFIG.toml")
+    command.add_argument("--out", type=Path, metavar="RUN", help="runs/CONFIG")
+    _add_changes(command)
+    command.set_defaults(work=_train, lines=_train_lines)
+    return command
+
+
+def add_ablate(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds ablate`."""
+    command = commands.add_parser(
+        "ablate", help="train networks that differ in one thing, for a table"
+    )
+    add = command.add_argument
+    add("config", type=Path, metavar="CONFIG.toml")
+    add(
+        "--table",
+        required=True,
+        help="base, guides, blocks, depth, rival, loss, input, variation",
+    )
+    add("--out", type=Path, required=True, help="folder of TABLE.json and its runs")
+    add("--seeds", type=arguments.positive, default=3, help="runs of each variant")
+    _add_changes(command)
+    command.set_defaults(work=_ablate, lines=lines_of("xrds_lab.training.ablations"))
+    return command
+
+
+def add_train_filter(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds train-filter`."""
+    command = commands.add_parser(
+        "train-filter", help="train what filters guides of few samples"
+    )
+    add = command.add_argument
+    add("data", type=Path, nargs="+", metavar="DATASET", help="folders of `dataset`")
+    add("--out", type=Path, required=True, metavar="guide_filter.safetensors")
+    add("--steps", type=arguments.positive, default=10_000)
+    add("--seed", type=int, default=0)
+    lines = lines_of("xrds_lab.training.guide_filter")
+    command.set_defaults(work=_train_filter, lines=lines)
+    return command
+
+
+def _add_changes(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="changes",
+        metavar="KEY=VALUE",
+        help="in the place of the file's, as scale=8 or 'start=\"a.safetensors\"'",
+    )

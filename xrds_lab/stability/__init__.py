@@ -1,0 +1,1 @@
+"""`xrds stability`: stiff and extreme cases, measured and held to stated bounds."""
