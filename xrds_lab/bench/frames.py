@@ -7,6 +7,8 @@ import json
 import time
 from typing import TYPE_CHECKING, Any
 
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
 from .contenders import ENLARGEMENTS
 from .inputs import SEEDS, open_scene
 from .tasks import noise
@@ -109,7 +111,7 @@ class FrameSeconds:
     def _plain(self, samples: int) -> Callable[[], Stages]:
         def job(passes: Any) -> Stages:
             seed = SEEDS["plain"]
-            picture = passes.beauty(1, samples, seed=seed, prefilter="ACCURATE")
+            picture = passes.beauty(1, samples, seed=seed, denoiser=DEFAULT_DENOISER)
             return dict(picture.seconds)
 
         return lambda: _whole_frame(self.shot, job)

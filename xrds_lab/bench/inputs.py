@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
 
@@ -93,10 +94,9 @@ class Request:
         if self.denoiser == OFF:
             return {"denoise": False}
         if self.denoiser is not None:
-            quality, prefilter = self.denoiser.split("-")
-            return {"quality": quality, "prefilter": prefilter}
+            return {"denoiser": Denoiser(self.denoiser)}
         # Blender's own default for plain pictures; the product's choice for low ones
-        return {"prefilter": "ACCURATE" if self.kind == "plain" else None}
+        return {"denoiser": DEFAULT_DENOISER if self.kind == "plain" else None}
 
 
 class Folder:

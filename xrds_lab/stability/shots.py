@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_core import metrics
 from xrds_core.atomic import replacing
 
@@ -77,7 +78,7 @@ def _frame(passes: Any, frame: int) -> Arrays:
     found |= {"albedo": guides.albedo, "normal": guides.normal}
     for scale in SCALES:
         count = equal_samples(scale)
-        picture = passes.beauty(1, count, seed=300 + frame, prefilter="ACCURATE")
+        picture = passes.beauty(1, count, seed=300 + frame, denoiser=DEFAULT_DENOISER)
         found[f"plain{scale}"] = picture.radiance
     return found
 

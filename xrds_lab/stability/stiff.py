@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_core import baselines, front_end, metrics
 from xrds_core.atomic import replacing
 
@@ -88,7 +89,7 @@ def render(name: str, side: int) -> Arrays:
         plain = {f"plain{s}": equal_samples(s, samples) for s in SCALES}
         for key, count in (plain | {"reference": REFERENCE_SAMPLES}).items():
             seed = _SEEDS["reference" if key == "reference" else "plain"]
-            picture = passes.beauty(1, count, seed=seed, prefilter="ACCURATE")
+            picture = passes.beauty(1, count, seed=seed, denoiser=DEFAULT_DENOISER)
             found[key] = picture.radiance
             found[f"{key}_seconds"] = sum(picture.seconds.values())
         return {key: np.asarray(x, np.float32) for key, x in found.items()}

@@ -29,6 +29,7 @@ from tqdm import tqdm
 
 from xrds_blender import run_job
 from xrds_blender.cycles.passes import CyclesPasses
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_core.atomic import replacing
 
 from . import framing, scenes
@@ -257,7 +258,7 @@ def _arrays(passes: CyclesPasses, samples: Samples) -> tuple[Arrays, dict[str, f
     reference = timed(
         "reference",
         lambda seed: passes.beauty(
-            1, samples.reference, prefilter="ACCURATE", seed=seed
+            1, samples.reference, denoiser=DEFAULT_DENOISER, seed=seed
         ),
     )
     arrays["reference"] = reference.radiance
