@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -21,6 +23,17 @@ def test_open_job_description_accepts_the_template() -> None:
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "passes validation" in done.stdout
+
+
+def test_the_check_asks_xrds_for_what_there_is() -> None:
+    """Its progress comes from a module of ours, which may move and be renamed."""
+    text = TEMPLATE.read_text("utf-8")
+    ((package, name),) = re.findall(r"from (xrds_blender[\w.]*) import (\w+)", text)
+    module = importlib.import_module(f"{package}.{name}")
+    asked = re.findall(rf"\b{name}\.(\w+)", text)
+    assert asked
+    for each in asked:
+        assert callable(getattr(module, each))
 
 
 @pytest.fixture(scope="module")
