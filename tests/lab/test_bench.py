@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from xrds_blender.planning import budget
+from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import UsageError
 from xrds_lab.bench import growth, machine, measure, pictures, tasks
@@ -24,7 +25,7 @@ from xrds_lab.bench.stages import PLAIN_FRAME, STAGES
 from xrds_lab.bench.sweep import Sweep
 
 SWEEP = Sweep(
-    (("fast", 4, "fast"),),
+    (Network("fast", 4, "fast"),),
     plain_samples=(1, 2),
     low_samples={4: (4,)},
     guide_samples=(1, 2),
@@ -37,10 +38,10 @@ def few_modes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two modes of the denoiser instead of nine."""
     few = (Denoiser.HIGH_ACCURATE, Denoiser.HIGH_FAST)
     for module in ("sweep", "measure", "analysis"):
-        found = importlib.import_module(f"xrds_lab.bench.{module}")
+        user = importlib.import_module(f"xrds_lab.bench.{module}")
         for name in ("DENOISERS", "LOW_DENOISERS"):
-            if hasattr(found, name):
-                monkeypatch.setattr(found, name, few)
+            if hasattr(user, name):
+                monkeypatch.setattr(user, name, few)
     monkeypatch.setattr(growth, "_core_counts", lambda: [machine.cores()])
 
 
@@ -49,7 +50,7 @@ class World:
         self.folder, self.scene = folder, folder / "cubes.blend"
 
     def run(self, **options: Any) -> dict[str, Any]:
-        given = {
+        settings = {
             "budgets": (1.0, 8.0),
             "resolution": SIZE,
             "reference_samples": 4,
@@ -57,7 +58,7 @@ class World:
             "sweep": SWEEP,
             "picker": False,
         }
-        return bench([self.scene], self.folder / "out", **(given | options))
+        return bench([self.scene], self.folder / "out", **(settings | options))
 
 
 @pytest.fixture
@@ -74,17 +75,17 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
 ) -> None:
     # on a busy machine one stage may take many times what it takes on an idle one
     monkeypatch.setattr(measure, "MOST_OVER_BUDGET", 1e3)
-    told = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
+    report = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
     out = world.folder / "out"
-    assert told["failures"] == {}
-    assert json.loads((out / "results.json").read_text()) == told
-    _check_points(told)
-    _check_growth(told["growth"])
-    _check_picker(told)
+    assert report["failures"] == {}
+    assert json.loads((out / "results.json").read_text()) == report
+    _check_points(report)
+    _check_growth(report["growth"])
+    _check_picker(report)
     with (out / "results.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["label"] for row in rows] == [p["label"] for p in told["points"]]
-    _check_page((out / "report.html").read_text("utf-8"), told)
+    assert [row["label"] for row in rows] == [p["label"] for p in report["points"]]
+    _check_page((out / "report.html").read_text("utf-8"), report)
 
     def refuse(*_: Any) -> None:
         raise AssertionError("measured again")
@@ -94,8 +95,8 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
         patch.setattr(pictures.Pictures, "render", lambda *_: None)
         patch.setattr(tasks, "frame", refuse)
         again = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
-    assert again["points"] == told["points"]
-    assert again["growth"] == told["growth"]
+    assert again["points"] == report["points"]
+    assert again["growth"] == report["growth"]
     assert again["failures"] == {}
     # Nothing is left to foresee when the picker renders what nobody has rendered.
     more = world.run(picker=True, budgets=(3.0, 6.0))
@@ -103,39 +104,39 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
     assert more["failures"] == {}
 
 
-def _check_points(told: dict[str, Any]) -> None:
-    methods = {point["method"] for point in told["points"]}
+def _check_points(report: dict[str, Any]) -> None:
+    methods = {point["method"] for point in report["points"]}
     assert methods == {"cycles", "oidn", "bicubic", "demodulated_bilinear", "xrds"}
-    for point in told["points"]:
+    for point in report["points"]:
         assert set(point["seconds"]) == {*STAGES, "total"}
         parts = sum(s for stage, s in point["seconds"].items() if stage != "total")
         assert parts == pytest.approx(point["seconds"]["total"])
         assert point["cpu_seconds"] > 0
         assert 5 < point["psnr"] < 80
         assert 0 < point["relmse_trimmed"] <= point["relmse"]
-    (scene,) = told["scenes"]
+    (scene,) = report["scenes"]
     assert scene["frame"] == list(SIZE)
     assert scene["rho"] > 0
     assert scene["reference_psnr_floor"] > 10
 
 
-def _check_growth(told: dict[str, Any]) -> None:
-    sizes = {tuple(row["size"]) for row in told["rows"]}
+def _check_growth(report: dict[str, Any]) -> None:
+    sizes = {tuple(row["size"]) for row in report["rows"]}
     assert sizes == {(32, 24), (64, 48)}
-    names = {row["task"] for row in told["rows"]}
+    names = {row["task"] for row in report["rows"]}
     assert {PLAIN_FRAME, "XRDS fast x4", "OIDN HIGH-ACCURATE alone"} <= names
-    assert all(row["seconds"] >= 0 for row in told["rows"])
-    assert told["break_even"]
+    assert all(row["seconds"] >= 0 for row in report["rows"])
+    assert report["break_even"]
 
 
-def _check_picker(told: dict[str, Any]) -> None:
-    (entry,) = told["budgets"]
+def _check_picker(report: dict[str, Any]) -> None:
+    (entry,) = report["budgets"]
     assert entry["picker"]["label"].startswith(("OIDN", "XRDS"))
     assert "dB expected" in entry["picker"]["reason"]
-    assert told["picker"]["runs"] == 1
+    assert report["picker"]["runs"] == 1
 
 
-def _check_page(page: str, told: dict[str, Any]) -> None:
+def _check_page(page: str, report: dict[str, Any]) -> None:
     assert page.count("<svg") >= 3  # over all, of the scene, growth
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing beside it
     crops = re.search(r'class="crops">(.*?)</script>', page, re.DOTALL)
@@ -144,7 +145,7 @@ def _check_page(page: str, told: dict[str, Any]) -> None:
     assert data["reference"].startswith("data:image/webp")
     labels = {c["label"] for b in data["budgets"] for c in b["columns"]}
     assert labels == set(data["pictures"])
-    best = told["budgets"][0]["best"]
+    best = report["budgets"][0]["best"]
     assert labels == {best[name]["label"] for name in SHOWN if best.get(name)}
 
 
@@ -160,9 +161,9 @@ def test_one_bad_configuration_is_left_out_and_told(
         return good(self, config)
 
     monkeypatch.setattr(pictures.Pictures, "picture", bad)
-    told = world.run(timing=False)
-    assert list(told["failures"].values()) == ["ValueError: no such picture"]
-    assert {p["method"] for p in told["points"]} >= {"oidn", "xrds"}
+    report = world.run(timing=False)
+    assert list(report["failures"].values()) == ["ValueError: no such picture"]
+    assert {p["method"] for p in report["points"]} >= {"oidn", "xrds"}
     assert (world.folder / "out" / "report.html").is_file()
 
 

@@ -15,9 +15,13 @@ from PIL import Image
 from xrds_core import exr, metrics, weights
 from xrds_core.errors import UsageError
 from xrds_core.network import XRDS, preset_config
-from xrds_lab.bench import contenders, inputs, windows
 from xrds_lab.bench.evaluate import evaluate
+from xrds_lab.bench.inputs import Folder, Request
+from xrds_lab.bench.journal import Strict
+from xrds_lab.bench.pictures import Networks, Pictures
+from xrds_lab.bench.rivals import ENLARGEMENTS
 from xrds_lab.bench.samples import samples_table
+from xrds_lab.bench.windows import find_shots
 
 FRAME, WINDOW = [128, 96], [32, 16, 64, 48]
 
@@ -59,22 +63,24 @@ class World:
         entry = {"resolution": FRAME, "window": WINDOW, "floor_psnr": 42.0}
         self.windows.write_text(json.dumps({"floor": entry}), "utf-8")
         self.reference.touch()
-        (shot,) = windows.find_shots([self.scene], self.windows, self.folder)
-        request = inputs.Request("plain", 32)
-        folder = inputs.Folder(self.cache)
-        arrays = inputs.rendered(shot, [request], folder, print)[request]
+        (shot,) = find_shots([self.scene], self.windows, self.folder)
+        request, folder = Request("plain", 32), Folder(self.cache)
+        pictures = Pictures(shot, folder, Networks(None, "cpu"))
+        pictures.render([request], Strict(), print)
+        arrays = folder.read(request.file_name(shot))
+        assert arrays is not None
         self.truth = arrays["radiance"]
         planes = {letter: self.truth[..., i] for i, letter in enumerate("RGB")}
         exr.write_picture(self.reference, planes)
 
     def run(self, **options: Any) -> dict[str, Any]:
-        given = {"scales": [2], "samples": 4, "guide_samples": 2} | options
+        settings = {"scales": [2], "samples": 4, "guide_samples": 2} | options
         return evaluate(
             [self.scene],
             windows=self.windows,
             references=self.folder,
             cache=self.cache,
-            **given,
+            **settings,
         )
 
 
@@ -96,7 +102,7 @@ def test_every_rival_is_measured(report: dict[str, Any]) -> None:
     ]
     assert keys == [("floor", s, "fast", g) for s in (2, 4) for g in ("fast", "full")]
     for record in report["scenes"]:
-        rivals = set(contenders.ENLARGEMENTS) | {"oidn_equal_spp"}
+        rivals = set(ENLARGEMENTS) | {"oidn_equal_spp"}
         assert rivals <= set(record["methods"])
         for row in record["methods"].values():
             assert 10 < row["psnr"] < 60
@@ -116,11 +122,10 @@ def test_checks_in_the_albedo_are_won_by_demodulation(report: dict[str, Any]) ->
 def test_low_resolution_and_guides_lie_on_the_reference(
     world: World, report: dict[str, Any]
 ) -> None:
-    (shot,) = windows.find_shots([world.scene], world.windows, world.folder)
-    settings = contenders.Settings(scales=(4,), samples=4, guide_samples=2)
-    held = contenders.Contenders(settings, inputs.Folder(world.cache), None, print)
-    given = held.inputs(shot, contenders.Case(4, "fast", "fast"))
-    assert given.exposure_stops == 0.5
+    (shot,) = find_shots([world.scene], world.windows, world.folder)
+    low = Folder(world.cache).read(Request("low", 4, 4).file_name(shot))
+    assert low is not None
+    assert low["view_exposure"] == 0.5
     errors = {}
     for dy in range(-2, 3):
         for dx in range(-2, 3):
@@ -128,7 +133,7 @@ def test_low_resolution_and_guides_lie_on_the_reference(
             means = moved.reshape(12, 4, 16, 4, 3).mean(axis=(1, 3))
             inner = slice(1, -1)
             errors[dy, dx] = metrics.psnr(
-                given.radiance[inner, inner], means[inner, inner]
+                low["radiance"][inner, inner], means[inner, inner]
             )
     assert max(errors, key=errors.__getitem__) == (0, 0), errors
 
@@ -204,19 +209,19 @@ def test_table_of_samples(world: World, capsys: pytest.CaptureFixture[str]) -> N
     }
     assert len(rows) == 5 + 3 + 2 * 4  # fast and full guides, two modes of OIDN
     assert all(row["seconds"] > 0 for row in rows.values())
-    told = report["summary"]
+    summary = report["summary"]
     ours = rows["xrds", "fast", 16, "HIGH-ACCURATE"]
     for mode, denoiser in (("default", "HIGH-ACCURATE"), ("fast", "FAST-FAST")):
         theirs = rows["oidn", "", 4, denoiser]
-        found = told["over_oidn"][mode]["4"]
-        assert found["gain"] == {"floor": ours["psnr"] - theirs["psnr"]}
-        assert found["seconds"] == {"floor": ours["seconds"] / theirs["seconds"]}
+        cell = summary["over_oidn"][mode]["4"]
+        assert cell["gain"] == {"floor": ours["psnr"] - theirs["psnr"]}
+        assert cell["seconds"] == {"floor": ours["seconds"] / theirs["seconds"]}
         full = rows["xrds", "full", 16, "HIGH-ACCURATE"]
         assert full["guide_samples"] == 4  # eight on the average, half of them each
         eight = rows["oidn", "", 8, denoiser]
-        gain = told["full_over_oidn"][mode]["8"]["mean_gain"]
+        gain = summary["full_over_oidn"][mode]["8"]["mean_gain"]
         assert gain == full["psnr"] - eight["psnr"]
-    few, some, many = told["more_samples"]["floor"]
+    few, some, many = summary["more_samples"]["floor"]
     assert few < some < many + 1
     shown = capsys.readouterr().err
     assert f"{many - some:+.2f}" in shown or f"{some - few:+.2f}" in shown

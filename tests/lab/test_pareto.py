@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from xrds_blender.planning.budget import Network
 from xrds_core.errors import Cancelled
 from xrds_lab.bench import growth, machine, pareto
 from xrds_lab.bench.inputs import OFF
@@ -20,7 +21,7 @@ from xrds_lab.bench.stages import (
     network_name,
     task_name,
 )
-from xrds_lab.bench.sweep import Config, Sweep, anchor, anchors
+from xrds_lab.bench.sweep import Config, Sweep, anchor, anchors, xrds
 
 
 def point(seconds: float, psnr: float, method: str = "oidn", **more: Any) -> Any:
@@ -93,7 +94,8 @@ def test_mean_curve_is_over_all_scenes_alike() -> None:
 
 # --- seconds as sums of stages --------------------------------------------------------
 
-SWEEP = Sweep((("fast", 2, "fast"),))
+NETWORK = Network("fast", 2, "fast")
+SWEEP = Sweep((NETWORK,))
 
 
 def timed(tmp_path: Path) -> StageTimes:
@@ -101,7 +103,7 @@ def timed(tmp_path: Path) -> StageTimes:
     times = StageTimes(tmp_path / "times.json")
     denoise = {"HIGH-ACCURATE": 5.0, "HIGH-FAST": 1.0}
     for slow in (1.0, 1.5, 1.0):
-        for request in anchors(SWEEP):
+        for request in anchors(SWEEP.configurations()):
             each = {"plain": 2.0, "low": 0.5, "guides": 1.0}[request.kind]
             seconds = 0.1 + each * request.samples
             if request.denoiser not in {None, OFF}:
@@ -112,7 +114,7 @@ def timed(tmp_path: Path) -> StageTimes:
         for name in (PLAIN_FRAME, XRDS_FRAME):
             times.add(name, {"seconds": 9.0, "cpu": 9.0, "peak": 50, "other": 0.25})
         times.add("sync", {"seconds": 0.5, "cpu": 0.5, "peak": 10})
-        name = network_name(Config("xrds", 1, "", 2, "fast", "fast"))
+        name = network_name(xrds(NETWORK))
         times.add(name, {"seconds": 4.0, "cpu": 8.0, "peak": 300})
         times.add(GUIDE_FILTER, {"seconds": 0.5, "cpu": 1.0, "peak": 300})
     return times
@@ -250,7 +252,7 @@ def test_break_even_sets_saved_against_paid() -> None:
         rows.append(row(name, 10, cores, 6 / cores))
         rows.append(row("OIDN HIGH-ACCURATE alone", 10, cores, 30 / cores))
         rows.append(row("OIDN HIGH-FAST alone", 10, cores, 2 / cores))
-    found = growth.break_even(rows, [("fast", 2, "fast")])
+    found = growth.break_even(rows, [NETWORK])
     assert [(r["cores"], r["extrapolated"]) for r in found] == [
         ("1", False),
         ("2", False),

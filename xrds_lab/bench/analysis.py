@@ -6,12 +6,12 @@ import statistics
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning import budget
-from xrds_blender.planning.budget import Choice, Curve, Network
+from xrds_blender.planning.budget import Choice, Curve
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
 from . import pareto
 from .stages import PLAIN_FRAME, XRDS_FRAME, network_name
-from .sweep import DENOISERS, Config
+from .sweep import DENOISERS, xrds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,7 +32,7 @@ def analysed(report: Report, budgets: Sequence[float]) -> Report:
         if "default_seconds" in scene
     }
     units = {s["scene"]: s.get("default_seconds") for s in report["scenes"]}
-    told = [
+    entries = [
         entry
         for name, points in by_scene.items()
         for entry in _budgets(name, points, units[name], budgets, _picks(report, name))
@@ -42,12 +42,12 @@ def analysed(report: Report, budgets: Sequence[float]) -> Report:
             name: [p["label"] for p in pareto.frontier(points)]
             for name, points in by_scene.items()
         },
-        "budgets": told,
-        "mean": _means(told, budgets),
+        "budgets": entries,
+        "mean": _means(entries, budgets),
         "crossings": [
             _crossing(name, points, units[name]) for name, points in by_scene.items()
         ],
-        "picker": _picker(told),
+        "picker": _picker(entries),
     }
 
 
@@ -65,15 +65,15 @@ def _budgets(
     picks: dict[str, Any],
 ) -> list[dict[str, Any]]:
     """The best of each group at each budget, and what the picker took."""
-    found = []
+    entries = []
     for multiple in budgets:
         best = {
             name: _short(pareto.best_within(members, multiple * unit))
             for name, members in pareto.groups(points).items()
         }
         entry = {"scene": scene, "budget": multiple, "seconds": multiple * unit}
-        found.append(entry | {"best": best, "picker": picks.get(f"{multiple:g}")})
-    return found
+        entries.append(entry | {"best": best, "picker": picks.get(f"{multiple:g}")})
+    return entries
 
 
 def _short(point: Point | None) -> dict[str, Any] | None:
@@ -92,14 +92,14 @@ def _means(
     entries: Sequence[dict[str, Any]], budgets: Sequence[float]
 ) -> list[dict[str, Any]]:
     """Mean PSNR and trimmed RelMSE by group at each budget, of scenes with one."""
-    found = []
+    means = []
     for multiple in budgets:
         here = [e for e in entries if e["budget"] == multiple]
         names = dict.fromkeys(name for e in here for name in e["best"])
         groups = {name: _mean([e["best"].get(name) for e in here]) for name in names}
         picked = _mean([e["picker"] for e in here])
-        found.append({"budget": multiple, "groups": groups, "picker": picked})
-    return found
+        means.append({"budget": multiple, "groups": groups, "picker": picked})
+    return means
 
 
 def _mean(rows: Sequence[dict[str, Any] | None]) -> dict[str, float] | None:
@@ -116,16 +116,16 @@ def _crossing(scene: str, points: Sequence[Point], unit: float) -> dict[str, Any
     """Where XRDS and the best OIDN mode cross, with guides rendered and cached."""
     groups = pareto.groups(points)
     rivals = groups.get(RIVAL, [])
-    told: dict[str, Any] = {"scene": scene}
+    entry: dict[str, Any] = {"scene": scene}
     for name, group in (("rendered", OURS), ("cached", CACHED)):
         ours = groups.get(group, [])
         changes = pareto.crossings(ours, rivals)
         for change in changes:
             change["budget"] = change["seconds"] / unit
-        told[name] = changes
+        entry[name] = changes
     best = pareto.best_within(groups.get(OURS, []), unit)
-    told["dearest_stage"] = None if best is None else pareto.dearest_stage(best)
-    return told
+    entry["dearest_stage"] = None if best is None else pareto.dearest_stage(best)
+    return entry
 
 
 def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
@@ -197,8 +197,8 @@ def _weights(scene: SceneBench) -> str:
     """The networks with the beginnings of their files' checksums."""
     chosen = scene.settings
     return ", ".join(
-        f"{preset} x{scale} {guides} {chosen.networks.digest((preset, scale, guides))}"
-        for preset, scale, guides in chosen.sweep.networks
+        f"{n.preset} x{n.scale} {n.guides} {chosen.networks.digest(n)}"
+        for n in chosen.sweep.networks
     )
 
 
@@ -218,7 +218,9 @@ def _speeds(
     denoisers = {mode: _ratio(timed, lambda s, m=mode: s.times.denoising(m))
                  for mode in DENOISERS}  # fmt: skip
     networks = {
-        network: _ratio(timed, lambda s, n=network: s.times.median(_name(n)))
+        network: _ratio(
+            timed, lambda s, n=network: s.times.median(network_name(xrds(n)))
+        )
         for network in timed[0].settings.sweep.networks
     }
     other = statistics.median(
@@ -234,8 +236,3 @@ def _ratio(scenes: Sequence[SceneBench], seconds: Any) -> float:
     unit = DEFAULT_DENOISER
     ratios = [seconds(s) / max(s.times.denoising(unit), 1e-6) for s in scenes]
     return round(statistics.median(ratios), 4)
-
-
-def _name(network: Network) -> str:
-    preset, scale, guides = network
-    return network_name(Config("xrds", 1, "", scale, preset, guides))

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any
 from xrds_blender.command import console
 from xrds_blender.planning.budget import Network
 from xrds_core.atomic import replacing, write_json
-from xrds_core.errors import UsageError
 
 from . import analysis, machine, report, workload
 from .growth import growth as measure_growth
@@ -25,7 +24,7 @@ from .measure import SceneBench, Settings
 from .pictures import Networks
 from .stages import ROUNDS
 from .sweep import Sweep
-from .windows import Shot, Window, digest, read_windows
+from .windows import find_shots
 
 if TYPE_CHECKING:
     Report = dict[str, Any]
@@ -54,23 +53,21 @@ def bench(
     device: str = "auto",
     sweep: Sweep | None = None,
 ) -> Report:
-    """Measure scene files and write the report into ``out``; returns results.json.
+    """Measure scene files and write the report into `out`; returns results.json.
 
-    ``budgets`` are multiples of a scene's own seconds for one sample and Blender's
-    default denoiser. ``windows`` (a file) and ``references`` (a folder of NAME.exr)
+    `budgets` are multiples of a scene's own seconds for one sample and Blender's
+    default denoiser. `windows` (a file) and `references` (a folder of NAME.exr)
     are as for `evaluate`; without them errors are of the whole frame, against the
-    mean of two renders of ``reference_samples`` each. ``resolution`` replaces the
-    files' own. ``presets`` None takes all whose weights are there. Without ``timing``
-    only errors are measured. ``growth`` are frame sizes at which the first scene is
-    timed beside. ``model`` is where to write the picker's model.
+    mean of two renders of `reference_samples` each. `resolution` replaces the
+    files' own. `presets` None takes all whose weights are there. Without `timing`
+    only errors are measured. `growth` are frame sizes at which the first scene is
+    timed beside. `model` is where to write the picker's model.
     Raises UsageError for missing files and unknown names, before anything is rendered.
     """
     out.mkdir(parents=True, exist_ok=True)
     networks = Networks(weights, device)
     folder = Folder(cache or out / "cache")
-    assert folder.directory is not None
-    folder.directory.mkdir(parents=True, exist_ok=True)
-    journal = Journal(folder.directory / "journal.json", _say)
+    journal = Journal(folder.directory / "journal.json", report_line)
     chosen = Settings(
         sweep or Sweep(_chosen(networks, presets)),
         folder,
@@ -83,13 +80,13 @@ def bench(
         picker,
     )
     with console.stdout_to(folder.directory / "blender.log"):
-        shots = find_shots(scenes, resolution, windows, references)
+        shots = find_shots(scenes, windows, references, resolution)
         parts = [SceneBench(shot, chosen) for shot in shots]
-        _tell_missing(networks, presets)
-        told = _measured(parts, chosen, out, growth)
+        _report_missing(networks, presets)
+        results = _measured(parts, chosen, out, growth)
     if model is not None:
-        _write_model(model, parts, told)
-    return told
+        write_json(model, analysis.fitted(parts, results["points"]).to_json())
+    return results
 
 
 def _measured(
@@ -100,94 +97,41 @@ def _measured(
 ) -> Report:
     """Scene by scene, with a report of those that are done after each."""
     meter = workload.Meter(_estimate(parts, growth))
-    chosen.journal.say = meter.say
-    told: Report = {}
+    chosen.journal.progress = meter.write
+    results: Report = {}
     try:
         for number, part in enumerate(parts, 1):
             part.measure(meter)
-            told = _report(parts[:number], chosen)
-            write(out, told)
-            report.write(out, told, parts[:number])
+            results = _results(parts[:number], chosen)
+            write(out, results)
+            report.write(out, results, parts[:number])
         if growth:
-            told["growth"] = _growth(parts[0], growth, chosen, meter)
-            write(out, told)
-            report.write(out, told, parts)
+            results["growth"] = _growth(parts[0], growth, chosen, meter)
+            write(out, results)
+            report.write(out, results, parts)
     finally:
         meter.close()
-    return told
-
-
-def find_shots(
-    scenes: Sequence[Path],
-    resolution: tuple[int, int] | None,
-    windows: Path | None,
-    references: Path | None,
-) -> list[Shot]:
-    """A shot of each scene; raises UsageError for what is missing or contradicts."""
-    if windows is not None and resolution is not None:
-        raise UsageError(
-            "windows lie in frames of their own size: give --windows or --resolution"
-        )
-    if references is not None and windows is None:
-        raise UsageError("references show windows: give --windows with --references")
-    known = {} if windows is None else read_windows(windows)
-    names = [path.stem for path in scenes]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise UsageError(f"two scenes are named {twice[0]}; rename one")
-    return [_shot(path, resolution, known, windows, references) for path in scenes]
-
-
-def _shot(
-    path: Path,
-    resolution: tuple[int, int] | None,
-    known: dict[str, Window],
-    windows: Path | None,
-    references: Path | None,
-) -> Shot:
-    if not path.is_file():
-        raise UsageError(f"there is no scene {path}")
-    if windows is not None and path.stem not in known:
-        raise UsageError(f"{windows} has no window for {path.stem}")
-    reference = None if references is None else references / f"{path.stem}.exr"
-    if reference is not None and not reference.is_file():
-        raise UsageError(f"there is no reference {reference} for {path}")
-    window = known.get(path.stem) or _whole(path, resolution)
-    return Shot(path, window, reference, digest(path))
-
-
-def _whole(path: Path, resolution: tuple[int, int] | None) -> Window:
-    if resolution is None:
-        from xrds_blender.command.scene_file import open_scene
-
-        render = open_scene(path).render
-        share = render.resolution_percentage
-        width, height = (
-            size * share // 100 for size in (render.resolution_x, render.resolution_y)
-        )
-    else:
-        width, height = resolution
-    return Window(width, height, 0, 0, width, height)
+    return results
 
 
 def _chosen(networks: Networks, presets: Sequence[str] | None) -> tuple[Network, ...]:
-    return tuple(n for n in networks.records if presets is None or n[0] in presets)
+    return tuple(n for n in networks.records if presets is None or n.preset in presets)
 
 
-def _tell_missing(networks: Networks, presets: Sequence[str] | None) -> None:
+def _report_missing(networks: Networks, presets: Sequence[str] | None) -> None:
     lacking = [
         f"{preset} x{scale} {guides}"
         for preset, scale, guides in _absent(networks)
         if presets is None or preset in presets
     ]
     if lacking:
-        _say(f"no weights, left out: {', '.join(lacking)}")
+        report_line(f"no weights, left out: {', '.join(lacking)}")
 
 
 def _absent(networks: Networks) -> list[Network]:
     """Networks of the product without weights."""
     wanted = [
-        (preset, scale, guides)
+        Network(preset, scale, guides)
         for preset in ("fast", "balanced")
         for scale in (2, 4, 8)
         for guides in ("fast", "full")
@@ -203,37 +147,34 @@ def _growth(
 ) -> dict[str, Any]:
     per_megapixel = part.unit() / part.megapixels
 
-    def tell(megapixels: float, what: str) -> None:
-        meter.done(megapixels * per_megapixel, f"growth: {what}")
+    def done(megapixels: float, task: str) -> None:
+        meter.done(megapixels * per_megapixel, f"growth: {task}")
 
-    return measure_growth(part.shot, sizes, chosen, tell)
+    return measure_growth(part.shot, sizes, chosen, done)
 
 
 def _estimate(parts: Sequence[SceneBench], growth: Sequence[tuple[int, int]]) -> float:
-    """Predicted seconds of the run, told scene by scene as they are probed."""
+    """Predicted seconds of the run, printed scene by scene."""
     seconds = []
     for part in parts:
         seconds.append(part.estimate())
-        _say(f"{part.name}: about {workload.spoken(seconds[-1])}")
+        report_line(f"{part.name}: about {workload.duration(seconds[-1])}")
     if growth:
         first, pixels = parts[0], sum(w * h for w, h in growth) / 1e6
         seconds.append(first.growth_estimate(pixels))
-        _say(f"growth: at most about {workload.spoken(seconds[-1])}")
-    _say(f"all of it: about {workload.spoken(sum(seconds))}")
+        report_line(f"growth: at most about {workload.duration(seconds[-1])}")
+    report_line(f"all of it: about {workload.duration(sum(seconds))}")
     return sum(seconds)
 
 
-def _report(parts: Sequence[SceneBench], chosen: Settings) -> Report:
+def _results(parts: Sequence[SceneBench], chosen: Settings) -> Report:
     scenes = [part.summary() | {"picks": part.picks} for part in parts]
-    told: Report = {
+    results: Report = {
         "settings": {
             "budgets": list(chosen.budgets),
             "rounds": chosen.rounds,
             "reference_samples": chosen.reference_samples,
-            "networks": [
-                dict(zip(("preset", "scale", "guides"), n, strict=True))
-                for n in chosen.sweep.networks
-            ],
+            "networks": [network._asdict() for network in chosen.sweep.networks],
             "without_weights": [list(n) for n in _absent(chosen.networks)],
         },
         "machine": machine.describe(chosen.networks.device),
@@ -242,14 +183,14 @@ def _report(parts: Sequence[SceneBench], chosen: Settings) -> Report:
         "failures": chosen.journal.failures,
     }
     if chosen.timing:
-        told = analysis.analysed(told, chosen.budgets)
-    return told
+        results = analysis.analysed(results, chosen.budgets)
+    return results
 
 
-def write(out: Path, told: Report) -> None:
-    """results.json and results.csv."""
-    write_json(out / "results.json", told)
-    rows = [_flat(point) for point in told["points"]]
+def write(out: Path, results: Report) -> None:
+    """Write results.json and results.csv."""
+    write_json(out / "results.json", results)
+    rows = [_flat(point) for point in results["points"]]
     columns = list(dict.fromkeys(key for row in rows for key in row))
     with (
         replacing(out / "results.csv") as part,
@@ -271,9 +212,6 @@ def _flat(point: dict[str, Any]) -> dict[str, Any]:
     )
 
 
-def _write_model(path: Path, parts: Sequence[SceneBench], told: Report) -> None:
-    write_json(path, analysis.fitted(parts, told["points"]).to_json())
-
-
-def _say(line: str) -> None:
+def report_line(line: str) -> None:
+    """Print a line of progress beside the result."""
     print(line, file=sys.stderr, flush=True)

@@ -15,22 +15,25 @@ from xrds_core.metrics import to_srgb
 from .sweep import Config
 
 if TYPE_CHECKING:
+    from xrds_core.arrays import Array
+
     from .measure import SceneBench
 
     Report = dict[str, Any]
+    Box = tuple[slice, slice]
 
 CROP = (480, 320)  # pixels of the part that is shown, at most
 SHOWN = ("OIDN, default", "OIDN, best mode", "XRDS", "demodulated bilinear")
 QUALITY = 92  # of the pictures in the page; they are to be looked at, not measured
 
 
-def viewer(told: Report, scene: SceneBench) -> str:
+def viewer(report: Report, scene: SceneBench) -> str:
     """HTML of a scene's crops; the page's script zooms and moves them together."""
     reference = scene.pictures.reference()
     place = _place(reference)
     shown: dict[str, str] = {}
     budgets = []
-    for entry in (e for e in told["budgets"] if e["scene"] == scene.name):
+    for entry in (e for e in report["budgets"] if e["scene"] == scene.name):
         columns = []
         for name in SHOWN:
             best = entry["best"].get(name)
@@ -38,7 +41,7 @@ def viewer(told: Report, scene: SceneBench) -> str:
                 continue
             key = best["label"]
             if key not in shown:
-                picture = _crop(scene, told, key, place)
+                picture = _crop(scene, report, key, place)
                 if picture is None:
                     continue
                 shown[key] = picture
@@ -59,13 +62,11 @@ def viewer(told: Report, scene: SceneBench) -> str:
     )
 
 
-def _crop(
-    scene: SceneBench, told: Report, label: str, place: tuple[slice, slice]
-) -> str | None:
+def _crop(scene: SceneBench, report: Report, label: str, place: Box) -> str | None:
     if label in scene.crops:
         return scene.crops[label]
     point = next(
-        p for p in told["points"] if p["label"] == label and p["scene"] == scene.name
+        p for p in report["points"] if p["label"] == label and p["scene"] == scene.name
     )
     config = Config(method=point["method"], **point["settings"])
     try:
@@ -81,25 +82,29 @@ def _exposure(scene: SceneBench) -> float:
     return scene.pictures.exposure(known[0])
 
 
-def _place(reference: np.ndarray) -> tuple[slice, slice]:
+def _place(reference: Array) -> Box:
     """The part of the picture with most detail, of CROP's size at most."""
-    height, width = reference.shape[:2]
-    columns, rows = min(CROP[0], width), min(CROP[1], height)
     shown = to_srgb(reference).mean(-1)
     detail = np.abs(np.diff(shown, axis=0, append=shown[-1:]))
     detail += np.abs(np.diff(shown, axis=1, append=shown[:, -1:]))
-    total = np.pad(detail, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
+    return largest(detail, *CROP)
+
+
+def largest(plane: Array, width: int, height: int, step: int = 1) -> Box:
+    """The place of this size at most, every `step` pixels, with the largest sum."""
+    height, width = min(height, plane.shape[0]), min(width, plane.shape[1])
+    total = np.pad(plane, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
     inside = (
-        total[rows:, columns:]
-        - total[:-rows, columns:]
-        - total[rows:, :-columns]
-        + total[:-rows, :-columns]
-    )
-    y, x = np.unravel_index(int(inside.argmax()), inside.shape)
-    return slice(int(y), int(y) + rows), slice(int(x), int(x) + columns)
+        total[height:, width:]
+        - total[:-height, width:]
+        - total[height:, :-width]
+        + total[:-height, :-width]
+    )[::step, ::step]
+    y, x = (int(i) * step for i in np.unravel_index(inside.argmax(), inside.shape))
+    return slice(y, y + height), slice(x, x + width)
 
 
-def _encoded(linear: np.ndarray, stops: float) -> str:
+def _encoded(linear: Array, stops: float) -> str:
     """A data URI of the picture as it is shown."""
     from PIL import Image
 

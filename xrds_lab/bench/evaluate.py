@@ -5,30 +5,42 @@ Error on windows of real scenes against their references, seconds of whole frame
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
+import platform
 import sys
-from dataclasses import asdict
+from dataclasses import replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from xrds_core import exr, metrics
+from xrds_blender.planning.budget import Network
+from xrds_core import metrics
 from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
 
 from . import table
-from .contenders import Contenders, Settings
-from .frames import FrameSeconds
-from .inputs import Folder, silent
+from .inputs import GENERATION, kept, silent
+from .journal import Strict
+from .pictures import Networks, Pictures
+from .rivals import ENLARGEMENTS
 from .sheets import Sheet
-from .timing import ROUNDS
+from .stages import ROUNDS, StageTimes, Stopwatch
+from .sweep import Config, anchors
+from .tasks import tasks
 from .windows import find_shots
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from .contenders import Case
-    from .inputs import Say
+    from .inputs import Progress
     from .windows import Shot
+
+    Configs = dict[str, Config]
+    Record = dict[str, Any]
+
+GUIDES = ("fast", "full")
 
 
 def evaluate(
@@ -40,44 +52,57 @@ def evaluate(
     scales: Sequence[int] = (2, 4),
     presets: Sequence[str] = ("fast",),
     guides: Sequence[str] = ("fast",),
+    samples: int = 16,
+    guide_samples: int = 4,
     timing: bool = False,
+    timing_scenes: Sequence[str] | None = None,
+    timing_rounds: int = ROUNDS,
     out: Path | None = None,
     sheets: Path | None = None,
     weights: Path | None = None,
-    progress: Say | None = None,
-    timing_scenes: Sequence[str] | None = None,
-    timing_rounds: int = ROUNDS,
-    **settings: Any,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Measure the product and its rivals on scene files; returns the JSON's content.
 
-    ``windows`` is a windows file, ``references`` a folder of NAME.exr, ``cache`` a
-    folder for rendered inputs: with it, new weights cost no rendering. ``timing``
-    adds whole frames' seconds and OIDN at equal time, for the scenes named in
-    ``timing_scenes`` or for all. Presets without weights stand in the table without
-    the product. ``progress`` is given lines of text; ``settings`` are further fields
-    of Settings. The table is printed on stderr; ``out`` gets results.json, ``sheets``
-    a JPEG of enlarged crops for each scene.
+    `windows` is a windows file, `references` a folder of NAME.exr, `cache` a folder
+    for rendered inputs: with it, new weights cost no rendering. `timing` adds whole
+    frames' seconds and OIDN at equal time, for the scenes named in `timing_scenes` or
+    for all. Presets without weights stand in the table without the product. `progress`
+    gets lines of text. The table is printed on stderr; `out` gets results.json,
+    `sheets` a JPEG of enlarged crops for each scene.
     Raises UsageError for missing files and unknown names.
     """
-    chosen = Settings(tuple(scales), tuple(presets), tuple(guides), **settings)
-    contenders = Contenders(chosen, Folder(cache), weights, progress or silent)
-    records: list[dict[str, Any]] = []
+    _check_guides(guides)
+    networks = Networks(weights, "auto")
+    rows = {
+        network: _configurations(network, networks, samples, guide_samples, progress)
+        for network in (
+            Network(preset, scale, kind)
+            for scale, preset, kind in product(scales, presets, guides)
+        )
+    }
     shots = find_shots(scenes, windows, references)
-    absent = set(timing_scenes or ()) - {shot.name for shot in shots}
-    if absent:
-        raise UsageError(f"{sorted(absent)} cannot be timed: not among the scenes")
-    for shot in shots:
-        timed = timing and (timing_scenes is None or shot.name in timing_scenes)
-        frame = FrameSeconds(shot, contenders, timing_rounds) if timed else None
-        sheet = Sheet()
-        for case in chosen.cases:
-            records.append(_record(shot, case, contenders, frame, sheet))
-            contenders.say(table.line(records[-1]))
-        if sheets is not None:
-            sheet.write(sheets / f"{shot.name}.jpg")
+    timed = _timed(shots, timing, timing_scenes)
+    records: list[Record] = []
+    with kept(cache) as folder:
+        for shot in shots:
+            rounds = timing_rounds if shot.name in timed else 0
+            scene = _Scene(Pictures(shot, folder, networks), rows, rounds, progress)
+            records += scene.records()
+            if sheets is not None:
+                scene.sheet.write(sheets / f"{shot.name}.jpg")
     report = {
-        "settings": _settings(chosen, timing),
+        "settings": {
+            "scales": list(scales),
+            "presets": list(presets),
+            "guides": list(guides),
+            "samples": samples,
+            "guide_samples": guide_samples,
+            "device": networks.device,
+            "timing": timing,
+            "blender": _blender_version(),
+            "cpu_count": os.cpu_count(),
+        },
         "scenes": records,
         "mean": table.means(records),
         "worst": table.worst(records),
@@ -89,47 +114,147 @@ def evaluate(
     return report
 
 
-def _record(
-    shot: Shot,
-    case: Case,
-    contenders: Contenders,
-    frame: FrameSeconds | None,
-    sheet: Sheet,
-) -> dict[str, Any]:
-    """One entry of ``scenes``; its pictures go into the sheet."""
-    record = {
-        "scene": shot.name,
-        "scale": case.scale,
-        "preset": case.preset,
-        "guides": case.guides,
-    }
-    pictures, stops = contenders.pictures(shot, case)
-    stages = {} if frame is None else frame.methods(case)
-    if frame is not None and "xrds" in pictures:
-        samples = frame.equal_time_samples(case)
-        pictures["oidn_equal_time"] = contenders.plain(shot, samples)
-        stages["oidn_equal_time"] = frame.plain(samples)
-    reference = exr.read_beauty(shot.reference).radiance[..., :3]
-    sheet.add(f"{shot.name} x{case.scale} {case.label}", pictures, reference, stops)
-    methods = {
-        name: metrics.all_metrics(picture, reference, stops)
-        | {"seconds": stages.get(name, {}).get("total")}
-        for name, picture in pictures.items()
-    }
-    record |= {"methods": methods, "gain": table.gain(methods)}
-    record |= {"reference_psnr_floor": shot.window.floor_psnr}
-    return record | ({} if frame is None else {"frame_seconds": stages})
+def _check_guides(guides: Sequence[str]) -> None:
+    unknown = set(guides) - set(GUIDES)
+    if unknown:
+        raise UsageError(f"guides {sorted(unknown)} do not exist: take {GUIDES}")
 
 
-def _settings(chosen: Settings, timing: bool) -> dict[str, Any]:
+def _timed(
+    shots: Sequence[Shot], timing: bool, names: Sequence[str] | None
+) -> set[str]:
+    """Names of the scenes whose frames are timed."""
+    known = {shot.name for shot in shots}
+    absent = set(names or ()) - known
+    if absent:
+        raise UsageError(f"{sorted(absent)} cannot be timed: not among the scenes")
+    return (known if names is None else set(names)) if timing else set()
+
+
+def _configurations(
+    network: Network,
+    networks: Networks,
+    samples: int,
+    guide_samples: int,
+    progress: Progress,
+) -> Configs:
+    """One block of the table by method: the product first, if there are weights."""
+    preset, scale, guides = network
+    xrds = Config("xrds", samples, None, scale, preset, guides, guide_samples)
+    configs = {"xrds": xrds}
+    configs |= {name: replace(xrds, method=name, preset="") for name in ENLARGEMENTS}
+    configs["bicubic"] = Config("bicubic", samples, None, scale)
+    equal_rays = max(1, round(samples / scale**2 + guide_samples))
+    configs["oidn_equal_spp"] = Config("oidn", equal_rays, None)
+    if network not in networks.records:
+        progress(f"{table.case(network)} has no weights yet: rivals alone")
+        del configs["xrds"]
+    return configs
+
+
+class _Scene:
+    """One scene's part of the table."""
+
+    def __init__(
+        self,
+        pictures: Pictures,
+        rows: dict[Network, Configs],
+        rounds: int,
+        progress: Progress,
+    ) -> None:
+        self.pictures, self.rows, self.progress = pictures, rows, progress
+        self.sheet = Sheet()
+        self._render([c for configs in rows.values() for c in configs.values()])
+        self.times = self._measured_times(rounds) if rounds else None
+
+    def records(self) -> list[Record]:
+        """Entries of `scenes`; their pictures go into the sheet."""
+        records = []
+        for network, configs in self.rows.items():
+            records.append(self._record(network, dict(configs)))
+            self.progress(table.line(records[-1]))
+        return records
+
+    def _record(self, network: Network, configs: Configs) -> Record:
+        if self.times is not None and "xrds" in configs:
+            configs["oidn_equal_time"] = _equal_time(self.times, configs)
+            self._render([configs["oidn_equal_time"]])
+        stages = {} if self.times is None else _seconds(self.times, configs)
+        made = {name: self.pictures.picture(c) for name, c in configs.items()}
+        shot, reference = self.pictures.shot, self.pictures.reference()
+        stops = self.pictures.exposure(configs["bicubic"])
+        self.sheet.add(f"{shot.name} {table.case(network)}", made, reference, stops)
+        methods = {
+            name: metrics.all_metrics(picture, reference, stops)
+            | {"seconds": stages.get(name, {}).get("total")}
+            for name, picture in made.items()
+        }
+        record: Record = {
+            "scene": shot.name,
+            "scale": network.scale,
+            "preset": network.preset,
+            "guides": network.guides,
+            "methods": methods,
+            "gain": table.gain(methods),
+            "reference_psnr_floor": shot.window.floor_psnr,
+        }
+        return record | ({} if self.times is None else {"frame_seconds": stages})
+
+    def _render(self, configs: Sequence[Config]) -> None:
+        name = self.pictures.shot.name
+        self.pictures.render(
+            self.pictures.missing(configs),
+            Strict(),
+            lambda r: self.progress(f"{name}: rendered {r.kind} {r.samples} spp"),
+        )
+
+    def _measured_times(self, rounds: int) -> StageTimes:
+        """Seconds of the stages of whole frames; runs in the folder are not repeated.
+
+        They are kept for each machine and size of the networks: weights alone do not
+        change them.
+        """
+        shot, networks = self.pictures.shot, self.pictures.networks
+        configs = [c for row in self.rows.values() for c in row.values()]
+        sizes = [
+            networks[network].network.config.to_dict()
+            for network in self.rows
+            if network in networks.records
+        ]
+        digest = hashlib.sha256(json.dumps(sizes, sort_keys=True).encode()).hexdigest()
+        machine = f"{platform.machine()}-{os.cpu_count()}cpu"
+        version = f"v{GENERATION}-blender{_blender_version().replace(' ', '')}"
+        name = f"{shot.identity}-seconds-{machine}-{version}-{digest[:8]}.json"
+        times = StageTimes(self.pictures.folder.directory / name)
+        timed = tasks(shot, configs, networks)
+        watch = Stopwatch(shot, times, anchors(configs), timed, Strict())
+        watch.measure(rounds, lambda n: self.progress(f"{shot.name}: timed {n}"))
+        return times
+
+
+def _equal_time(times: StageTimes, configs: Configs) -> Config:
+    """OIDN with as many samples as it takes in the product's time."""
+    plain = configs["oidn_equal_spp"]
+    left = times.cost(configs["xrds"]).total - times.cost(plain).total
+    samples = plain.samples + round(left / times.line("plain")[1])
+    return replace(plain, samples=max(1, samples))
+
+
+def _seconds(times: StageTimes, configs: Configs) -> dict[str, dict[str, float]]:
+    """Seconds of a whole frame by method, the product's by stage."""
+    seconds: dict[str, dict[str, float]] = {}
+    for name, config in configs.items():
+        cost = times.cost(config)
+        seconds[name] = {"total": cost.total}
+        if config.method == "oidn":
+            seconds[name]["samples"] = config.samples
+        if config.method == "xrds":
+            stages = {k: s for k, s in cost.seconds.items() if k != "other"}
+            seconds[name] = stages | {"cpu": cost.cpu_seconds}
+    return seconds
+
+
+def _blender_version() -> str:
     import bpy
 
-    fields = {
-        key: list(value) if isinstance(value, tuple) else value
-        for key, value in asdict(chosen).items()
-    }
-    return fields | {
-        "timing": timing,
-        "blender": bpy.app.version_string,
-        "cpu_count": os.cpu_count(),
-    }
+    return str(bpy.app.version_string)

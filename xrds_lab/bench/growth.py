@@ -10,23 +10,25 @@ from __future__ import annotations
 import math
 from contextlib import nullcontext
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.planning.budget import Network
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
 from . import machine, tasks
 from .inputs import Request
 from .stages import PLAIN_FRAME, StageTimes, Stopwatch, clocked, network_name
-from .sweep import Config, anchor
+from .sweep import anchor, xrds
 from .windows import Window
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
+
+    from xrds_blender.planning.budget import Network
 
     from .measure import Settings
     from .stages import Run, Task
@@ -38,7 +40,7 @@ if TYPE_CHECKING:
 # Cores that no machine at hand has; each stage's line in 1/cores is drawn on to them.
 MORE_CORES = (8, 32)
 MEMORY_LIMIT = 1 << 30
-QUICK_DENOISER = "HIGH-FAST"
+QUICK_DENOISER = Denoiser.HIGH_FAST
 NOTE = (
     "Break-even at equal rays: saved is a frame of one sample + OIDN less the "
     "low-resolution render of scale² samples, its OIDN and one guide sample; paid is "
@@ -53,17 +55,17 @@ def growth(
     shot: Shot,
     sizes: Sequence[Size],
     settings: Settings,
-    tell: Callable[[float, str], object],
+    done: Callable[[float, str], object],
 ) -> dict[str, Any]:
-    """Measure one scene at every size with 1 to all cores; the report's ``growth``.
+    """Measure one scene at every size with 1 to all cores; the report's `growth`.
 
-    ``tell`` hears megapixels done and what they were.
+    `done` gets the megapixels of each run and its name.
     """
     counts = _core_counts()
     rows: list[Row] = []
     for size in sizes:
         for cores in counts:
-            rows += _measured(_resized(shot, size), cores, counts, settings, tell)
+            rows += _measured(_resized(shot, size), cores, counts, settings, done)
     return {
         "scene": shot.name,
         "sizes": [list(size) for size in sizes],
@@ -91,22 +93,18 @@ def _measured(
     cores: int,
     counts: Sequence[int],
     settings: Settings,
-    tell: Callable[[float, str], object],
+    done: Callable[[float, str], object],
 ) -> list[Row]:
     """Rows of one frame size on so many cores."""
     size = shot.window.frame_width, shot.window.frame_height
-    directory = settings.folder.directory
-    assert directory is not None
-    name = f"{shot.name}-{shot.digest}-{size[0]}x{size[1]}-{cores}cores-growth"
-    times = StageTimes(directory / f"{name}.json")
-    watch = Stopwatch(shot, times, _renders(settings), settings.journal)
-    for task, call in _tasks(shot, settings).items():
-        watch.add(task, call)
+    name = f"{shot.identity}-{cores}cores-growth.json"
+    times = StageTimes(settings.folder.directory / name)
+    watch = Stopwatch(shot, times, _renders(), _tasks(shot, settings), settings.journal)
     all_of_them = cores == max(counts)
     with nullcontext() if all_of_them else machine.only_cores(cores):
         pixels = size[0] * size[1] / 1e6
         watch.measure(
-            settings.rounds, lambda what: tell(pixels, f"{size[0]}x{size[1]}: {what}")
+            settings.rounds, lambda what: done(pixels, f"{size[0]}x{size[1]}: {what}")
         )
     return [
         {
@@ -121,27 +119,23 @@ def _measured(
     ]
 
 
-def _renders(settings: Settings) -> list[Request]:
-    found = [anchor("plain", more=more) for more in (False, True)]
-    found += [anchor("plain", 1, mode) for mode in (DEFAULT_DENOISER, QUICK_DENOISER)]
-    return [*found, anchor("guides"), anchor("guides", more=True)]
+def _renders() -> list[Request]:
+    kinds = ("plain", "guides")
+    lines = [anchor(kind, more=more) for kind in kinds for more in (False, True)]
+    modes = (DEFAULT_DENOISER, QUICK_DENOISER)
+    return lines + [anchor("plain", 1, mode) for mode in modes]
 
 
 def _tasks(shot: Shot, settings: Settings) -> dict[str, Task]:
     """Networks alone, without and with a memory limit, and whole frames by each."""
     sweep, networks = settings.sweep, settings.networks
-    timed = tasks.tasks(shot, sweep, networks)
-    names = {network_name(_config(n)): n for n in sweep.networks}
-    found = {name: timed[name] for name in [PLAIN_FRAME, *names]}
-    for name, network in names.items():
-        found[_limited(name)] = _limited_network(shot, settings, network)
-        found[_frame(name)] = _xrds_frame(shot, settings, network)
-    return found
-
-
-def _config(network: Network) -> Config:
-    preset, scale, guides = network
-    return Config("xrds", 1, "", scale, preset, guides)
+    configs = {network_name(xrds(n)): xrds(n) for n in sweep.networks}
+    known = tasks.tasks(shot, configs.values(), networks)
+    timed = {name: known[name] for name in [PLAIN_FRAME, *configs]}
+    for name, config in configs.items():
+        timed[_limited(name)] = _limited_network(shot, settings, config.network)
+        timed[_frame(name)] = _xrds_frame(shot, settings, config.network)
+    return timed
 
 
 def _limited(name: str) -> str:
@@ -162,8 +156,8 @@ def _alone(denoiser: str) -> str:
 
 def _limited_network(shot: Shot, settings: Settings, network: Network) -> Task:
     def task() -> Run:
-        low, full = tasks.noise(shot.window, network[1])
-        extra = full if network[2] == "full" else None
+        low, full = tasks.noise(shot.window, network.scale)
+        extra = full if network.guides == "full" else None
         upscaler = settings.networks[network]
         return clocked(
             lambda: upscaler(
@@ -176,12 +170,9 @@ def _limited_network(shot: Shot, settings: Settings, network: Network) -> Task:
 
 def _xrds_frame(shot: Shot, settings: Settings, network: Network) -> Task:
     """A frame with the rays of one full-resolution sample and one guide sample."""
-    preset, scale, guides = network
     job = RenderJob(
-        scale=scale,
-        preset=preset,
-        guides=guides,
-        samples=scale**2,
+        **network._asdict(),
+        samples=network.scale**2,
         guide_samples=1,
         device=settings.networks.device,
         weights=settings.networks.weights,
@@ -202,7 +193,7 @@ def _rows(
     if times.count(PLAIN_FRAME):
         yield PLAIN_FRAME, times.median(PLAIN_FRAME), times.peak(PLAIN_FRAME)
     for network in settings.sweep.networks:
-        name = network_name(_config(network))
+        name = network_name(xrds(network))
         for task in (name, _limited(name), _frame(name)):
             if times.count(task):
                 yield task, times.median(task), times.peak(task)
@@ -227,13 +218,13 @@ def _rows(
 
 def exponents(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """Power of the pixels by which each task's seconds and memory grow."""
-    found = []
+    fitted = []
     for task, cores in dict.fromkeys((row["task"], row["cores"]) for row in rows):
         mine = [r for r in rows if (r["task"], r["cores"]) == (task, cores)]
         fits = {key: _power(mine, key) for key in ("seconds", "peak_memory")}
         if fits["seconds"] is not None:
-            found.append({"task": task, "cores": cores} | fits)
-    return found
+            fitted.append({"task": task, "cores": cores} | fits)
+    return fitted
 
 
 def _power(rows: Sequence[Row], key: str) -> float | None:
@@ -247,41 +238,38 @@ def _power(rows: Sequence[Row], key: str) -> float | None:
 
 def break_even(rows: Sequence[Row], networks: Sequence[Network]) -> list[Row]:
     """Seconds saved by the small render against seconds paid for the network."""
-    found = []
     sizes = dict.fromkeys(tuple(row["size"]) for row in rows)
     known = sorted({row["cores"] for row in rows})
-    for network in networks:
-        name = network_name(_config(network))
-        for size in sizes:
-            here = [row for row in rows if tuple(row["size"]) == size]
-            for cores in [*known, *(c for c in MORE_CORES if c > max(known))]:
-                plain, rest, paid, default, quick = (
-                    seconds_on(here, task, cores)
-                    for task in (
-                        PLAIN_FRAME,
-                        _less_network(name),
-                        name,
-                        _alone(DEFAULT_DENOISER),
-                        _alone(QUICK_DENOISER),
-                    )
-                )
-                if plain is None or rest is None or paid is None:
-                    continue
-                known_oidn = default is not None and quick is not None
-                found.append(
-                    {
-                        "network": name,
-                        "size": list(size),
-                        "cores": str(cores),
-                        "extrapolated": cores not in known,
-                        "saved": plain - rest,
-                        "saved_quick": plain - default + quick - rest
-                        if known_oidn
-                        else None,
-                        "paid": paid,
-                    }
-                )
-    return found
+    results = []
+    for network, size in product(networks, sizes):
+        name = network_name(xrds(network))
+        here = [row for row in rows if tuple(row["size"]) == size]
+        for cores in [*known, *(c for c in MORE_CORES if c > max(known))]:
+            balance = _balance(here, name, cores)
+            if balance is not None:
+                own = {"network": name, "size": list(size), "cores": str(cores)}
+                results.append(own | {"extrapolated": cores not in known} | balance)
+    return results
+
+
+def _balance(rows: Sequence[Row], name: str, cores: int) -> Row | None:
+    """Seconds saved and paid by one network at one frame size."""
+    plain, rest, paid, default, quick = (
+        seconds_on(rows, task, cores)
+        for task in (
+            PLAIN_FRAME,
+            _less_network(name),
+            name,
+            _alone(DEFAULT_DENOISER),
+            _alone(QUICK_DENOISER),
+        )
+    )
+    if plain is None or rest is None or paid is None:
+        return None
+    saved_quick = None
+    if default is not None and quick is not None:
+        saved_quick = plain - default + quick - rest
+    return {"saved": plain - rest, "saved_quick": saved_quick, "paid": paid}
 
 
 def seconds_on(rows: Sequence[Row], task: str, cores: int) -> float | None:

@@ -1,40 +1,43 @@
-"""Rendered inputs of the standard measure, each rendered once and kept in a folder.
-
-Everything goes through the product's own passes, in one Blender render per scene.
-"""
+"""Inputs of a measurement: rendered once by the product's passes, kept in a folder."""
 
 from __future__ import annotations
 
 import json
+import tempfile
 import zipfile
 import zlib
+from collections.abc import Callable
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
+from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Iterator
 
     from .windows import Shot, Window
 
-    Arrays = dict[str, np.ndarray]
-    Say = Callable[[str], object]
-
+Arrays = dict[str, Array]
+Progress = Callable[[str], object]
+"""Gets lines of text."""
 # Counts up whenever the pass code changes what it renders: old files are then left.
 GENERATION = 2
+OFF: Literal["OFF"] = "OFF"
+"""In place of a denoiser's mode: the picture as rendered."""
+Mode = Denoiser | Literal["OFF"]
 # Unlike each other and unlike the references', so that no noise is shared.
-OFF = "OFF"  # in place of a denoiser's mode: the picture as rendered
 SEEDS = {"low": 101, "guides": 202, "full": 303, "plain": 404}
 
 
 def silent(line: str) -> None:
-    """Tell nobody: in the place of a progress line's listener."""
+    """Drop a line of progress."""
 
 
 @dataclass(frozen=True)
@@ -43,15 +46,20 @@ class Request:
 
     low: beauty at 1/scale, denoised and before; guides: albedo and normal; full: the
     same with the radiance of all bounces; plain: denoised full-resolution Cycles.
-    ``denoiser`` is one of budget.DENOISERS or OFF; None is what the standard measure
-    takes.
+    `denoiser` None is the standard measure's: Blender's default for plain, the scene's
+    own mode for low.
     """
 
     kind: str
     samples: int
     scale: int = 1
-    denoiser: str | None = None
+    denoiser: Mode | None = None
     seed: int | None = None
+
+    @property
+    def is_guide(self) -> bool:
+        """Whether it holds albedo and normal."""
+        return self.kind in {"guides", "full"}
 
     def file_name(self, shot: Shot) -> str:
         """Name that changes with everything the pixels depend on."""
@@ -67,7 +75,7 @@ class Request:
     def render(self, passes: Any) -> tuple[Arrays, dict[str, float]]:
         """Arrays and seconds by stage, from inside run_job."""
         seed = self._seed
-        if self.kind in {"guides", "full"}:
+        if self.is_guide:
             full = self.kind == "full"
             guides = passes.guides(self.samples, full=full, seed=seed)
             arrays = {"albedo": guides.albedo, "normal": guides.normal}
@@ -93,23 +101,20 @@ class Request:
         """Arguments of passes.beauty."""
         if self.denoiser == OFF:
             return {"denoise": False}
-        if self.denoiser is not None:
-            return {"denoiser": Denoiser(self.denoiser)}
-        # Blender's own default for plain pictures; the product's choice for low ones
-        return {"denoiser": DEFAULT_DENOISER if self.kind == "plain" else None}
+        if self.denoiser is None and self.kind == "plain":
+            return {"denoiser": DEFAULT_DENOISER}
+        return {"denoiser": self.denoiser}
 
 
 class Folder:
-    """Rendered inputs on disk; without a folder they last as long as the object."""
+    """Rendered inputs on disk."""
 
-    def __init__(self, directory: Path | None) -> None:
+    def __init__(self, directory: Path) -> None:
         self.directory = directory
-        self.kept: dict[str, Arrays] = {}
+        directory.mkdir(parents=True, exist_ok=True)
 
     def read(self, name: str) -> Arrays | None:
         """Arrays of a file, or None when there is none that can be read."""
-        if name in self.kept or self.directory is None:
-            return self.kept.get(name)
         try:
             with np.load(self.directory / name) as file:
                 return dict(file)
@@ -117,35 +122,26 @@ class Folder:
             return None
 
     def has(self, name: str) -> bool:
-        """Whether there is such a file, not yet whether it can be read."""
-        if self.directory is None:
-            return name in self.kept
-        return (self.directory / name).is_file()
+        """Whether there is such a file and it was written to its end."""
+        path = self.directory / name
+        return path.is_file() and zipfile.is_zipfile(path)
 
     def write(self, name: str, arrays: Arrays, seconds: dict[str, float]) -> None:
         """Keep arrays (as float32); a reader never sees half a file."""
         arrays = {key: np.asarray(a, np.float32) for key, a in arrays.items()}
-        if self.directory is None:
-            self.kept[name] = arrays
-            return
-        self.directory.mkdir(parents=True, exist_ok=True)
         note = np.array(json.dumps(seconds))
         with replacing(self.directory / name) as part, part.open("wb") as file:
             np.savez(file, **arrays, seconds=note)
 
 
-def rendered(
-    shot: Shot, requests: Sequence[Request], folder: Folder, say: Say
-) -> dict[Request, Arrays]:
-    """The arrays of every request; what is not in the folder is rendered.
-
-    Beside the pixels each holds ``view_exposure``, the stops of the scene's view.
-    """
-    found = {r: folder.read(r.file_name(shot)) for r in requests}
-    missing = [r for r, arrays in found.items() if arrays is None]
-    if missing:
-        _render(shot, missing, folder, say)
-    return {r: _kept(folder, r.file_name(shot), found[r]) for r in requests}
+@contextmanager
+def kept(directory: Path | None) -> Iterator[Folder]:
+    """A folder of rendered inputs; without a directory it goes with the block."""
+    if directory is not None:
+        yield Folder(directory)
+        return
+    with tempfile.TemporaryDirectory() as temporary:
+        yield Folder(Path(temporary))
 
 
 def open_scene(path: Path, window: Window) -> Any:
@@ -161,27 +157,3 @@ def open_scene(path: Path, window: Window) -> Any:
     scene.cycles.use_adaptive_sampling = False
     scene.cycles.time_limit = 0
     return scene
-
-
-def _render(shot: Shot, missing: list[Request], folder: Folder, say: Say) -> None:
-    from xrds_blender import run_job
-
-    scene = open_scene(shot.path, shot.window)
-    exposure = np.float32(scene.view_settings.exposure)
-
-    def job(passes: Any) -> None:
-        for request in missing:
-            arrays, seconds = request.render(passes)
-            arrays["view_exposure"] = exposure
-            folder.write(request.file_name(shot), arrays, seconds)
-            spent = ", ".join(f"{k} {s:.1f} s" for k, s in seconds.items())
-            say(f"{shot.name}: rendered {request.kind} {request.samples} spp, {spent}")
-
-    run_job(scene, job)
-
-
-def _kept(folder: Folder, name: str, arrays: Arrays | None) -> Arrays:
-    arrays = folder.read(name) if arrays is None else arrays
-    if arrays is None:
-        raise SceneError(f"{name} was rendered but cannot be read back")
-    return {key: value for key, value in arrays.items() if key != "seconds"}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
 from xrds_core.atomic import replacing
@@ -11,9 +11,10 @@ from xrds_core.errors import Cancelled
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from contextlib import AbstractContextManager
     from pathlib import Path
 
-    from .inputs import Say
+    from .inputs import Progress
 
 MOST_KILLS = 3  # so often a task may end with its process before it is left out
 
@@ -25,8 +26,8 @@ class Journal:
     last one was killed; a task that was running at ``MOST_KILLS`` ends is left out.
     """
 
-    def __init__(self, path: Path, say: Say) -> None:
-        self.path, self.say = path, say
+    def __init__(self, path: Path, progress: Progress) -> None:
+        self.path, self.progress = path, progress
         self.failures: dict[str, str] = {}
         self.kills: dict[str, int] = {}
         self._running: str | None = None
@@ -35,10 +36,10 @@ class Journal:
     def _read(self) -> None:
         if not self.path.is_file():
             return
-        told = json.loads(self.path.read_text("utf-8"))
-        self.kills = told["kills"]
-        if told["running"] is not None:
-            killed = told["running"]
+        record = json.loads(self.path.read_text("utf-8"))
+        self.kills = record["kills"]
+        killed = record["running"]
+        if killed is not None:
             self.kills[killed] = self.kills.get(killed, 0) + 1
 
     @contextmanager
@@ -53,7 +54,7 @@ class Journal:
             raise
         except Exception as error:  # any fault of one configuration is only its own
             self.failures[name] = f"{type(error).__name__}: {error}"
-            self.say(f"{name} failed and is left out: {self.failures[name]}")
+            self.progress(f"{name} failed and is left out: {self.failures[name]}")
         else:
             self.failures.pop(name, None)
         finally:
@@ -72,5 +73,17 @@ class Journal:
     def _write(self) -> None:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(self.path) as part:
-            told = {"running": self._running, "kills": self.kills}
-            part.write_text(json.dumps(told), "utf-8")
+            record = {"running": self._running, "kills": self.kills}
+            part.write_text(json.dumps(record), "utf-8")
+
+
+class Strict:
+    """A journal in which the first failure ends the run."""
+
+    def attempt(self, name: str) -> AbstractContextManager[None]:
+        """Run the body; its error is the caller's."""
+        return nullcontext()
+
+    def gives_up(self, name: str) -> bool:
+        """No task is ever left out."""
+        return False

@@ -18,7 +18,7 @@ from . import tasks, workload
 from .inputs import OFF, Folder, open_scene
 from .pictures import Networks, Pictures
 from .stages import PLAIN_FRAME, StageTimes, Stopwatch
-from .sweep import DENOISERS, Config, Sweep, anchors, describe
+from .sweep import DENOISERS, Config, Sweep, anchor, anchors, describe
 
 if TYPE_CHECKING:
     from .inputs import Request
@@ -55,11 +55,8 @@ class SceneBench:
         self.shot, self.settings = shot, settings
         self._configs = settings.sweep.configurations()
         directory = settings.folder.directory
-        assert directory is not None
-        frame = f"{shot.window.frame_width}x{shot.window.frame_height}"
-        identity = f"{shot.name}-{shot.digest}-{frame}"
-        self.times = StageTimes(directory / f"{identity}-stages.json")
-        self._picks_file = directory / f"{identity}-picks.json"
+        self.times = StageTimes(directory / f"{shot.identity}-stages.json")
+        self._picks_file = directory / f"{shot.identity}-picks.json"
         # Encoded, by label: the report is written again after every scene.
         self.crops: dict[str, str] = {}
         self.pictures = Pictures(
@@ -105,20 +102,20 @@ class SceneBench:
     def estimate(self) -> float:
         """Predicted seconds of what is left to do."""
         part, window = workload.share(self.shot.window), self.shot.window
-        found = [
+        seconds = [
             workload.render_seconds(request, self.costs, part)
             for request in self.pictures.missing(self.configs)
         ]
-        found += [
+        seconds += [
             workload.picture_seconds(config, self.costs, window)
             for config in self.configs
             if not self.pictures.knows(config)
         ]
         if self.settings.timing:
             left = self._stopwatch.left(self.settings.rounds)
-            found += [self._task_seconds(name) for name in left]
-            found += [multiple * self.unit() for multiple in self._budgets_left()]
-        return sum(found)
+            seconds += [self._task_seconds(name) for name in left]
+            seconds += [multiple * self.unit() for multiple in self._budgets_left()]
+        return sum(seconds)
 
     def unit(self) -> float:
         """Seconds of 1 spp + OIDN with Blender's defaults: predicted, then measured."""
@@ -151,10 +148,11 @@ class SceneBench:
     @cached_property
     def _stopwatch(self) -> Stopwatch:
         chosen = self.settings
-        watch = Stopwatch(self.shot, self.times, anchors(chosen.sweep), chosen.journal)
-        for name, task in tasks.tasks(self.shot, chosen.sweep, chosen.networks).items():
-            watch.add(name, task)
-        return watch
+        # guides are timed even where there are no networks to need them
+        guides = [anchor("guides", more=more) for more in (False, True)]
+        requests = list(dict.fromkeys(anchors(self._configs) + guides))
+        timed = tasks.tasks(self.shot, self._configs, chosen.networks)
+        return Stopwatch(self.shot, self.times, requests, timed, chosen.journal)
 
     def measure(self, meter: Meter) -> None:
         """Time, render and compare whatever is missing."""
@@ -180,11 +178,11 @@ class SceneBench:
             for request in self.pictures.missing(configs)
         }
 
-        def tell(request: Request) -> None:
+        def done(request: Request) -> None:
             what = f"{self.name}: {request.kind}, {request.samples} spp"
             meter.done(seconds[request], what)
 
-        self.pictures.render(list(seconds), self.settings.journal, tell)
+        self.pictures.render(list(seconds), self.settings.journal, done)
 
     def _compare(self, meter: Meter) -> None:
         saved = time.perf_counter()
@@ -225,7 +223,7 @@ class SceneBench:
         picture, run = tasks.frame(self.shot, job)
         assert picture.job is not None
         config = picked_config(picture.job)
-        told = {
+        record = {
             "budget": seconds,
             "seconds": picture.seconds | {"total": run["seconds"]},
             "peak_memory": run["peak"],
@@ -235,14 +233,14 @@ class SceneBench:
         }
         del picture
         self._render([config], meter)
-        told |= self.pictures.errors(config)
-        write_json(self._picks_file, self.picks | {f"{multiple:g}": told})
+        record |= self.pictures.errors(config)
+        write_json(self._picks_file, self.picks | {f"{multiple:g}": record})
 
     # --- results ----------------------------------------------------------------------
 
     def points(self) -> list[Point]:
         """Every configuration whose seconds and error are known."""
-        found = []
+        points = []
         for config in self.configs:
             if not self.pictures.knows(config):
                 continue
@@ -262,20 +260,20 @@ class SceneBench:
                     "cpu_seconds": cost.cpu_seconds,
                     "peak_memory": cost.peak_memory,
                 }
-            found.append(point | self.pictures.errors(config))
-        return found
+            points.append(point | self.pictures.errors(config))
+        return points
 
     def summary(self) -> dict[str, Any]:
-        """The scene's entry under ``scenes``."""
+        """The scene's entry under `scenes`."""
         window = self.shot.window
-        told: dict[str, Any] = {
+        entry: dict[str, Any] = {
             "scene": self.name,
             "frame": [window.frame_width, window.frame_height],
             "window": [window.x, window.y, window.width, window.height],
             "reference": _named(self.shot, self.settings.reference_samples),
             "reference_psnr_floor": self.pictures.floor(),
         }
-        return told | self._timed() if self.settings.timing else told
+        return entry | self._timed() if self.settings.timing else entry
 
     def _timed(self) -> dict[str, Any]:
         """What was timed; nothing where a stage that all else rests on failed."""

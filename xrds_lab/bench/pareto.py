@@ -1,6 +1,6 @@
 """Which method has the least error for its seconds; pure functions of points.
 
-A point is one entry of ``points`` in results.json: scene, method, settings, seconds
+A point is one entry of `points` in results.json: scene, method, settings, seconds
 by stage with total, and the error measures.
 """
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 RISING = ("psnr",)
 CACHED = "XRDS, guides cached"
 STEPS = 96  # of a curve over log seconds
+BUDGETS = (0.125, 16.0)  # the first and last of a mean curve
 
 
 def _oidn_default(point: Point) -> bool:
@@ -43,18 +44,19 @@ GROUPS: dict[str, Callable[[Point], bool]] = {
 
 def groups(points: Sequence[Point]) -> dict[str, list[Point]]:
     """Points by group; XRDS also by scale, by guides and with them for nothing."""
-    found = {name: [p for p in points if has(p)] for name, has in GROUPS.items()}
-    ours = found["XRDS"]
+    members = {name: [p for p in points if has(p)] for name, has in GROUPS.items()}
+    ours = members["XRDS"]
     for scale in sorted({p["settings"]["scale"] for p in ours}):
-        found[f"XRDS x{scale}"] = [p for p in ours if p["settings"]["scale"] == scale]
+        same = [p for p in ours if p["settings"]["scale"] == scale]
+        members[f"XRDS x{scale}"] = same
     guides = {
         f"XRDS, {kind} guides": [p for p in ours if p["settings"]["guides"] == kind]
         for kind in ("fast", "full")
     }
-    found[CACHED] = [without_guides(p) for p in guides["XRDS, fast guides"]]
+    members[CACHED] = [without_guides(p) for p in guides["XRDS, fast guides"]]
     if all(guides.values()):  # one alone is all of XRDS
-        found |= guides
-    return {name: members for name, members in found.items() if members}
+        members |= guides
+    return {name: group for name, group in members.items() if group}
 
 
 def without_guides(point: Point) -> Point:
@@ -73,23 +75,21 @@ def better(a: Point, b: Point, measure: str = "psnr") -> bool:
 
 def frontier(points: Iterable[Point], measure: str = "psnr") -> list[Point]:
     """Those that no other beats in both seconds and error, by rising seconds."""
-    found: list[Point] = []
+    line: list[Point] = []
     for point in sorted(points, key=lambda p: (p["seconds"]["total"], -p["psnr"])):
-        if not found or better(point, found[-1], measure):
-            found.append(point)
-    return found
+        if not line or better(point, line[-1], measure):
+            line.append(point)
+    return line
 
 
-def best_within(
-    points: Iterable[Point], seconds: float, measure: str = "psnr"
-) -> Point | None:
-    """The least error of those that take no longer; None where none does."""
-    inside = frontier((p for p in points if p["seconds"]["total"] <= seconds), measure)
+def best_within(points: Iterable[Point], seconds: float) -> Point | None:
+    """The least error of those that take no longer; None if there is none."""
+    inside = frontier(p for p in points if p["seconds"]["total"] <= seconds)
     return inside[-1] if inside else None
 
 
 def at(points: Sequence[Point], seconds: float, measure: str = "psnr") -> float | None:
-    """The frontier's error at ``seconds``, between its points linear in log seconds.
+    """The frontier's error at `seconds`, between its points linear in log seconds.
 
     None before its first point; beyond its last, that one's.
     """
@@ -107,50 +107,49 @@ def at(points: Sequence[Point], seconds: float, measure: str = "psnr") -> float 
 
 
 def crossings(
-    ours: Sequence[Point], rivals: Sequence[Point], measure: str = "psnr"
+    ours: Sequence[Point], rivals: Sequence[Point]
 ) -> list[dict[str, float | bool]]:
-    """Where the better of two frontiers changes: seconds, and who is better after.
+    """Where the frontier with the higher PSNR changes: seconds, and which one leads.
 
     The first entry is where both exist for the first time.
     """
     if not ours or not rivals:
         return []
     totals = [p["seconds"]["total"] for p in [*ours, *rivals]]
-    found: list[dict[str, float | bool]] = []
+    changes: list[dict[str, float | bool]] = []
     for seconds in spaced(min(totals), max(totals)):
-        a, b = at(ours, seconds, measure), at(rivals, seconds, measure)
+        a, b = at(ours, seconds), at(rivals, seconds)
         if a is None and b is None:
             continue
-        wins = b is None or (a is not None and (a > b if measure in RISING else a < b))
-        if not found or found[-1]["ours_better"] != wins:
-            found.append({"seconds": seconds, "ours_better": wins})
-    return found
+        wins = b is None or (a is not None and a > b)
+        if not changes or changes[-1]["ours_better"] != wins:
+            changes.append({"seconds": seconds, "ours_better": wins})
+    return changes
 
 
-def spaced(first: float, last: float, steps: int = STEPS) -> list[float]:
-    """Values from ``first`` to ``last`` in equal ratios."""
+def spaced(first: float, last: float) -> list[float]:
+    """STEPS values from `first` to `last` in equal ratios."""
     ratio = last / first
-    return [first * ratio ** (i / (steps - 1)) for i in range(steps)]
+    return [first * ratio ** (i / (STEPS - 1)) for i in range(STEPS)]
 
 
 def mean_curve(
     scenes: dict[str, tuple[Sequence[Point], float]],
     measure: str = "psnr",
-    span: tuple[float, float] = (0.125, 16.0),
 ) -> list[tuple[float, float]]:
     """(budget, mean error) over scenes of (points, seconds of 1 spp + OIDN).
 
     Only budgets at which every scene has a point.
     """
-    found = []
-    for budget in spaced(*span):
+    curve = []
+    for budget in spaced(*BUDGETS):
         errors = [
             at(points, budget * unit, measure) for points, unit in scenes.values()
         ]
         known = [error for error in errors if error is not None]
         if known and len(known) == len(errors):
-            found.append((budget, statistics.fmean(known)))
-    return found
+            curve.append((budget, statistics.fmean(known)))
+    return curve
 
 
 def dearest_stage(point: Point) -> str:

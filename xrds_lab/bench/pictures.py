@@ -12,17 +12,20 @@ import numpy as np
 
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
-from xrds_core import baselines, exr, front_end, metrics
+from xrds_core import exr, front_end, metrics
 from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
 
 from .inputs import Folder, Request, open_scene
+from .rivals import ENLARGEMENTS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from xrds_core.arrays import Array
+
     from .inputs import Arrays
-    from .journal import Journal
+    from .journal import Journal, Strict
     from .sweep import Config
     from .windows import Shot
 
@@ -40,7 +43,7 @@ class Networks:
         self.weights, self.device = weights, device
         self._loaded: dict[Network, Any] = {}
         self.records = {
-            (record["preset"], record["scale"], record["guides"]): record
+            Network(record["preset"], record["scale"], record["guides"]): record
             for record in files.available(weights)
         }
         self.filter_digest = files.guide_filter_record(weights)["sha256"][:12]
@@ -53,9 +56,8 @@ class Networks:
         if network not in self._loaded:
             from xrds_core.upscaler import Upscaler
 
-            preset, scale, guides = network
             self._loaded[network] = Upscaler(
-                preset, scale, guides, self.device, weights=self.weights
+                *network, self.device, weights=self.weights
             )
         return self._loaded[network]
 
@@ -64,11 +66,14 @@ class Pictures:
     """Makes pictures of rendered inputs and measures them against the reference."""
 
     def __init__(
-        self, shot: Shot, folder: Folder, networks: Networks, reference_samples: int
+        self,
+        shot: Shot,
+        folder: Folder,
+        networks: Networks,
+        reference_samples: int = 0,
     ) -> None:
         self.shot, self.folder, self.networks = shot, folder, networks
         self.reference_samples = reference_samples
-        assert folder.directory is not None
         self._errors_file = folder.directory / f"{_identity(shot)}-errors.json"
         self._errors = _stored(self._errors_file)
         pixels = shot.window.width * shot.window.height
@@ -100,10 +105,10 @@ class Pictures:
     def render(
         self,
         requests: Sequence[Request],
-        journal: Journal,
-        tell: Callable[[Request], object],
+        journal: Journal | Strict,
+        done: Callable[[Request], object],
     ) -> None:
-        """Render requests into the folder; one that fails is left out."""
+        """Render requests into the folder; the journal has what fails."""
         from xrds_blender import run_job
 
         names = {r: f"{self.shot.name}: {r.file_name(self.shot)}" for r in requests}
@@ -118,7 +123,7 @@ class Pictures:
                     arrays["view_exposure"] = exposure
                     name = request.file_name(self.shot)
                     self.folder.write(name, arrays, seconds)
-                tell(request)
+                done(request)
 
         with journal.attempt(f"{self.shot.name}: rendering its inputs"):
             scene = open_scene(self.shot.path, self.shot.window)
@@ -127,38 +132,33 @@ class Pictures:
 
     # --- pictures ---------------------------------------------------------------------
 
-    def picture(self, config: Config) -> np.ndarray:
-        """Radiance (H, W, 3) of the shot's window; raises SceneError for what lacks."""
-        beauty, *guide = (self._read(request) for request in config.requests())
-        radiance = front_end.clean_radiance(beauty["radiance"])[0]
+    def picture(self, config: Config) -> Array:
+        """Radiance (H, W, 3) of the shot's window; SceneError without its renders."""
+        beauty, *rest = (_cleaned(self._read(r)) for r in config.requests())
+        radiance = beauty["radiance"]
         if config.scale == 1:
             return radiance
-        height, width = self.reference().shape[:2]
-        if not guide:
-            return baselines.bicubic(radiance, config.scale)[:height, :width]
-        albedo = front_end.clean_albedo(guide[0]["albedo"])[0]
-        if config.method == "demodulated_bilinear":
-            padded = front_end.pad_guide(albedo, radiance, config.scale)
-            picture = front_end.demodulated_base(radiance, padded, config.scale)
-            return picture[:height, :width]
-        light = {
-            name: None if x is None else front_end.clean_radiance(x)[0]
-            for name, x in (
-                ("noisy", beauty.get("noisy")),
-                ("guide_radiance", guide[0].get("radiance")),
+        guide = rest[0] if rest else {}
+        if config.method == "xrds":
+            upscaled = self.networks[config.network](
+                radiance,
+                guide["albedo"],
+                guide["normal"],
+                noisy=beauty.get("noisy"),
+                guide_radiance=guide.get("radiance"),
+                guide_samples=config.guide_samples,
             )
-        }
-        network = self.networks[config.preset, config.scale, config.guides]
-        picture = network(
-            radiance,
-            albedo,
-            front_end.clean_normal(guide[0]["normal"])[0],
-            guide_samples=config.guide_samples,
-            **light,
+            return np.asarray(upscaled.radiance[..., :3])
+        albedo, normal = (
+            front_end.pad_guide(guide[name], radiance, config.scale) if guide else None
+            for name in ("albedo", "normal")
         )
-        return np.asarray(picture.radiance[..., :3])
+        noisy = beauty.get("noisy", radiance)
+        enlarge = ENLARGEMENTS[config.method]
+        height, width = self.reference().shape[:2]
+        return enlarge(radiance, noisy, albedo, normal, config.scale)[:height, :width]
 
-    def reference(self) -> np.ndarray:
+    def reference(self) -> Array:
         """The reference (H, W, 3): the shot's own, or the mean of two halves."""
         if self.shot.reference is not None:
             return _reference_file(self.shot.reference)
@@ -181,8 +181,7 @@ class Pictures:
     def _key(self, config: Config) -> str:
         if config.method != "xrds":
             return config.key
-        network = config.preset, config.scale, config.guides
-        key = f"{config.key}-{self.networks.digest(network)}"
+        key = f"{config.key}-{self.networks.digest(config.network)}"
         if config.has_noisy_guides:
             key += f"-{self.networks.filter_digest}"
         return key
@@ -191,8 +190,9 @@ class Pictures:
         """Error measures, computed once for these weights."""
         key = self._key(config)
         if key not in self._errors:
-            stops = float(self._read(config.beauty())["view_exposure"])
-            self._errors[key] = measured(self.picture(config), self.reference(), stops)
+            self._errors[key] = measured(
+                self.picture(config), self.reference(), self.exposure(config)
+            )
         return dict(self._errors[key])
 
     def save(self) -> None:
@@ -208,18 +208,30 @@ class Pictures:
         name = request.file_name(self.shot)
         arrays = self.folder.read(name)
         if arrays is None:
-            raise SceneError(f"{name} was not rendered; run again to try it anew")
+            path = self.folder.directory / name
+            raise SceneError(f"{path} cannot be read: delete it and run again")
         return arrays
 
 
-def measured(
-    picture: np.ndarray, reference: np.ndarray, stops: float
-) -> dict[str, float]:
+_CLEAN = {
+    "radiance": front_end.clean_radiance,
+    "noisy": front_end.clean_radiance,
+    "albedo": front_end.clean_albedo,
+    "normal": front_end.clean_normal,
+}
+
+
+def _cleaned(arrays: Arrays) -> Arrays:
+    """The pictures as the product cleans its inputs."""
+    return {n: _CLEAN[n](array)[0] for n, array in arrays.items() if n in _CLEAN}
+
+
+def measured(picture: Array, reference: Array, stops: float) -> dict[str, float]:
     """All error measures; LPIPS where its package and weights are installed."""
-    told = metrics.all_metrics(picture, reference, stops)
+    errors = metrics.all_metrics(picture, reference, stops)
     if has_lpips():
-        told["lpips"] = metrics.lpips(picture, reference, stops)
-    return told
+        errors["lpips"] = metrics.lpips(picture, reference, stops)
+    return errors
 
 
 @lru_cache(maxsize=1)
@@ -234,7 +246,7 @@ def has_lpips() -> bool:
 
 
 @lru_cache(maxsize=2)
-def _reference_file(path: Path) -> np.ndarray:
+def _reference_file(path: Path) -> Array:
     return np.asarray(exr.read_beauty(path).radiance[..., :3])
 
 

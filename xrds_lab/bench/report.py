@@ -22,34 +22,34 @@ if TYPE_CHECKING:
 PAGE = Path(__file__).with_name("report.html")
 
 
-def write(out: Path, told: Report, scenes: Sequence[SceneBench]) -> None:
+def write(out: Path, report: Report, scenes: Sequence[SceneBench]) -> None:
     """Write report.html and the plots as files."""
     timed = {
         scene["scene"]: (
-            [p for p in told["points"] if p["scene"] == scene["scene"]],
+            [p for p in report["points"] if p["scene"] == scene["scene"]],
             scene["default_seconds"],
         )
-        for scene in told["scenes"]
+        for scene in report["scenes"]
         if "default_seconds" in scene
     }
     timed = {name: pair for name, pair in timed.items() if pair[0]}
-    sections = [_machine(told), _failures(told)]
+    sections = [_machine(report), _failures(report)]
     if timed:
         overall = plots.mean_plot(timed)
         plots.save(overall, out / "pareto.svg")
-        sections[:0] = [_figure(overall), _mean_table(told), _picker(told)]
-    if "growth" in told:
-        sections.append(_growth(out, told["growth"]))
+        sections[:0] = [_figure(overall), _mean_table(report), _picker(report)]
+    if "growth" in report:
+        sections.append(_growth(out, report["growth"]))
     by_name = {scene.name: scene for scene in scenes}
-    for scene in told["scenes"]:
+    for scene in report["scenes"]:
         name = scene["scene"]
         sections.append(f"<h2>{html.escape(name)}</h2>")
         if name in timed:
             floor = scene["reference_psnr_floor"]
             svg = plots.scene_plot(name, *timed[name], floor)
             plots.save(svg, out / f"pareto-{name}.svg")
-            sections += [_facts(told, scene), _figure(svg), _table(told, name)]
-            sections.append(viewer(told, by_name[name]))
+            sections += [_facts(report, scene), _figure(svg), _table(report, name)]
+            sections.append(viewer(report, by_name[name]))
     page = Template(PAGE.read_text("utf-8")).substitute(body="\n".join(sections))
     with replacing(out / "report.html") as part:
         part.write_text(page, "utf-8")
@@ -67,12 +67,12 @@ def _rows(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     return f"<table><thead>{cells('th', head)}</thead><tbody>{body}</tbody></table>"
 
 
-def _mean_table(told: Report) -> str:
-    names = list(dict.fromkeys(n for row in told["mean"] for n in row["groups"]))
+def _mean_table(report: Report) -> str:
+    names = list(dict.fromkeys(n for row in report["mean"] for n in row["groups"]))
     rows = []
-    for row in told["mean"]:
-        cells = [_mean_cell(row["groups"].get(name), told) for name in names]
-        rows.append([f"{row['budget']:g}", *cells, _mean_cell(row["picker"], told)])
+    for row in report["mean"]:
+        cells = [_mean_cell(row["groups"].get(name), report) for name in names]
+        rows.append([f"{row['budget']:g}", *cells, _mean_cell(row["picker"], report)])
     head = ["budget", *names, "picker"]
     note = (
         "Mean PSNR in dB (trimmed RelMSE) of the best configuration within each "
@@ -82,16 +82,16 @@ def _mean_table(told: Report) -> str:
     return f"<p>{note}</p>{_rows(head, rows)}"
 
 
-def _mean_cell(mean: dict[str, float] | None, told: Report) -> str:
+def _mean_cell(mean: dict[str, float] | None, report: Report) -> str:
     if mean is None:
         return "–"
-    some = mean["scenes"] < sum("default_seconds" in s for s in told["scenes"])
+    some = mean["scenes"] < sum("default_seconds" in s for s in report["scenes"])
     count = f" [{mean['scenes']}]" if some else ""
     return f"{mean['psnr']:.2f} ({mean['relmse_trimmed']:.4f}){count}"
 
 
-def _table(told: Report, scene: str) -> str:
-    entries = [e for e in told["budgets"] if e["scene"] == scene]
+def _table(report: Report, scene: str) -> str:
+    entries = [e for e in report["budgets"] if e["scene"] == scene]
     names = list(dict.fromkeys(n for e in entries for n in e["best"]))
     rows: list[list[str]] = []
     for entry in entries:
@@ -118,8 +118,8 @@ def _table(told: Report, scene: str) -> str:
     return f"<details><summary>All budgets</summary>{table}</details>"
 
 
-def _facts(told: Report, scene: dict[str, Any]) -> str:
-    crossing = next(c for c in told["crossings"] if c["scene"] == scene["scene"])
+def _facts(report: Report, scene: dict[str, Any]) -> str:
+    crossing = next(c for c in report["crossings"] if c["scene"] == scene["scene"])
     check = scene["check"]
     floor = scene["reference_psnr_floor"]
     frame, rho = "x".join(map(str, scene["frame"])), scene["rho"]
@@ -143,19 +143,19 @@ def _facts(told: Report, scene: dict[str, Any]) -> str:
 
 
 def _changes(changes: list[dict[str, Any]]) -> str:
-    """Who is better from which budget on."""
+    """Which is better, from which budget on."""
     if not changes:
         return "no XRDS with weights."
-    told = [
+    lines = [
         f"from {c['seconds']:.1f} s (budget {c['budget']:.2f}) "
         f"{'XRDS' if c['ours_better'] else 'the best OIDN mode'}"
         for c in changes
     ]
-    return f"better is {', '.join(told)}."
+    return f"better is {', '.join(lines)}."
 
 
-def _picker(told: Report) -> str:
-    picker = told["picker"]
+def _picker(report: Report) -> str:
+    picker = report["picker"]
     if picker is None:
         return ""
     line = (
@@ -175,20 +175,20 @@ def _gap(gap: float | None) -> str:
     return "–" if gap is None else f"{gap:+.2f}"
 
 
-def _machine(told: Report) -> str:
-    rows = [[key, value] for key, value in told["machine"].items()]
+def _machine(report: Report) -> str:
+    rows = [[key, value] for key, value in report["machine"].items()]
     lacking = ", ".join(
         f"{preset} x{scale} {guides}"
-        for preset, scale, guides in told["settings"]["without_weights"]
+        for preset, scale, guides in report["settings"]["without_weights"]
     )
     rows.append(["without weights, so not measured", lacking or "none"])
     return f"<h2>Machine</h2>{_rows(['', ''], rows)}"
 
 
-def _failures(told: Report) -> str:
-    if not told["failures"]:
+def _failures(report: Report) -> str:
+    if not report["failures"]:
         return ""
-    rows = [[name, error] for name, error in told["failures"].items()]
+    rows = [[name, error] for name, error in report["failures"].items()]
     return f"<h2>Left out</h2>{_rows(['what', 'why'], rows)}"
 
 

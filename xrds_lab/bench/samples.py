@@ -10,27 +10,26 @@ from __future__ import annotations
 import json
 import statistics
 import sys
-import tempfile
 import time
-from contextlib import nullcontext
 from dataclasses import asdict
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.budget import Network
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_core.atomic import write_json
 
-from .inputs import Folder, rendered, silent
+from .inputs import kept, silent
+from .journal import Strict
 from .pictures import Networks, Pictures
-from .sweep import Config
+from .sweep import Config, xrds
 from .windows import find_shots
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
+    from pathlib import Path
 
-    from .inputs import Say
-    from .windows import Shot
+    from .inputs import Folder, Progress
 
     Record = dict[str, Any]
 
@@ -40,7 +39,7 @@ LOW_SAMPLES = (4, 16, 64)
 AVERAGES = (2, 4, 8)
 """Samples per full-resolution pixel with `full` guides, which get a half of them."""
 GUIDE_SAMPLES = 4
-OIDN = {"default": DEFAULT_DENOISER, "fast": "FAST-FAST"}
+OIDN = {"default": DEFAULT_DENOISER, "fast": Denoiser.FAST_FAST}
 
 
 def samples_table(
@@ -53,24 +52,21 @@ def samples_table(
     preset: str = "fast",
     out: Path | None = None,
     weights: Path | None = None,
-    device: str = "auto",
-    progress: Say | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
     """Measure scene files over their samples; returns the JSON's content.
 
-    Arguments as of `evaluate`; ``out`` gets samples.json, stderr the table. Raises
+    Arguments as of `evaluate`; `out` gets samples.json, stderr the table. Raises
     UsageError for missing files.
     """
     shots = find_shots(scenes, windows, references)
-    networks = Networks(weights, device)
+    networks = Networks(weights, "auto")
     full = (preset, scale, "full") in networks.records
     configs = list(configurations(scale, preset, full))
     records: list[Record] = []
-    folder = nullcontext(str(cache)) if cache else tempfile.TemporaryDirectory()
-    with folder as directory:
+    with kept(cache) as folder:
         for shot in shots:
-            kept = Folder(Path(directory))
-            records += _measured(shot, kept, networks, configs, progress or silent)
+            records += _measured(Pictures(shot, folder, networks), configs, progress)
     report = {"scale": scale, "preset": preset, "records": records}
     report |= {"summary": summary(records)}
     print(text(report), file=sys.stderr)
@@ -84,30 +80,28 @@ def configurations(scale: int, preset: str, full: bool) -> Iterator[Config]:
     """All that the table compares, each once."""
     low = sorted({*LOW_SAMPLES, *(n * scale**2 for n in RATES)})
     for n in low:
-        yield _xrds(n, scale, preset, "fast", GUIDE_SAMPLES)
+        yield xrds(Network(preset, scale, "fast"), n, DEFAULT_DENOISER, GUIDE_SAMPLES)
     for n in RATES:
         for denoiser in OIDN.values():
             yield Config("oidn", n, denoiser)
     if full:
+        network = Network(preset, scale, "full")
         for average in AVERAGES:
-            yield _full(average, scale, preset)
-
-
-def _xrds(samples: int, scale: int, preset: str, guides: str, spp: int) -> Config:
-    return Config("xrds", samples, DEFAULT_DENOISER, scale, preset, guides, spp)
-
-
-def _full(average: int, scale: int, preset: str) -> Config:
-    """Half of the rays for the guides, half for the low-resolution picture."""
-    return _xrds(average * scale**2 // 2, scale, preset, "full", average // 2)
+            # half of the rays for the guides, half for the low-resolution picture
+            half = average // 2
+            yield xrds(network, average * scale**2 // 2, DEFAULT_DENOISER, half)
 
 
 def _measured(
-    shot: Shot, folder: Folder, networks: Networks, configs: list[Config], say: Say
+    pictures: Pictures, configs: list[Config], progress: Progress
 ) -> list[Record]:
     """One record per configuration."""
-    pictures = Pictures(shot, folder, networks, reference_samples=0)
-    rendered(shot, pictures.missing(configs), folder, say)
+    folder, shot = pictures.folder, pictures.shot
+    pictures.render(
+        pictures.missing(configs),
+        Strict(),
+        lambda r: progress(f"{shot.name}: rendered {r.kind} {r.samples} spp"),
+    )
     records = []
     for config in configs:
         errors = pictures.errors(config)
@@ -119,7 +113,8 @@ def _measured(
         records.append(
             asdict(config) | {"scene": shot.name, "seconds": seconds, **errors}
         )
-        say(f"{shot.name}: {config.label}: {errors['psnr']:.2f} dB, {seconds:.1f} s")
+        figures = f"{errors['psnr']:.2f} dB, {seconds:.1f} s"
+        progress(f"{shot.name}: {config.label}: {figures}")
     pictures.save()
     return records
 
@@ -135,9 +130,9 @@ def _render_seconds(folder: Folder, name: str) -> float:
 def summary(records: list[Record]) -> dict[str, Any]:
     """What the table asks, scene by scene and on the mean.
 
-    ``over_oidn``: dB over OIDN of n samples, and of its seconds the product's share;
-    ``full_over_oidn``: the same for `full` guides at so many samples on the average;
-    ``more_samples``: PSNR over LOW_SAMPLES.
+    `over_oidn`: dB over OIDN of n samples, and of its seconds the product's share;
+    `full_over_oidn`: the same for `full` guides at so many samples on the average;
+    `more_samples`: PSNR over LOW_SAMPLES.
     """
     by_scene: dict[str, dict[tuple[Any, ...], Record]] = {}
     for record in records:
@@ -167,8 +162,8 @@ def summary(records: list[Record]) -> dict[str, Any]:
             for mode, d in OIDN.items()
         },
         "more_samples": {
-            scene: [found["xrds", "fast", n]["psnr"] for n in LOW_SAMPLES]
-            for scene, found in by_scene.items()
+            scene: [by_key["xrds", "fast", n]["psnr"] for n in LOW_SAMPLES]
+            for scene, by_key in by_scene.items()
         },
     }
 
@@ -180,9 +175,9 @@ def _against(
 ) -> dict[str, Any]:
     """By scene dB better and the share of their seconds; the means of both."""
     gains, shares = {}, {}
-    for scene, found in by_scene.items():
-        gains[scene] = found[ours]["psnr"] - found[theirs]["psnr"]
-        shares[scene] = found[ours]["seconds"] / found[theirs]["seconds"]
+    for scene, by_key in by_scene.items():
+        gains[scene] = by_key[ours]["psnr"] - by_key[theirs]["psnr"]
+        shares[scene] = by_key[ours]["seconds"] / by_key[theirs]["seconds"]
     return {
         "gain": gains,
         "seconds": shares,
@@ -192,19 +187,19 @@ def _against(
 
 
 def text(report: dict[str, Any]) -> str:
-    """The summary to be read."""
-    told, scale = report["summary"], report["scale"]
+    """The summary as text."""
+    answers, scale = report["summary"], report["scale"]
     name = f"XRDS {report['preset']} x{scale}"
     blocks = [
-        _block(f"{name}, {scale**2} n spp + {GUIDE_SAMPLES}", told["over_oidn"]),
-        _block(f"{name}, full guides, n spp on average", told["full_over_oidn"]),
-        "\n".join(_growth(name, told["more_samples"])),
+        _block(f"{name}, {scale**2} n spp + {GUIDE_SAMPLES}", answers["over_oidn"]),
+        _block(f"{name}, full guides, n spp on average", answers["full_over_oidn"]),
+        "\n".join(_growth(name, answers["more_samples"])),
     ]
     return "\n\n".join(block for block in blocks if block)
 
 
 def _block(title: str, by_mode: dict[str, dict[str, Any]]) -> str:
-    columns = [(m, n, found) for m, row in by_mode.items() for n, found in row.items()]
+    columns = [(m, n, cell) for m, row in by_mode.items() for n, cell in row.items()]
     if not columns:
         return ""
     lines = [
@@ -213,8 +208,8 @@ def _block(title: str, by_mode: dict[str, dict[str, Any]]) -> str:
     ]
     for scene in columns[0][2]["gain"]:
         cells = [
-            f"{found['gain'][scene]:+.2f} ({found['seconds'][scene]:.2f})"
-            for *_, found in columns
+            f"{cell['gain'][scene]:+.2f} ({cell['seconds'][scene]:.2f})"
+            for *_, cell in columns
         ]
         lines.append(_row(scene, cells))
     means = [f"{f['mean_gain']:+.2f} ({f['median_seconds']:.2f})" for *_, f in columns]

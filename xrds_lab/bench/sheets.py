@@ -9,6 +9,7 @@ import numpy as np
 from xrds_core.atomic import replacing
 from xrds_core.metrics import to_srgb
 
+from .crops import largest
 from .table import COLUMNS
 
 if TYPE_CHECKING:
@@ -16,8 +17,9 @@ if TYPE_CHECKING:
 
     from PIL.Image import Image
 
-    Pictures = dict[str, np.ndarray]
-    Box = tuple[slice, slice]
+    from xrds_core.arrays import Array
+
+    Pictures = dict[str, Array]
 
 CROP, ZOOM, STEP = 80, 4, 8  # pixels of a crop, its enlargement, pixels between places
 CAPTION = 18  # pixels above each crop
@@ -32,7 +34,7 @@ class Sheet:
         self._rows: list[Image] = []
 
     def add(
-        self, title: str, pictures: Pictures, reference: np.ndarray, stops: float
+        self, title: str, pictures: Pictures, reference: Array, stops: float
     ) -> None:
         """Linear pictures (H, W, 3) of one case by method; without XRDS no row."""
         if "xrds" not in pictures:
@@ -47,7 +49,7 @@ class Sheet:
             "most lost to OIDN": errors["xrds"] - errors["oidn_equal_spp"],
         }
         for what, difference in places.items():
-            box = _largest(difference)
+            box = largest(difference, CROP, CROP, STEP)
             cells = [
                 _cell(COLUMNS[name], picture[box], errors[name][box])
                 for name, picture in shown.items()
@@ -73,21 +75,7 @@ class Sheet:
             whole.save(part, "JPEG", quality=QUALITY)
 
 
-def _largest(difference: np.ndarray) -> Box:
-    """The place of a crop, on a grid of STEP pixels, whose sum is the largest."""
-    height, width = (min(CROP, size) for size in difference.shape)
-    total = np.pad(difference, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    inside = (
-        total[height:, width:]
-        - total[:-height, width:]
-        - total[height:, :-width]
-        + total[:-height, :-width]
-    )[::STEP, ::STEP]
-    y, x = (int(i) * STEP for i in np.unravel_index(inside.argmax(), inside.shape))
-    return slice(y, y + height), slice(x, x + width)
-
-
-def _cell(name: str, crop: np.ndarray, error: np.ndarray | None) -> Image:
+def _cell(name: str, crop: Array, error: Array | None) -> Image:
     """A crop under its name and its own PSNR."""
     from PIL import Image, ImageDraw
 

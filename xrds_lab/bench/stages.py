@@ -19,15 +19,15 @@ from typing import TYPE_CHECKING, Any
 from xrds_core.atomic import write_json
 
 from . import machine
-from .inputs import OFF, open_scene
+from .inputs import OFF, Mode, open_scene
 from .sweep import anchor
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
     from .inputs import Request
-    from .journal import Journal
+    from .journal import Journal, Strict
     from .sweep import Config
     from .windows import Shot
 
@@ -85,7 +85,7 @@ class StageTimes:
         return None if None in peaks else int(max(peaks))
 
     def paired(self, name: str, less: str, key: str = "seconds") -> float:
-        """Median over the rounds of what ``name`` takes more than ``less``."""
+        """Median over the rounds of what `name` takes more than `less`."""
         pairs = zip(self.runs[name], self.runs[less], strict=False)
         return statistics.median(a[key] - b[key] for a, b in pairs)
 
@@ -106,9 +106,12 @@ class StageTimes:
 
     def _stages(self, config: Config, key: str) -> dict[str, float]:
         plain = config.scale == 1
+        # without weights no frame of the product was timed
+        lone = config.method != "xrds" and not self.count(XRDS_FRAME)
+        frame = PLAIN_FRAME if plain or lone else XRDS_FRAME
         stages = dict.fromkeys(STAGES, 0.0)
         stages["sync"] = self.median("sync", key)
-        stages["other"] = self.median(PLAIN_FRAME if plain else XRDS_FRAME, "other")
+        stages["other"] = self.median(frame, "other")
         beauty, *guide = config.requests()
         stages["beauty"] = self._line(beauty, key)
         if config.denoiser != OFF:
@@ -130,7 +133,9 @@ class StageTimes:
         slope = max(self.paired(high, low, key) / (more.samples - few.samples), 1e-6)
         return max(self.median(low, key) - few.samples * slope, 0.0), slope
 
-    def denoising(self, denoiser: str, scale: int = 1, key: str = "seconds") -> float:
+    def denoising(
+        self, denoiser: Mode | None, scale: int = 1, key: str = "seconds"
+    ) -> float:
         """Seconds of the denoiser on a frame of 1/scale of the size."""
         kind = "plain" if scale == 1 else "low"
         on, off = (task_name(anchor(kind, scale, mode)) for mode in (denoiser, OFF))
@@ -143,7 +148,8 @@ class StageTimes:
 
 def task_name(request: Request) -> str:
     """As a render stands in the file of runs."""
-    denoiser = "" if request.denoiser in {None, OFF} else f" {request.denoiser}"
+    undenoised = request.is_guide or request.denoiser == OFF
+    denoiser = "" if undenoised else f" {request.denoiser or 'default'}"
     return f"{request.kind} x{request.scale}, {request.samples} spp{denoiser}"
 
 
@@ -163,31 +169,28 @@ class Stopwatch:
         shot: Shot,
         times: StageTimes,
         requests: Sequence[Request],
-        journal: Journal,
+        tasks: Mapping[str, Task],
+        journal: Journal | Strict,
     ) -> None:
         self.shot, self.times, self.journal = shot, times, journal
         self.renders = {task_name(request): request for request in requests}
-        self.tasks: dict[str, Task] = {}
-
-    def add(self, name: str, task: Task) -> None:
-        """Put something beside the renders on the list; it may tell its own figures."""
-        self.tasks.setdefault(name, task)
+        self.tasks = tasks
 
     def left(self, rounds: int) -> list[str]:
         """Names of the runs still to be made, as often as they are."""
         names = [*self.renders, *self.tasks]
         return [n for n in names for _ in range(rounds - self.times.count(n))]
 
-    def measure(self, rounds: int, tell: Callable[[str], object]) -> None:
-        """Make the missing runs; ``tell`` hears the name of each one made."""
+    def measure(self, rounds: int, done: Callable[[str], object]) -> None:
+        """Make the missing runs; `done` gets the name of each."""
         for turn in range(rounds):
             missing = [n for n in self.renders if self._missing(n, turn)]
             if missing:
-                self._render(missing[turn:] + missing[:turn], tell)
+                self._render(missing[turn:] + missing[:turn], done)
             for name in [n for n in self.tasks if self._missing(n, turn)]:
                 with self.journal.attempt(self._job(name)):
                     self.times.add(name, clocked(self.tasks[name]))
-                tell(name)
+                done(name)
 
     def _missing(self, name: str, turn: int) -> bool:
         gone = self.journal.gives_up(self._job(name))
@@ -196,7 +199,7 @@ class Stopwatch:
     def _job(self, name: str) -> str:
         return f"{self.times.path.stem}: {name}"
 
-    def _render(self, names: list[str], tell: Callable[[str], object]) -> None:
+    def _render(self, names: list[str], done: Callable[[str], object]) -> None:
         """All renders of a round in one session of Cycles, so that sync shows apart."""
         from xrds_blender import run_job
 
@@ -212,7 +215,7 @@ class Stopwatch:
                         )
                         synced = True
                     self.times.add(name, run)
-                tell(name)
+                done(name)
 
         with self.journal.attempt(f"{self.shot.name}: opening the scene"):
             scene = open_scene(self.shot.path, self.shot.window.whole)
@@ -235,11 +238,11 @@ class Stopwatch:
 
 
 def clocked(task: Task) -> Run:
-    """Seconds, CPU seconds and peak memory of a call; a dict it returns goes before."""
+    """Seconds, CPU seconds and peak memory of a call; a dict it returns wins."""
     known = machine.forget_peak()
     wall, cpu = time.perf_counter(), time.process_time()
-    told = task()
-    own = told if isinstance(told, dict) else {}
+    result = task()
+    own = result if isinstance(result, dict) else {}
     return {
         "seconds": time.perf_counter() - wall,
         "cpu": time.process_time() - cpu,

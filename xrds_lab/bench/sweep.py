@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, LOW_DENOISERS, Denoiser
 
-from .inputs import OFF, Request
+from .inputs import OFF, Mode, Request
 
-METHODS = ("cycles", "oidn", "bicubic", "demodulated_bilinear", "xrds")
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
 PLAIN_SAMPLES = (1, 2, 4, 8, 16, 32, 64)
 # Every mode of the denoiser is tried on few samples; on many only those that can
 # still win: there the denoiser's own seconds count for little.
@@ -29,14 +31,15 @@ FULL_SAMPLES = (1, 2, 4)
 
 @dataclass(frozen=True)
 class Config:
-    """One way to a picture; ``denoiser`` is OFF for none.
+    """One way to a picture: Cycles, OIDN, one of `rivals.ENLARGEMENTS` or xrds.
 
-    ``samples`` are per pixel of the beauty render, at 1/``scale`` of the size.
+    `samples` are per pixel of the beauty render, at 1/`scale` of the size. `denoiser`
+    OFF is none; None is as of `Request`.
     """
 
     method: str
     samples: int
-    denoiser: str = OFF
+    denoiser: Mode | None = OFF
     scale: int = 1
     preset: str = ""
     guides: str = ""
@@ -59,6 +62,11 @@ class Config:
     def key(self) -> str:
         """Unlike that of every other configuration; in file names and journals."""
         return "_".join(str(value) for value in asdict(self).values() if value != "")
+
+    @property
+    def network(self) -> Network:
+        """The weights it needs."""
+        return Network(self.preset, self.scale, self.guides)
 
     @property
     def has_noisy_guides(self) -> bool:
@@ -88,7 +96,7 @@ class Config:
 
 @dataclass(frozen=True)
 class Sweep:
-    """Sample counts and networks of a run: (preset, scale, guides) of the weights."""
+    """Sample counts and networks of a run."""
 
     networks: tuple[Network, ...]
     plain_samples: tuple[int, ...] = PLAIN_SAMPLES
@@ -101,76 +109,86 @@ class Sweep:
     @property
     def scales(self) -> list[int]:
         """Scales of the networks, each once."""
-        return sorted({scale for _, scale, _ in self.networks})
+        return sorted({network.scale for network in self.networks})
 
     def configurations(self) -> list[Config]:
         """Everything that is compared, the rivals first."""
-        found = [Config("cycles", n) for n in self.plain_samples]
-        found += [
+        configs = [Config("cycles", n) for n in self.plain_samples]
+        configs += [
             Config("oidn", n, denoiser)
             for n in self.plain_samples
             for denoiser in DENOISERS
             if n <= FEW_SAMPLES or denoiser in MANY_DENOISERS
         ]
         for scale in self.scales:
-            found += self._baselines(scale)
+            configs += self._baselines(scale)
         for network in self.networks:
-            found += self._enlarged(*network)
-        return found
+            configs += self._enlarged(network)
+        return configs
 
     def _baselines(self, scale: int) -> list[Config]:
-        found = []
+        configs = []
         for n in self.low_samples[scale]:
-            found.append(Config("bicubic", n, DEFAULT_DENOISER, scale))
-            found += [
-                Config(
-                    "demodulated_bilinear",
-                    n,
-                    DEFAULT_DENOISER,
-                    scale,
+            bicubic = Config("bicubic", n, DEFAULT_DENOISER, scale)
+            configs.append(bicubic)
+            configs += [
+                replace(
+                    bicubic,
+                    method="demodulated_bilinear",
                     guides="fast",
-                    guide_samples=guides,
+                    guide_samples=guide_samples,
                 )
-                for guides in self.guide_samples
+                for guide_samples in self.guide_samples
             ]
-        return found
+        return configs
 
-    def _enlarged(self, preset: str, scale: int, guides: str) -> list[Config]:
-        counts = self.full_samples if guides == "full" else self.guide_samples
+    def _enlarged(self, network: Network) -> list[Config]:
+        full = network.guides == "full"
         return [
-            Config("xrds", n, denoiser, scale, preset, guides, guide)
-            for n, denoiser, guide in product(
-                self.low_samples[scale], LOW_DENOISERS, counts
+            xrds(network, n, denoiser, guide_samples)
+            for n, denoiser, guide_samples in product(
+                self.low_samples[network.scale],
+                LOW_DENOISERS,
+                self.full_samples if full else self.guide_samples,
             )
         ]
 
 
+def xrds(
+    network: Network,
+    samples: int = 1,
+    denoiser: Mode | None = OFF,
+    guide_samples: int = 0,
+) -> Config:
+    """A configuration of the product."""
+    preset, scale, guides = network
+    return Config("xrds", samples, denoiser, scale, preset, guides, guide_samples)
+
+
 def anchor(
-    kind: str, scale: int = 1, denoiser: str = OFF, more: bool = False
+    kind: str, scale: int = 1, denoiser: Mode | None = OFF, more: bool = False
 ) -> Request:
-    """A render that is timed: of few samples, or of ``more`` for the line's slope."""
+    """A render that is timed: of few samples, or of `more` for the line's slope."""
     samples = (scale if kind == "low" else 1) * (4 if more else 1)
     is_guide = kind in {"guides", "full"}
     return Request(kind, samples, scale, None if is_guide else denoiser)
 
 
-def anchors(sweep: Sweep) -> list[Request]:
-    """Renders of a whole frame that tell the seconds of every configuration.
+def anchors(configs: Iterable[Config]) -> list[Request]:
+    """Renders of a whole frame from which the seconds of every configuration follow.
 
     Two sample counts for the line through each kind of render, and every mode of the
     denoiser once.
     """
-    kinds = [("plain", 1), *(("low", scale) for scale in sweep.scales), ("guides", 1)]
-    if any(guides == "full" for *_, guides in sweep.networks):
-        kinds.append(("full", 1))
-    found = [anchor(*kind, more=more) for kind in kinds for more in (False, True)]
-    found += [anchor("plain", 1, denoiser) for denoiser in DENOISERS]
-    return found + [
-        anchor("low", scale, denoiser)
-        for scale, denoiser in product(sweep.scales, LOW_DENOISERS)
-    ]
+    needed: dict[Request, None] = {}
+    for request in (request for config in configs for request in config.requests()):
+        for more in (False, True):
+            needed[anchor(request.kind, request.scale, more=more)] = None
+        if not request.is_guide and request.denoiser != OFF:
+            needed[anchor(request.kind, request.scale, request.denoiser)] = None
+    return list(needed)
 
 
 def describe(config: Config) -> dict[str, Any]:
-    """The configuration as it stands in results.json under ``settings``."""
+    """The configuration as it stands in results.json under `settings`."""
     return {key: value for key, value in asdict(config).items() if key != "method"}

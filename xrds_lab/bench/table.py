@@ -5,6 +5,8 @@ from __future__ import annotations
 import statistics
 from typing import Any
 
+from xrds_blender.planning.budget import Network
+
 Record = dict[str, Any]
 
 # Method names as the JSON has them, and the headings of their columns.
@@ -21,6 +23,12 @@ FIGURES = ("psnr", "relmse", "relmse_trimmed", "flip", "seconds")
 _DIGITS = {"psnr": 2, "relmse": 4, "relmse_trimmed": 4, "flip": 4, "seconds": 1}
 
 
+def case(network: Network) -> str:
+    """A block of the table by name: x2 fast, or x2 fast_full for those guides."""
+    suffix = "" if network.guides == "fast" else f"_{network.guides}"
+    return f"x{network.scale} {network.preset}{suffix}"
+
+
 def gain(methods: dict[str, dict[str, Any]]) -> float | None:
     """PSNR (dB) of the product over the better of bicubic and demodulated."""
     if "xrds" not in methods:
@@ -32,7 +40,7 @@ def gain(methods: dict[str, dict[str, Any]]) -> float | None:
 def means(records: list[Record]) -> dict[str, dict[str, dict[str, Any]]]:
     """Mean figures over the scenes that have them: {scale: {preset: {method: ..}}}.
 
-    A preset with ``full`` guides is named as its weights file: PRESET_full.
+    A preset with `full` guides is named as its weights file: PRESET_full.
     """
     return _by_case(records, _mean_methods)
 
@@ -48,21 +56,18 @@ def line(record: Record) -> str:
         f"{COLUMNS[name]} {figure['psnr']:.2f}"
         for name, figure in record["methods"].items()
     )
-    return f"{record['scene']} x{record['scale']} {_preset(record)}: {figures} dB"
+    return f"{record['scene']} {_case(record)}: {figures} dB"
 
 
 def text(report: dict[str, Any]) -> str:
     """The whole report as text: a block for every scale and preset."""
-    blocks = [
-        _block(f"x{scale} {preset}", block, report)
-        for (scale, preset), block in _cases(report["scenes"]).items()
-    ]
+    blocks = [_block(block, report) for block in _cases(report["scenes"]).values()]
     return "\n\n".join(blocks)
 
 
-def _block(title: str, records: list[Record], report: dict[str, Any]) -> str:
-    scale, preset = str(records[0]["scale"]), _preset(records[0])
-    lines = [_row(f"{title}, dB", [*COLUMNS.values(), "gain", "floor"])]
+def _block(records: list[Record], report: dict[str, Any]) -> str:
+    scale, preset = _key(records[0])
+    lines = [_row(f"{_case(records[0])}, dB", [*COLUMNS.values(), "gain", "floor"])]
     for record in records:
         figures = [record["methods"].get(name, {}).get("psnr") for name in COLUMNS]
         figures += [record["gain"], record["reference_psnr_floor"]]
@@ -88,16 +93,20 @@ def _cell(value: float | None, digits: int) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _preset(record: Record) -> str:
-    full = record["guides"] != "fast"
-    return f"{record['preset']}_{record['guides']}" if full else record["preset"]
+def _case(record: Record) -> str:
+    return case(Network(record["preset"], record["scale"], record["guides"]))
+
+
+def _key(record: Record) -> tuple[str, str]:
+    """Scale and preset as they stand in the JSON."""
+    scale, preset = _case(record).removeprefix("x").split()
+    return scale, preset
 
 
 def _cases(records: list[Record]) -> dict[tuple[str, str], list[Record]]:
     cases: dict[tuple[str, str], list[Record]] = {}
     for record in records:
-        key = str(record["scale"]), _preset(record)
-        cases.setdefault(key, []).append(record)
+        cases.setdefault(_key(record), []).append(record)
     return cases
 
 

@@ -7,47 +7,47 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.planning.budget import Network
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_blender.planning.plan import savings_but
 
-from .contenders import ENLARGEMENTS
 from .inputs import open_scene
+from .rivals import ENLARGEMENTS
 from .stages import GUIDE_FILTER, PLAIN_FRAME, XRDS_FRAME, clocked, network_name
-from .sweep import Config
 
 if TYPE_CHECKING:
-    from xrds_blender.frame.job import Picture
+    from collections.abc import Iterable
 
-    from .contenders import Enlargement
+    from xrds_blender.frame.job import Picture
+    from xrds_blender.planning.budget import Network
+    from xrds_core.arrays import Array
+
     from .pictures import Networks
+    from .rivals import Enlargement
     from .stages import Run, Task
-    from .sweep import Sweep
+    from .sweep import Config
     from .windows import Shot, Window
 
-    Arrays = tuple[np.ndarray, np.ndarray]
 
-BASELINES = ("bicubic", "demodulated_bilinear")
-
-
-def tasks(shot: Shot, sweep: Sweep, networks: Networks) -> dict[str, Task]:
+def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str, Task]:
     """By name, everything that `Stopwatch` is to time beside the renders."""
     window = shot.window.whole
-    found: dict[str, Task] = {}
-    for scale in sweep.scales:
-        for method in BASELINES:
-            name = network_name(Config(method, 1, scale=scale))
-            found[name] = _baseline(ENLARGEMENTS[method], window, scale)
-    for network in sweep.networks:
-        preset, scale, guides = network
-        name = network_name(Config("xrds", 1, "", scale, preset, guides))
-        found[name] = _network(networks, network, window)
-    found[PLAIN_FRAME] = lambda: frame(shot, plain_job())[1]
-    if sweep.networks:
-        found[GUIDE_FILTER] = _guide_filter(networks, sweep.networks[0], window)
-        job = _quick_job(networks, sweep.networks[0])
-        found[XRDS_FRAME] = lambda: frame(shot, job)[1]
-    return found
+    timed: dict[str, Task] = {}
+    used: list[Network] = []
+    for config in configs:
+        name = network_name(config)
+        if config.scale == 1 or name in timed:
+            continue
+        if config.method == "xrds":
+            used.append(config.network)
+            timed[name] = _network(networks, config.network, window)
+        else:
+            timed[name] = _baseline(ENLARGEMENTS[config.method], window, config.scale)
+    timed[PLAIN_FRAME] = lambda: frame(shot, plain_job())[1]
+    if used:
+        timed[GUIDE_FILTER] = _guide_filter(networks, used[0], window)
+        job = _quick_job(networks, used[0])
+        timed[XRDS_FRAME] = lambda: frame(shot, job)[1]
+    return timed
 
 
 def plain_job() -> RenderJob:
@@ -74,7 +74,7 @@ def frame(shot: Shot, job: RenderJob) -> tuple[Picture, Run]:
     return pictures[0], run | {"other": run["seconds"] - sum(stages.values())}
 
 
-def noise(window: Window, scale: int) -> Arrays:
+def noise(window: Window, scale: int) -> tuple[Array, Array]:
     """Low-resolution picture and guide of the frame's size, in [0, 1)."""
     random = np.random.default_rng(0)
     low = -(-window.frame_height // scale), -(-window.frame_width // scale), 3
@@ -97,7 +97,7 @@ def _guide_filter(networks: Networks, network: Network, window: Window) -> Task:
     from xrds_core.guide_filter import filter_guides
 
     def task() -> Run:
-        upscaler, (_, full) = networks[network], noise(window, network[1])
+        upscaler, (_, full) = networks[network], noise(window, network.scale)
         guides = torch.from_numpy(np.concatenate((full, full), axis=-1))
         guides = guides.permute(2, 0, 1)[None].contiguous().to(upscaler.device)
 
@@ -117,8 +117,8 @@ def _network(networks: Networks, network: Network, window: Window) -> Task:
 
     def task() -> Run:
         load = clocked(lambda: networks[network])["seconds"]
-        upscaler, (low, full) = networks[network], noise(window, network[1])
-        extra = full if network[2] == "full" else None
+        upscaler, (low, full) = networks[network], noise(window, network.scale)
+        extra = full if network.guides == "full" else None
 
         def run() -> Any:
             return upscaler(low, full, full, guide_radiance=extra)
@@ -131,14 +131,11 @@ def _network(networks: Networks, network: Network, window: Window) -> Task:
 
 
 def _quick_job(networks: Networks, network: Network) -> RenderJob:
-    preset, scale, guides = network
     return RenderJob(
-        scale=scale,
-        preset=preset,
-        guides=guides,
-        samples=scale,
+        **network._asdict(),
+        samples=network.scale,
         guide_samples=1,
         device=networks.device,
         weights=networks.weights,
-        denoiser="HIGH-FAST",
+        denoiser=Denoiser.HIGH_FAST,
     )

@@ -70,6 +70,12 @@ class Shot:
         """Name of the scene: the file's without its suffix."""
         return self.path.stem
 
+    @property
+    def identity(self) -> str:
+        """Scene and frame as they stand in the names of files of seconds."""
+        frame = f"{self.window.frame_width}x{self.window.frame_height}"
+        return f"{self.name}-{self.digest}-{frame}"
+
 
 def read_windows(path: Path) -> dict[str, Window]:
     """Windows by scene name; raises UsageError when the file does not hold them."""
@@ -86,24 +92,55 @@ def read_windows(path: Path) -> dict[str, Window]:
         ) from error
 
 
-def find_shots(scenes: Sequence[Path], windows: Path, references: Path) -> list[Shot]:
-    """One Shot per scene file; raises UsageError for what is missing."""
-    known = read_windows(windows)
-    return [_shot(path, known, windows, references) for path in scenes]
+def find_shots(
+    scenes: Sequence[Path],
+    windows: Path | None,
+    references: Path | None,
+    resolution: tuple[int, int] | None = None,
+) -> list[Shot]:
+    """A shot of each scene file, of the whole frame without `windows`.
+
+    `resolution` replaces the files' own. Raises UsageError for what is missing or
+    contradicts.
+    """
+    if windows is not None and resolution is not None:
+        raise UsageError(
+            "windows lie in frames of their own size: give --windows or --resolution"
+        )
+    if references is not None and windows is None:
+        raise UsageError("references show windows: give --windows with --references")
+    known = {} if windows is None else read_windows(windows)
+    names = [path.stem for path in scenes]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise UsageError(f"two scenes are named {twice[0]}; rename one")
+    shots = []
+    for path in scenes:
+        if not path.is_file():
+            raise UsageError(f"there is no scene {path}")
+        if windows is not None and path.stem not in known:
+            raise UsageError(
+                f"{windows} has no window for {path.stem}; it has {', '.join(known)}"
+            )
+        reference = None if references is None else references / f"{path.stem}.exr"
+        if reference is not None and not reference.is_file():
+            raise UsageError(f"there is no reference {reference} for {path}")
+        window = known.get(path.stem) or _whole(path, resolution)
+        shots.append(Shot(path, window, reference, digest(path)))
+    return shots
 
 
-def _shot(
-    path: Path, known: dict[str, Window], windows: Path, references: Path
-) -> Shot:
-    if not path.is_file():
-        raise UsageError(f"there is no scene {path}")
-    if path.stem not in known:
-        names = ", ".join(known)
-        raise UsageError(f"{windows} has no window for {path.stem}; it has {names}")
-    reference = references / f"{path.stem}.exr"
-    if not reference.is_file():
-        raise UsageError(f"there is no reference {reference} for {path}")
-    return Shot(path, known[path.stem], reference, digest(path))
+def _whole(path: Path, resolution: tuple[int, int] | None) -> Window:
+    if resolution is None:
+        from xrds_blender.command.scene_file import open_scene
+
+        render = open_scene(path).render
+        share = render.resolution_percentage
+        resolution = (
+            render.resolution_x * share // 100,
+            render.resolution_y * share // 100,
+        )
+    return Window(*resolution, 0, 0, *resolution)
 
 
 def digest(path: Path) -> str:

@@ -16,11 +16,10 @@ if TYPE_CHECKING:
 
 # Of the errors of one picture, seconds per megapixel: FLIP above all.
 ERRORS_PER_MEGAPIXEL = 6.0
-OPENING = 2.0  # seconds of opening a scene file
 
 
 def render_seconds(request: Request, costs: Costs, share: float = 1.0) -> float:
-    """Predicted seconds of one render of a ``share`` of the frame's pixels."""
+    """Predicted seconds of one render of a `share` of the frame's pixels."""
     sample = costs.guide if request.kind == "guides" else costs.beauty
     seconds = request.samples * sample
     if request.denoiser not in {None, OFF}:
@@ -33,7 +32,7 @@ def config_seconds(config: Config, costs: Costs) -> float:
     seconds = costs.fixed
     seconds += sum(render_seconds(request, costs) for request in config.requests())
     if config.method == "xrds":
-        seconds += costs.network[config.preset, config.scale, config.guides]
+        seconds += costs.network[config.network]
     return seconds
 
 
@@ -42,8 +41,7 @@ def picture_seconds(config: Config, costs: Costs, window: Window) -> float:
     pixels = window.width * window.height
     seconds = ERRORS_PER_MEGAPIXEL * pixels / 1e6
     if config.method == "xrds":
-        network = config.preset, config.scale, config.guides
-        seconds += costs.network[network] * share(window)
+        seconds += costs.network[config.network] * share(window)
     return seconds
 
 
@@ -66,15 +64,15 @@ class Meter:
             "{desc}",
         )
 
-    def done(self, seconds: float, what: str = "") -> None:
+    def done(self, seconds: float, task: str) -> None:
         """Count a task of so many predicted seconds."""
-        self._bar.set_description_str(what[:60], refresh=False)
+        self._bar.set_description_str(task[:60], refresh=False)
         # a guess that was too low must not end the bar before the work
         self._bar.total = max(self._bar.total, self._bar.n + seconds)
         self._bar.update(seconds)
 
-    def say(self, line: str) -> None:
-        """A line above the bar."""
+    def write(self, line: str) -> None:
+        """Print a line above the bar."""
         self._bar.write(line, file=sys.stderr)
 
     def close(self) -> None:
@@ -82,8 +80,8 @@ class Meter:
         self._bar.close()
 
 
-def spoken(seconds: float) -> str:
-    """A duration for people: 45 s, 12 min, 3.4 h."""
+def duration(seconds: float) -> str:
+    """A duration to read: 45 s, 12 min, 3.4 h."""
     if seconds < 90:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -58,7 +58,7 @@ def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
             preset=options.preset[0],
             out=options.out,
             weights=options.weights,
-            progress=say,
+            progress=report_line,
         )
     return evaluate(
         options.scenes,
@@ -73,7 +73,7 @@ def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
         out=options.out,
         sheets=options.sheets,
         weights=options.weights,
-        progress=say,
+        progress=report_line,
     )
 
 
@@ -106,7 +106,7 @@ def _stability(options: argparse.Namespace) -> dict[str, Any]:
         cache=options.cache,
         device=options.device,
         weights=options.weights,
-        progress=say,
+        progress=report_line,
     )
     if not result["passed"]:
         raise XRDSError(f"some bounds are not held: see {options.out / 'report.md'}")
@@ -146,7 +146,7 @@ def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
         *options.resolution,
         options.rounds,
     )
-    return report(options.scenes, options.kind, setting, options.out, say)
+    return report(options.scenes, options.kind, setting, options.out, report_line)
 
 
 def add_bench(commands: Any) -> argparse.ArgumentParser:
@@ -222,6 +222,6 @@ def _bench_lines(result: dict[str, Any]) -> list[str]:
     return [f"{len(result['points'])} points", *failed]
 
 
-def say(line: str) -> None:
+def report_line(line: str) -> None:
     """Print a line of progress beside the result."""
     print(line, file=sys.stderr, flush=True)

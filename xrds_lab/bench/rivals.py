@@ -1,0 +1,23 @@
+"""Enlargements without a network, which the product is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from xrds_core import baselines, front_end
+from xrds_core.arrays import Array
+
+# (radiance, radiance before denoising, albedo, normal, scale) -> picture
+Enlargement = Callable[[Array, Array, Array, Array, int], Array]
+
+# By the method's name in every report.
+ENLARGEMENTS: dict[str, Enlargement] = {
+    "bicubic": lambda low, noisy, albedo, normal, s: baselines.bicubic(low, s),
+    "demodulated_bilinear": lambda low, noisy, albedo, normal, s: (
+        front_end.demodulated_base(low, albedo, s)
+    ),
+    "joint_bilateral": lambda low, noisy, *guides: baselines.joint_bilateral(
+        low, *guides
+    ),
+    "regressed": front_end.regressed_base,
+}
