@@ -14,7 +14,9 @@ bpy = pytest.importorskip("bpy")
 from xrds_blender.scene.guide_key import NotFollowed, guide_key
 from xrds_blender.scene.scene_facts import scene_facts
 from xrds_lab.studio import traps
-from xrds_lab.studio.nodes import Nodes
+from xrds_lab.studio.builder import Builder
+from xrds_lab.studio.geometry import box
+from xrds_lab.studio.nodes import Nodes, Surface
 
 Change = Callable[[Any], None]
 
@@ -52,7 +54,8 @@ def rich_scene() -> Any:
     scene.collection.children.link(apart)
     apart.objects.link(bpy.data.objects["Thing"])
     crowd = bpy.data.collections.new("Crowd")
-    crowd.objects.link(traps.put(traps.box(0.2, 0.2, 0.2), "Small", shader_of("Red")))
+    small = Builder(scene).put(box(0.2, 0.2, 0.2), shader_of("Red"), name="Small")
+    crowd.objects.link(small)
     copies = put_empty("Copies")
     copies.instance_type, copies.instance_collection = "COLLECTION", crowd
     return scene
@@ -290,9 +293,8 @@ def test_what_cannot_be_followed_is_said(what: str) -> None:
     elif what == "shadow catcher":
         red.is_shadow_catcher = True
     else:
-        material, nodes, out = traps.bare_material()
-        portal = nodes.add("BsdfRayPortal")
-        nodes.plug(out.inputs["Surface"], portal.outputs[0])
-        red.data.materials[0] = material
+        surface = Surface("portal")
+        surface.replace(Surface=surface.add("BsdfRayPortal").outputs[0])
+        red.data.materials[0] = surface.material
     with pytest.raises(NotFollowed, match=r"(?i)motion|hair|catcher|PORTAL"):
         key()

@@ -2,29 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 
-from ..studio.nodes import Colour, Nodes, Value
+from ..studio.nodes import Colour, Surface, Value, solid
 
 WHITE = (1.0, 1.0, 1.0)
 
 
-class Surface(Nodes):
-    """A material's nodes around its Principled BSDF, in object coordinates."""
-
-    def __init__(self, name: str, **principled: Value) -> None:
-        self.material = bpy.data.materials.new(name)
-        self.material.use_nodes = True
-        super().__init__(self.material.node_tree)
-        self.shader = self.tree.nodes["Principled BSDF"]
-        self.set(**principled)
-
-    def set(self, **principled: Value) -> None:
-        """Set inputs of the Principled BSDF, `Base_Color` for "Base Color"."""
-        for name, value in principled.items():
-            self.plug(self.shader.inputs[name.replace("_", " ")], value)
+class Solid(Surface):
+    """A material's nodes in object coordinates."""
 
     def where(self, x: float = 1.0, y: float = 1.0, z: float = 1.0) -> Value:
         """Object coordinates in metres, scaled along each axis."""
@@ -47,15 +33,10 @@ class Surface(Nodes):
         """Multiply two colours."""
         return self.mix(a, b, 1.0, "MULTIPLY")
 
-    def bump(self, height: Value, distance: float, strength: float = 1.0) -> None:
-        """Bend the surface's normal by a height of about `distance` metres."""
-        node = self.add("Bump", Height=height, Distance=distance, Strength=strength)
-        self.set(Normal=node.outputs[0])
 
-
-def planks() -> Any:
+def planks() -> bpy.types.Material:
     """Boards of oiled oak, the grain along x."""
-    wood = Surface("Planks", Roughness=0.38)
+    wood = Solid("Planks", Roughness=0.38)
     boards = wood.add(
         "TexBrick",
         Vector=wood.where(),
@@ -83,9 +64,9 @@ def planks() -> Any:
     return wood.material
 
 
-def tiles() -> Any:
+def tiles() -> bpy.types.Material:
     """Glazed wall tiles of 10 cm in the plane y = 0, a painted sun in each."""
-    tile = Surface("Tiles", Roughness=0.12, Coat_Weight=0.4, Coat_Roughness=0.05)
+    tile = Solid("Tiles", Roughness=0.12, Coat_Weight=0.4, Coat_Roughness=0.05)
     place = tile.add("SeparateXYZ", Vector=tile.where(10.0, 10.0, 10.0)).outputs
     centred = (
         tile.math("SUBTRACT", tile.math("FRACT", place[axis]), 0.5) for axis in "XZ"
@@ -113,9 +94,9 @@ def tiles() -> Any:
     return tile.material
 
 
-def linen(pale: Colour, dark: Colour, pitch: float = 0.03) -> Any:
+def linen(pale: Colour, dark: Colour, pitch: float = 0.03) -> bpy.types.Material:
     """Checked cloth, its threads some 2 mm apart; checks `pitch` metres wide."""
-    cloth = Surface("Linen", Roughness=0.9, Sheen_Weight=0.3)
+    cloth = Solid("Linen", Roughness=0.9, Sheen_Weight=0.3)
     checks = cloth.add(
         "TexChecker",
         Vector=cloth.where(),
@@ -140,16 +121,16 @@ def linen(pale: Colour, dark: Colour, pitch: float = 0.03) -> Any:
     return cloth.material
 
 
-def glass(tint: Colour = WHITE) -> Any:
+def glass(tint: Colour = WHITE) -> bpy.types.Material:
     """Clear glass."""
-    pane = Surface("Glass", Base_Color=tint, Roughness=0.0, IOR=1.47)
-    pane.set(Transmission_Weight=1.0)
-    return pane.material
+    return solid(
+        "Glass", Base_Color=tint, Roughness=0.0, IOR=1.47, Transmission_Weight=1.0
+    )
 
 
-def metal(colour: Colour, roughness: float, hammered: bool = False) -> Any:
+def metal(colour: Colour, roughness: float, hammered: bool = False) -> bpy.types.Material:
     """Bare metal with turning marks, or beaten by a hammer."""
-    bare = Surface("Metal", Base_Color=colour, Metallic=1.0, Roughness=roughness)
+    bare = Solid("Metal", Base_Color=colour, Metallic=1.0, Roughness=roughness)
     if hammered:
         bare.bump(bare.cells(75.0), 0.004, 0.6)
     else:
@@ -157,9 +138,9 @@ def metal(colour: Colour, roughness: float, hammered: bool = False) -> Any:
     return bare.material
 
 
-def stoneware() -> Any:
+def stoneware() -> bpy.types.Material:
     """Glazed stoneware: cream, iron speckles, a blue band below the rim."""
-    clay = Surface("Stoneware", Roughness=0.22, Coat_Weight=0.5, Coat_Roughness=0.08)
+    clay = Solid("Stoneware", Roughness=0.22, Coat_Weight=0.5, Coat_Roughness=0.08)
     iron = (0.16, 0.09, 0.05)
     speckles = clay.colours(clay.cells(230.0), (0.14, iron), (0.22, WHITE))
     level = clay.add("SeparateXYZ", Vector=clay.where()).outputs["Z"]
@@ -177,32 +158,32 @@ def stoneware() -> Any:
     return clay.material
 
 
-def peel(colour: Colour, shade: Colour) -> Any:
+def peel(colour: Colour, shade: Colour) -> bpy.types.Material:
     """Citrus peel: pores and a slow change of colour."""
-    skin = Surface("Peel", Roughness=0.42)
+    skin = Solid("Peel", Roughness=0.42)
     blush = skin.noise(skin.where(), 14.0, 4.0)
     skin.set(Base_Color=skin.colours(blush, (0.35, shade), (0.65, colour)))
     skin.bump(skin.cells(260.0), 0.0014)
     return skin.material
 
 
-def pages() -> Any:
+def pages() -> bpy.types.Material:
     """Pages of a closed book, seen from the side."""
-    paper = Surface("Pages", Roughness=0.8)
+    paper = Solid("Pages", Roughness=0.8)
     lines = paper.noise(paper.where(2.0, 2.0, 900.0))
     dark, pale = (0.42, 0.36, 0.27), (0.86, 0.8, 0.68)
     paper.set(Base_Color=paper.colours(lines, (0.35, dark), (0.6, pale)))
     return paper.material
 
 
-def plain(name: str, colour: Colour, roughness: float = 0.6) -> Any:
+def plain(name: str, colour: Colour, roughness: float = 0.6) -> bpy.types.Material:
     """One colour."""
-    return Surface(name, Base_Color=colour, Roughness=roughness).material
+    return solid(name, Base_Color=colour, Roughness=roughness)
 
 
-def plaster() -> Any:
+def plaster() -> bpy.types.Material:
     """Limewashed wall, rough to the touch."""
-    wall = Surface("Plaster", Roughness=0.95)
+    wall = Solid("Plaster", Roughness=0.95)
     clouds = wall.noise(wall.where(), 5.0, 9.0)
     dark, pale = (0.47, 0.39, 0.29), (0.7, 0.62, 0.5)
     wall.set(Base_Color=wall.colours(clouds, (0.3, dark), (0.7, pale)))

@@ -11,9 +11,9 @@ from typing import Any
 
 import bpy
 
-from ..studio.geometry import box, lathe, sphere, tube
+from ..studio.builder import ORIGIN, Builder, empty_scene
+from ..studio.geometry import Point, Shape, box, curved, lathe, sphere, tube
 from . import materials
-from .placing import Point, aim, curved, hang, place, put, write
 
 WALL = 0.62  # y of the tiled wall, metres behind the middle of the table
 POT = (0.5, 0.24, 0.0)
@@ -49,63 +49,68 @@ def build(width: int = 960, height: int = 540) -> Any:
 
     The picture is `width` x `height` pixels; samples are left to the caller.
     """
-    scene = _empty_scene(width, height)
-    _room()
-    _table_ware()
-    _fruit()
-    _books()
-    _recipe()
-    _lights(scene)
-    _camera(scene)
-    return scene
-
-
-def _empty_scene(width: int, height: int) -> Any:
-    """Empty the file and set what a Cycles picture needs."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    scene = bpy.context.scene
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x = width
-    scene.render.resolution_y = height
-    scene.render.resolution_percentage = 100
-    scene.cycles.device = "CPU"
-    scene.cycles.use_adaptive_sampling = False
+    kitchen = Kitchen(empty_scene(width, height))
+    scene = kitchen.scene
     scene.cycles.max_bounces = 8
     scene.cycles.blur_glossy = 0.5
     scene.view_settings.view_transform = "Standard"
+    _room(kitchen)
+    _table_ware(kitchen)
+    _fruit(kitchen)
+    _books(kitchen)
+    _recipe(kitchen)
+    _lights(kitchen)
+    kitchen.camera((0.06, -1.62, 0.58), (0.02, 0.1, 0.195), 48.0)
     return scene
 
 
-def _room() -> None:
+class Kitchen(Builder):
+    """Things under names of their own, turned by degrees."""
+
+    def stand(
+        self,
+        name: str,
+        shape: Shape,
+        material: bpy.types.Material,
+        at: Point = ORIGIN,
+        degrees: float = 0.0,
+        bevel: float = 0.0,
+    ) -> bpy.types.Object:
+        """A shape with finely rounded edges."""
+        turn = math.radians(degrees)
+        return self.put(shape, material, at, turn, bevel, name, segments=3)
+
+
+def _room(kitchen: Kitchen) -> None:
     """Table, tiled wall and plaster above it."""
     oak = materials.planks()
-    put("Table", box(2.6, 1.2, 0.05), oak, (0.0, 0.02, -0.05), bevel=0.004)
-    put("Tiles", box(4.0, 0.05, 0.5), materials.tiles(), (0.0, WALL + 0.025, 0.0))
-    put("Wall", box(4.0, 0.05, 1.5), materials.plaster(), (0.0, WALL + 0.035, 0.5))
-    put("Rail", box(4.0, 0.04, 0.022), oak, (0.0, WALL, 0.5), bevel=0.004)
+    kitchen.stand("Table", box(2.6, 1.2, 0.05), oak, (0.0, 0.02, -0.05), bevel=0.004)
+    kitchen.stand("Tiles", box(4.0, 0.05, 0.5), materials.tiles(), (0.0, WALL + 0.025, 0.0))
+    kitchen.stand("Wall", box(4.0, 0.05, 1.5), materials.plaster(), (0.0, WALL + 0.035, 0.5))
+    kitchen.stand("Rail", box(4.0, 0.04, 0.022), oak, (0.0, WALL, 0.5), bevel=0.004)
     cloth = materials.linen((0.8, 0.76, 0.68), (0.5, 0.06, 0.05))
-    put("Cloth", box(0.62, 0.46, 0.003), cloth, (0.16, -0.2, 0.0), 14.0, bevel=0.001)
+    kitchen.stand("Cloth", box(0.62, 0.46, 0.003), cloth, (0.16, -0.2, 0.0), 14.0, bevel=0.001)
 
 
-def _table_ware() -> None:
+def _table_ware(kitchen: Kitchen) -> None:
     """Carafe, tumbler, bowl and a hammered copper kettle with brass fittings."""
     inside = [(radius - 0.004, height) for radius, height in reversed(CARAFE[2:])]
     hollow = [*curved(CARAFE), *curved([*inside, (0.05, 0.012), (0.0, 0.01)])]
-    put("Carafe", lathe(hollow, 96), materials.glass(), (-0.13, 0.1, 0.0))
+    kitchen.stand("Carafe", lathe(hollow, 96), materials.glass(), (-0.13, 0.1, 0.0))
     tinted = materials.glass((0.86, 0.97, 0.93))
-    put("Tumbler", lathe(TUMBLER, 96), tinted, (0.03, -0.02, 0.003))
+    kitchen.stand("Tumbler", lathe(TUMBLER, 96), tinted, (0.03, -0.02, 0.003))
     clay = materials.stoneware()
-    put("Bowl", lathe(curved(BOWL), 96), clay, (0.27, -0.1, 0.003))
+    kitchen.stand("Bowl", lathe(curved(BOWL), 96), clay, (0.27, -0.1, 0.003))
     copper = materials.metal((0.93, 0.5, 0.36), 0.16, hammered=True)
-    put("Kettle", lathe(curved(KETTLE), 96), copper, POT)
+    kitchen.stand("Kettle", lathe(curved(KETTLE), 96), copper, POT)
     brass = materials.metal((0.88, 0.66, 0.28), 0.2)
-    put("Knob", sphere(0.018), brass, (POT[0], POT[1], 0.185))
+    kitchen.stand("Knob", sphere(0.018), brass, (POT[0], POT[1], 0.185))
     angles = [math.pi * k / 32 for k in range(33)]
     bow = [(0.105 * math.cos(a), 0.0, 0.125 + 0.13 * math.sin(a)) for a in angles]
-    put("Handle", tube(bow, 0.006, 16), brass, POT, 25.0)
+    kitchen.stand("Handle", tube(bow, 0.006, 16), brass, POT, 25.0)
 
 
-def _fruit() -> None:
+def _fruit(kitchen: Kitchen) -> None:
     """Oranges and lemons in the bowl and beside it."""
     orange = materials.peel((0.83, 0.27, 0.02), (0.7, 0.16, 0.01))
     lemon = materials.peel((0.86, 0.62, 0.05), (0.72, 0.6, 0.07))
@@ -118,11 +123,11 @@ def _fruit() -> None:
         (orange, 0.042, (-0.36, -0.18, 0.041)),
     ]
     for number, (skin, radius, at) in enumerate(spots):
-        fruit = put(f"Fruit {number}", sphere(radius, 64), skin, at)
+        fruit = kitchen.stand(f"Fruit {number}", sphere(radius, 64), skin, at)
         fruit.rotation_euler = (0.3 * number, 0.5 * number, number)
 
 
-def _books() -> None:
+def _books(kitchen: Kitchen) -> None:
     """A pile of cloth-bound books, their titles in gold."""
     gold = materials.metal((0.9, 0.7, 0.3), 0.25)
     paper = materials.pages()
@@ -138,14 +143,15 @@ def _books() -> None:
         at = (*BOOKS, level)
         for lift in (0.0, thick - 0.004):
             lid = (*BOOKS, level + lift)
-            put("Cover", box(0.27, 0.2, 0.004), cover, lid, turn, bevel=0.001)
+            kitchen.stand("Cover", box(0.27, 0.2, 0.004), cover, lid, turn, bevel=0.001)
         leaves = (*BOOKS, level + 0.004)
-        put("Pages", box(0.255, 0.19, thick - 0.008), paper, leaves, turn)
+        kitchen.stand("Pages", box(0.255, 0.19, thick - 0.008), paper, leaves, turn)
         spine = _beside(at, 0.1, turn)
-        put("Spine", box(0.27, 0.004, thick), cover, spine, turn, bevel=0.001)
+        kitchen.stand("Spine", box(0.27, 0.004, thick), cover, spine, turn, bevel=0.001)
         x, y, z = _beside(at, 0.1028, turn)
-        name = write("Title", title, 0.014, gold, (x, y, z + thick / 2 - 0.005))
-        name.rotation_euler[2] = math.radians(turn)
+        middle = (x, y, z + thick / 2 - 0.005)
+        angle = math.radians(turn)
+        kitchen.write(title, 0.014, gold, middle, angle, "Title", align_x="CENTER")
         level += thick + 0.001
 
 
@@ -156,33 +162,22 @@ def _beside(centre: Point, distance: float, degrees: float) -> Point:
     return (x + distance * math.sin(a), y - distance * math.cos(a), z)
 
 
-def _recipe() -> None:
+def _recipe(kitchen: Kitchen) -> None:
     """A framed recipe on the wall, its letters near the limit of the picture."""
     ink = materials.plain("Ink", (0.03, 0.03, 0.035))
     sheet = materials.plain("Sheet", (0.83, 0.79, 0.7), 0.9)
     frame = box(0.46, 0.025, 0.3)
-    put("Frame", frame, materials.planks(), (CARD[0], WALL - 0.002, 0.18), bevel=0.004)
-    put("Card", box(0.42, 0.004, 0.26), sheet, (CARD[0], WALL - 0.015, 0.2))
-    write("Heading", "Tea for four", 0.045, ink, (*CARD, 0.405))
-    write("Recipe", RECIPE, 0.0175, ink, (*CARD, 0.355))
+    kitchen.stand("Frame", frame, materials.planks(), (CARD[0], WALL - 0.002, 0.18), bevel=0.004)
+    kitchen.stand("Card", box(0.42, 0.004, 0.26), sheet, (CARD[0], WALL - 0.015, 0.2))
+    heading, lines = (*CARD, 0.405), (*CARD, 0.355)
+    kitchen.write("Tea for four", 0.045, ink, heading, align_x="CENTER", name="Heading")
+    kitchen.write(RECIPE, 0.0175, ink, lines, align_x="CENTER", name="Recipe")
 
 
-def _lights(scene: Any) -> None:
+def _lights(kitchen: Kitchen) -> None:
     """A window on the left, a warm lamp on the right, a dim room around."""
-    middle = (0.0, 0.15, 0.1)
-    hang("Window", (-1.7, -0.9, 1.3), middle, 0.9, 42.0, (0.86, 0.93, 1.0))
-    hang("Lamp", (1.3, -0.3, 1.1), middle, 0.25, 11.0, (1.0, 0.72, 0.42))
-    world = bpy.data.worlds.new("Room")
-    scene.world = world
-    world.use_nodes = True
-    background = world.node_tree.nodes["Background"]
-    background.inputs["Color"].default_value = (0.55, 0.6, 0.7, 1.0)
-    background.inputs["Strength"].default_value = 0.25
-
-
-def _camera(scene: Any) -> None:
-    """Look at the table from a standing person's height."""
-    camera = bpy.data.cameras.new("Camera")
-    camera.lens = 48.0
-    scene.camera = place("Camera", camera, (0.06, -1.62, 0.58))
-    aim(scene.camera, (0.02, 0.1, 0.195))
+    middle, window, lamp = (0.0, 0.15, 0.1), (-1.7, -0.9, 1.3), (1.3, -0.3, 1.1)
+    day, warm = (0.86, 0.93, 1.0), (1.0, 0.72, 0.42)
+    kitchen.lamp("AREA", 42.0, window, middle, "Window", size=0.9, color=day)
+    kitchen.lamp("AREA", 11.0, lamp, middle, "Lamp", size=0.25, color=warm)
+    kitchen.even_world((0.55, 0.6, 0.7), 0.25)

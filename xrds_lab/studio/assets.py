@@ -15,7 +15,7 @@ from xrds_core.errors import UsageError
 class Library:
     """What an asset folder holds, in the order of names.
 
-    ``folder`` has ``models/*.glb``, ``hdris/*.exr`` and ``textures/NAME/albedo.jpg``
+    `folder` has `models/*.glb`, `hdris/*.exr` and `textures/NAME/albedo.jpg`
     (and normal, roughness, displacement ... where a set has them).
     """
 
@@ -26,7 +26,7 @@ class Library:
 
     @classmethod
     def at(cls, folder: str | Path) -> Library:
-        """The library in ``folder``; UsageError where there is nothing to use."""
+        """The library in `folder`; UsageError where there is nothing to use."""
         root = Path(folder)
         found = cls(
             tuple(sorted(root.glob("models/*.glb"))),
@@ -41,19 +41,19 @@ class Library:
         return found
 
     def note(self, path: Path) -> None:
-        """Remember that the scene uses ``path``."""
+        """Remember that the scene uses `path`."""
         name = path.parent.name + "/" + path.name
         if name not in self.used:
             self.used.append(name)
 
 
 def texture_map(folder: Path, kind: str) -> Path | None:
-    """The file of one map (``albedo``, ``normal`` ...) of a texture set, if any."""
+    """The file of one map (`albedo`, `normal` ...) of a texture set, if any."""
     return next(iter(sorted(folder.glob(kind + ".*"))), None)
 
 
 def load_image(path: Path, colour: bool) -> bpy.types.Image:
-    """The picture at ``path`` as colour or as plain numbers."""
+    """The picture at `path` as colour or as plain numbers."""
     image = bpy.data.images.load(str(path), check_existing=True)
     if not colour:
         image.colorspace_settings.name = "Non-Color"
@@ -61,7 +61,7 @@ def load_image(path: Path, colour: bool) -> bpy.types.Image:
 
 
 def import_model(path: Path, size: float) -> bpy.types.Object:
-    """Import a GLB as one empty with children; stands on z = 0, longest side ``size``.
+    """Import a GLB as one empty with children; stands on z = 0, longest side `size`.
 
     Raises RuntimeError where Blender cannot read the file.
     """

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-import bpy
 import numpy as np
 
 from . import lighting, props
 from .geometry import Shape, cone, cylinder, joined, lumpy, sheet, sphere, torus, tube
-from .nodes import Nodes
+from .nodes import air
 from .stage import Stage, turned
 
 
@@ -82,7 +81,7 @@ def _pipes(stage: Stage) -> None:
 
 def _lights(stage: Stage) -> None:
     rng = stage.rng
-    lighting.plain_world(stage, props.tone(stage), rng.choice((0.0, 0.01, 0.05)))
+    stage.even_world(props.tone(stage), rng.choice((0.0, 0.01, 0.05)))
     for _ in range(rng.randint(2, 7)):
         x, y, _z = _spot(stage)
         z, colour = rng.uniform(0.3, 2.5), props.tone(stage)
@@ -109,11 +108,5 @@ def _lights(stage: Stage) -> None:
 
 def _smoke(stage: Stage) -> None:
     """Thin even smoke all around."""
-    material = bpy.data.materials.new("smoke")
-    material.use_nodes = True
-    nodes = Nodes(material.node_tree)
-    scatter = nodes.add("VolumeScatter", Density=stage.rng.uniform(0.02, 0.12))
-    output = material.node_tree.nodes["Material Output"]
-    nodes.plug(output.inputs["Volume"], scatter.outputs[0])
-    material.node_tree.nodes.remove(material.node_tree.nodes["Principled BSDF"])
-    stage.put(sphere(8.0, 16), material)
+    smoke = air("smoke", stage.rng.uniform(0.02, 0.12))
+    stage.put(sphere(8.0, 16), smoke)

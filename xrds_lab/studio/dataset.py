@@ -1,14 +1,14 @@
 """The training-set generator: random scenes rendered into small windows.
 
 Every window is rendered by the code the product renders with, at the pixel density of
-a whole frame. One ``.npz`` file per window holds, in half precision and row 0 on top,
+a whole frame. One `.npz` file per window holds, in half precision and row 0 on top,
 
-- ``reference`` (H, W, 3): radiance at full resolution, denoised;
-- ``low{S}_{i}``, ``low{S}_{i}_noisy`` (H / S, W / S, 3): radiance at 1 / S of the size
+- `reference` (H, W, 3): radiance at full resolution, denoised;
+- `low{S}_{i}`, `low{S}_{i}_noisy` (H / S, W / S, 3): radiance at 1 / S of the size
   through a box filter, denoised and as rendered, for two sample counts i = 0, 1;
-- ``guides_a``, ``guides_b`` (H, W, 6): albedo and camera-space normal, two seeds;
-- ``guide_radiance_a``, ``guide_radiance_b`` (H, W, 3): one full sample each;
-- ``meta``: a JSON string with seeds, window, sample counts, seconds and assets.
+- `guides_a`, `guides_b` (H, W, 6): albedo and camera-space normal, two seeds;
+- `guide_radiance_a`, `guide_radiance_b` (H, W, 3): one full sample each;
+- `meta`: a JSON string with seeds, window, sample counts, seconds and assets.
 """
 
 from __future__ import annotations
@@ -59,11 +59,11 @@ class Recipe:
         return self.reference_samples * (1 if self.split(seed) == "train" else 2)
 
     def split(self, seed: int) -> str:
-        """``train`` or ``validation``, by the scene's number alone."""
+        """`train` or `validation`, by the scene's number alone."""
         return "validation" if seed % VALIDATION_EVERY == 9 else "train"
 
     def path(self, seed: int, index: int) -> Path:
-        """Where window ``index`` of scene ``seed`` is written."""
+        """Where window `index` of scene `seed` is written."""
         return self.out / self.split(seed) / f"{seed:06d}_{index:02d}.npz"
 
 
@@ -102,10 +102,10 @@ def generate(
     assets: str | Path | None = None,
     **options: Any,
 ) -> int:
-    """Render ``count`` scenes from number ``seed`` on; how many windows were written.
+    """Render `count` scenes from number `seed` on; how many windows were written.
 
     Finished scenes and windows are skipped, so an interrupted run is taken up again
-    by the same call. ``options`` are further fields of Recipe.
+    by the same call. `options` are further fields of Recipe.
     """
     assets = Path(assets) if assets is not None else None
     recipe = Recipe(Path(out), tuple(scales), assets, **options)
@@ -266,7 +266,7 @@ def _arrays(passes: CyclesPasses, samples: Samples) -> tuple[Arrays, dict[str, f
 
 
 def main(arguments: Sequence[str]) -> None:
-    """``OUT ASSETS|- SEED COUNT``: generate, then leave at once."""
+    """`OUT ASSETS|- SEED COUNT`: generate, then leave at once."""
     from xrds_blender.interface.registration import ensure_registered
 
     out, assets, seed, count = arguments

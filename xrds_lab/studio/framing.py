@@ -28,7 +28,7 @@ class Window:
 
 
 def set_border(scene: bpy.types.Scene, window: Window | None) -> None:
-    """Make the scene render only ``window``, cropped; the whole frame if None."""
+    """Make the scene render only `window`, cropped; the whole frame if None."""
     render = scene.render
     render.use_border = render.use_crop_to_border = window is not None
     if window is None:
@@ -76,9 +76,9 @@ def choose(
     detail: Array,
     luminance: Array,
 ) -> list[Window]:
-    """At most ``count`` windows of a frame (width, height) that do not overlap.
+    """At most `count` windows of a frame (width, height) that do not overlap.
 
-    ``detail`` is the interest and ``luminance`` the brightness of the small picture.
+    `detail` is the interest and `luminance` the brightness of the small picture.
     Most are drawn from the best third of the places, some from the middle.
     """
     width, height = frame

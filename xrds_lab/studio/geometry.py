@@ -13,9 +13,11 @@ from itertools import pairwise
 
 import bpy
 import numpy as np
+from numpy.typing import NDArray
 
-Array = np.ndarray
+Array = NDArray[np.float64]
 Point = Sequence[float]
+Profile = Sequence[tuple[float, float]]
 
 
 @dataclass(frozen=True)
@@ -28,15 +30,15 @@ class Shape:
     smooth: bool = False
 
     def moved(self, offset: Point = (0, 0, 0), turn: float = 0.0) -> Shape:
-        """Turned by ``turn`` radians about z, then moved by ``offset``."""
+        """Turned by `turn` radians about z, then moved by `offset`."""
         return self.rotated("z", turn).shifted(offset)
 
     def shifted(self, offset: Point) -> Shape:
-        """Moved by ``offset``."""
+        """Moved by `offset`."""
         return self._with(self.vertices + np.asarray(offset, float))
 
     def rotated(self, axis: str, angle: float) -> Shape:
-        """Turned by ``angle`` radians about the axis ``x``, ``y`` or ``z``."""
+        """Turned by `angle` radians about the axis `x`, `y` or `z`."""
         if not angle:
             return self
         i, j = {"x": (1, 2), "y": (2, 0), "z": (0, 1)}[axis]
@@ -47,7 +49,7 @@ class Shape:
         return self._with(out)
 
     def bent(self, bend: Callable[[Array], Array]) -> Shape:
-        """Vertices replaced by ``bend(vertices)``."""
+        """Vertices replaced by `bend(vertices)`."""
         return self._with(bend(self.vertices))
 
     def _with(self, vertices: Array) -> Shape:
@@ -133,7 +135,23 @@ def _grid(points: Array, uv: Array, columns: int, rows: int) -> Shape:
     )
 
 
-def lathe(profile: Sequence[tuple[float, float]], segments: int = 32) -> Shape:
+def curved(points: Profile) -> list[tuple[float, float]]:
+    """A profile for `lathe`: a Catmull-Rom curve through (radius, height) points."""
+    ends = np.array([points[0], *points, points[-1]], float)
+    t = np.linspace(0.0, 1.0, 8, endpoint=False)[:, None]
+    pieces = [
+        b
+        + 0.5 * (c - a) * t
+        + (a - 2.5 * b + 2 * c - 0.5 * d) * t**2
+        + 0.5 * (3 * b - a - 3 * c + d) * t**3
+        for a, b, c, d in zip(ends, ends[1:], ends[2:], ends[3:], strict=False)
+    ]
+    curve = np.concatenate([*pieces, ends[-1:]])
+    curve[:, 0] = curve[:, 0].clip(0.0)
+    return [(float(radius), float(height)) for radius, height in curve]
+
+
+def lathe(profile: Profile, segments: int = 32) -> Shape:
     """The profile of (radius, height) points turned about z."""
     radius, height = np.array(profile, float).T
     radius = np.maximum(radius, 1e-4)
@@ -176,7 +194,7 @@ def torus(radius: float, thickness: float, segments: int = 40) -> Shape:
 
 
 def tube(points: Sequence[Point], radius: float, segments: int = 8) -> Shape:
-    """A round wire through ``points``."""
+    """A round wire through `points`."""
     path = np.asarray(points, float)
     along = np.gradient(path, axis=0)
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
@@ -192,15 +210,15 @@ def tube(points: Sequence[Point], radius: float, segments: int = 8) -> Shape:
     return _grid(vertices, uv, segments + 1, len(path))
 
 
-def rod(start: Point, end: Point, radius: float, segments: int = 8) -> Shape:
+def rod(start: Point, end: Point, radius: float) -> Shape:
     """A straight wire."""
-    return tube([start, end], radius, segments)
+    return tube([start, end], radius)
 
 
 def lumpy(
     shape: Shape, rng: np.random.Generator, size: float, strength: float
 ) -> Shape:
-    """Vertices pushed from the origin by smooth noise of wavelength ``size``."""
+    """Vertices pushed from the origin by smooth noise of wavelength `size`."""
 
     def push(vertices: Array) -> Array:
         waves = rng.normal(0, 1 / size, (12, 3))
@@ -214,7 +232,7 @@ def lumpy(
 def wall(width: float, height: float, holes: Sequence[tuple[float, ...]]) -> Shape:
     """A wall in the plane y = 0 with rectangular holes (x0, z0, x1, z1).
 
-    x runs from 0 to ``width``; the visible face looks to -y.
+    x runs from 0 to `width`; the visible face looks to -y.
     """
     xs = sorted({0.0, width, *(x for hole in holes for x in hole[0::2])})
     zs = sorted({0.0, height, *(z for hole in holes for z in hole[1::2])})

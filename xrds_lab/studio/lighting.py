@@ -4,33 +4,13 @@ from __future__ import annotations
 
 import math
 
-import bpy
-
 from . import patterns
 from .assets import load_image
 from .geometry import Point, box, cylinder, lathe, sphere
-from .nodes import Colour, Nodes
-from .stage import Stage, aim
+from .nodes import Colour
+from .stage import Stage
 
 WARM = ((1.0, 0.75, 0.5), (1.0, 0.85, 0.7), (1.0, 1.0, 1.0), (0.8, 0.9, 1.0))
-
-
-def _world(stage: Stage) -> Nodes:
-    world = bpy.data.worlds.new("world")
-    world.use_nodes = True
-    stage.scene.world = world
-    return Nodes(world.node_tree)
-
-
-def _background(nodes: Nodes, colour: object, strength: float) -> None:
-    node = nodes.tree.nodes["Background"]
-    nodes.plug(node.inputs["Color"], colour)
-    node.inputs["Strength"].default_value = strength
-
-
-def plain_world(stage: Stage, colour: Colour, strength: float) -> None:
-    """The same light from everywhere."""
-    _background(_world(stage), colour, strength)
 
 
 def sky(stage: Stage, strength: float = 1.0) -> None:
@@ -42,7 +22,7 @@ def sky(stage: Stage, strength: float = 1.0) -> None:
 
 
 def _picture_sky(stage: Stage, strength: float) -> None:
-    nodes, rng = _world(stage), stage.rng
+    nodes, rng = stage.world(), stage.rng
     path = rng.choice(stage.library.skies)
     stage.library.note(path)
     at = nodes.add(
@@ -54,13 +34,11 @@ def _picture_sky(stage: Stage, strength: float) -> None:
     image.colorspace_settings.name = "Linear Rec.709"
     picture = nodes.add("TexEnvironment", image=image, Vector=at.outputs[0])
     # Night skies are made bright enough to light a scene.
-    _background(
-        nodes, picture.outputs["Color"], strength * (8 if "night" in path.name else 1)
-    )
+    nodes.light(picture.outputs["Color"], strength * (8 if "night" in path.name else 1))
 
 
 def _painted_sky(stage: Stage, strength: float) -> None:
-    nodes, rng = _world(stage), stage.rng
+    nodes, rng = stage.world(), stage.rng
     way = nodes.add("TexCoord").outputs["Generated"]
     height = nodes.add("SeparateXYZ", Vector=way).outputs["Z"]
     zenith = (
@@ -78,52 +56,40 @@ def _painted_sky(stage: Stage, strength: float) -> None:
             noise.outputs[0], [(0.5, (0,) * 3), (0.7, (1,) * 3)], "EASE"
         )
         base = nodes.mix(base, (0.9, 0.9, 0.9), clouds)
-    _background(nodes, base, strength)
+    nodes.light(base, strength)
 
 
-def sun(stage: Stage, toward: Point | None = None, strength: float = 4.0) -> None:
-    """A sun; ``toward`` is the way its light goes, any downward one if None."""
+def sun(stage: Stage, strength: float = 4.0) -> None:
+    """A sun that shines downward from anywhere."""
     rng = stage.rng
-    lamp = bpy.data.lights.new("sun", "SUN")
-    lamp.energy = strength * rng.uniform(0.5, 2.0)
-    lamp.angle = math.radians(rng.choice((0.5, 0.5, 2.0, 8.0)))
-    lamp.color = rng.choice(WARM)
+    energy = strength * rng.uniform(0.5, 2.0)
+    angle = math.radians(rng.choice((0.5, 0.5, 2.0, 8.0)))
+    colour = rng.choice(WARM)
     turn = rng.uniform(0, 2 * math.pi)
-    way = toward or (math.cos(turn), math.sin(turn), -rng.uniform(0.3, 1.5))
-    _hung(stage, lamp, (0, 0, 0), way)
+    way = (math.cos(turn), math.sin(turn), -rng.uniform(0.3, 1.5))
+    stage.lamp("SUN", energy, (0, 0, 0), way, "sun", angle=angle, color=colour)
 
 
 def area(
     stage: Stage, at: Point, target: Point, size: float, watts: float, colour: Colour
 ) -> None:
-    """A rectangular lamp at ``at`` shining at ``target``."""
-    lamp = bpy.data.lights.new("area", "AREA")
-    lamp.shape, lamp.size = "RECTANGLE", size
-    lamp.size_y = size * stage.rng.uniform(0.3, 1.0)
-    lamp.energy, lamp.color = watts, colour
-    _hung(stage, lamp, at, target)
+    """A rectangular lamp at `at` shining at `target`."""
+    size_y = size * stage.rng.uniform(0.3, 1.0)
+    shape = {"shape": "RECTANGLE", "size": size, "size_y": size_y}
+    stage.lamp("AREA", watts, at, target, "area", color=colour, **shape)
 
 
 def point(stage: Stage, at: Point, watts: float, colour: Colour, radius: float) -> None:
     """A small round lamp."""
-    lamp = bpy.data.lights.new("point", "POINT")
-    lamp.energy, lamp.color, lamp.shadow_soft_size = watts, colour, radius
-    _hung(stage, lamp, at, (at[0], at[1], at[2] - 1))
+    below = (at[0], at[1], at[2] - 1)
+    light = {"color": colour, "shadow_soft_size": radius}
+    stage.lamp("POINT", watts, at, below, "point", **light)
 
 
 def spot(stage: Stage, at: Point, target: Point, watts: float, colour: Colour) -> None:
     """A spot light."""
-    lamp = bpy.data.lights.new("spot", "SPOT")
-    lamp.energy, lamp.color = watts, colour
-    lamp.spot_size = stage.rng.uniform(0.4, 1.4)
-    lamp.shadow_soft_size = 0.05
-    _hung(stage, lamp, at, target)
-
-
-def _hung(stage: Stage, lamp: bpy.types.Light, at: Point, target: Point) -> None:
-    thing = bpy.data.objects.new(lamp.name, lamp)
-    stage.scene.collection.objects.link(thing)
-    aim(thing, at, target)
+    cone = {"spot_size": stage.rng.uniform(0.4, 1.4), "shadow_soft_size": 0.05}
+    stage.lamp("SPOT", watts, at, target, "spot", color=colour, **cone)
 
 
 def softbox(stage: Stage, at: Point, target: Point, size: float, watts: float) -> None:
@@ -133,7 +99,7 @@ def softbox(stage: Stage, at: Point, target: Point, size: float, watts: float) -
 
 
 def pendant(stage: Stage, at: Point, drop: float, watts: float) -> None:
-    """A lamp with an open shade hanging ``drop`` metres below ``at``."""
+    """A lamp with an open shade hanging `drop` metres below `at`."""
     rng, wide = stage.rng, stage.rng.uniform(0.1, 0.3)
     x, y, z = at[0], at[1], at[2] - drop
     tall = wide * rng.uniform(0.5, 1.5)

@@ -10,29 +10,18 @@ import bpy
 
 from . import patterns
 from .assets import Library, load_image, texture_map
-from .nodes import Nodes, Value
+from .nodes import Surface, Value, solid
 
 
 class Painter:
-    """Makes materials; the choices come from ``rng`` and, if given, the library.
+    """Makes materials; the choices come from `rng` and, if given, the library.
 
-    ``size`` of a material is the length in metres over which it should show detail.
+    `size` of a material is the length in metres over which it should show detail.
     """
 
     def __init__(self, rng: random.Random, library: Library | None) -> None:
         self.rng = rng
         self.library = library
-
-    def _new(self, name: str) -> tuple[bpy.types.Material, Nodes, bpy.types.Node]:
-        material = bpy.data.materials.new(name)
-        material.use_nodes = True
-        nodes = Nodes(material.node_tree)
-        return material, nodes, material.node_tree.nodes["Principled BSDF"]
-
-    def _solid(self, name: str, **inputs: Value) -> bpy.types.Material:
-        material, nodes, shader = self._new(name)
-        _set(nodes, shader, inputs)
-        return material
 
     def any(self, size: float = 1.0) -> bpy.types.Material:
         """Any material that may cover a thing."""
@@ -75,7 +64,7 @@ class Painter:
     def painted(self, size: float = 1.0) -> bpy.types.Material:
         """One colour, any roughness."""
         rng = self.rng
-        return self._solid(
+        return solid(
             "painted",
             Base_Color=patterns.colour(rng),
             Roughness=rng.uniform(0.05, 1.0),
@@ -85,81 +74,77 @@ class Painter:
     def plaster(self, size: float = 1.0) -> bpy.types.Material:
         """Light paint with fine unevenness."""
         rng = self.rng
-        material, nodes, shader = self._new("plaster")
+        surface = Surface("plaster")
         light = rng.random() < 0.7
         base = patterns.colour(rng, 0.4 if light else 0.05, 0.9)
-        _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.4, 0.95)})
-        height = patterns._noise(
-            nodes, rng, patterns.placed(nodes, rng, rng.uniform(5, 90))
+        surface.set(Base_Color=base, Roughness=rng.uniform(0.4, 0.95))
+        height = patterns.noise(
+            surface, rng, patterns.placed(surface, rng, rng.uniform(5, 90))
         )
-        self._bump(nodes, shader, height, 0.002)
-        return material
+        self._bump(surface, height, 0.002)
+        return surface.material
 
     def patterned(self, size: float = 1.0) -> bpy.types.Material:
         """A random pattern drives colour, often roughness and bump."""
         rng = self.rng
-        material, nodes, shader = self._new("patterned")
+        surface = Surface("patterned")
         density = 2 ** rng.uniform(0, 5.5) / size
         at = patterns.placed(
-            nodes, rng, density, rng.choice((1, 1, 1, rng.uniform(0.1, 4)))
+            surface, rng, density, rng.choice((1, 1, 1, rng.uniform(0.1, 4)))
         )
-        value = patterns.pattern(nodes, rng, at)
+        value = patterns.pattern(surface, rng, at)
         base = patterns.tinted(
-            nodes, rng, value, patterns.colour(rng), rng.random() < 0.5
+            surface, rng, value, patterns.colour(rng), rng.random() < 0.5
         )
-        _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.1, 1.0)})
-        self._drive(nodes, shader, value, 0.3 / density)
-        return material
+        surface.set(Base_Color=base, Roughness=rng.uniform(0.1, 1.0))
+        self._drive(surface, value, 0.3 / density)
+        return surface.material
 
     def wallpaper(self, size: float = 1.0) -> bpy.types.Material:
         """A regular, fine, two or three coloured pattern."""
         rng = self.rng
-        material, nodes, shader = self._new("wallpaper")
-        at = patterns.placed(nodes, rng, 2 ** rng.uniform(1.5, 5.0))
+        surface = Surface("wallpaper")
+        at = patterns.placed(surface, rng, 2 ** rng.uniform(1.5, 5.0))
         makers = (
-            patterns._magic,
-            patterns._checker,
-            patterns._wave,
-            patterns._weave,
-            patterns._voronoi,
-            patterns._brick,
+            patterns.magic,
+            patterns.checker,
+            patterns.wave,
+            patterns.weave,
+            patterns.voronoi,
+            patterns.brick,
         )
-        value = rng.choice(makers)(nodes, rng, at)
-        base = patterns.tinted(nodes, rng, value, patterns.colour(rng, 0.15), False)
-        _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.3, 0.9)})
-        return material
+        value = rng.choice(makers)(surface, rng, at)
+        base = patterns.tinted(surface, rng, value, patterns.colour(rng, 0.15), False)
+        surface.set(Base_Color=base, Roughness=rng.uniform(0.3, 0.9))
+        return surface.material
 
     def wood(self, size: float = 1.0) -> bpy.types.Material:
         """Grained wood, raw or varnished."""
         rng = self.rng
         if self.library and rng.random() < 0.4:
             return self.pictured(size, ("wood", "Wood", "veneer", "Bark"))
-        material, nodes, shader = self._new("wood")
-        value = patterns.grain(nodes, rng, 2 ** rng.uniform(2, 5) / max(size, 0.3))
-        base = patterns.tinted(nodes, rng, value, patterns.wood_colour(rng), False)
+        surface = Surface("wood")
+        value = patterns.grain(surface, rng, 2 ** rng.uniform(2, 5) / max(size, 0.3))
+        base = patterns.tinted(surface, rng, value, patterns.wood_colour(rng), False)
         coat = rng.choice((0.0, 0.0, 1.0))
-        _set(
-            nodes,
-            shader,
-            {
-                "Base_Color": base,
-                "Roughness": rng.uniform(0.2, 0.7),
-                "Coat_Weight": coat,
-                "Coat_Roughness": rng.uniform(0.01, 0.2),
-            },
+        surface.set(
+            Base_Color=base,
+            Roughness=rng.uniform(0.2, 0.7),
+            Coat_Weight=coat,
+            Coat_Roughness=rng.uniform(0.01, 0.2),
         )
-        self._drive(nodes, shader, value, 0.002)
-        return material
+        self._drive(surface, value, 0.002)
+        return surface.material
 
     def boards(self, size: float = 1.0) -> bpy.types.Material:
         """A floor of boards with grain and gaps."""
         rng = self.rng
-        material, nodes, shader = self._new("boards")
-        value = patterns.grain(nodes, rng, rng.uniform(4, 14))
-        base = patterns.tinted(nodes, rng, value, patterns.wood_colour(rng), False)
-        bricks = nodes.add(
+        surface = Surface("boards")
+        value = patterns.grain(surface, rng, rng.uniform(4, 14))
+        base = patterns.tinted(surface, rng, value, patterns.wood_colour(rng), False)
+        bricks = surface.add(
             "TexBrick",
-            Vector=patterns.placed(nodes, rng, 1.0),
+            Vector=patterns.placed(surface, rng, 1.0),
             Scale=1.0,
             Color1=(1, 1, 1),
             Color2=(0.45, 0.45, 0.45),
@@ -168,22 +153,22 @@ class Painter:
             Brick_Width=rng.uniform(0.6, 2.0),
             Row_Height=rng.uniform(0.06, 0.2),
         )
-        base = nodes.mix(base, bricks.outputs["Color"], 1.0, "MULTIPLY")
-        _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.1, 0.6)})
-        self._bump(nodes, shader, bricks.outputs["Color"], 0.003)
-        return material
+        base = surface.mix(base, bricks.outputs["Color"], 1.0, "MULTIPLY")
+        surface.set(Base_Color=base, Roughness=rng.uniform(0.1, 0.6))
+        self._bump(surface, bricks.outputs["Color"], 0.003)
+        return surface.material
 
     def tiles(self, size: float = 1.0) -> bpy.types.Material:
         """Glazed or stone tiles with joints."""
         rng = self.rng
-        material, nodes, shader = self._new("tiles")
+        surface = Surface("tiles")
         edge = rng.uniform(0.05, 0.6)
         first = patterns.colour(rng, 0.1)
-        bricks = nodes.add(
+        bricks = surface.add(
             "TexBrick",
             offset=rng.choice((0.0, 0.5)),
             Scale=1.0,
-            Vector=patterns.placed(nodes, rng, 1.0),
+            Vector=patterns.placed(surface, rng, 1.0),
             Color1=first,
             Color2=rng.choice((patterns.shade(rng, first, 0.2), patterns.colour(rng))),
             Mortar=patterns.colour(rng, 0.05, 0.5),
@@ -191,17 +176,15 @@ class Painter:
             Brick_Width=edge * rng.choice((1, 1, 2)),
             Row_Height=edge,
         )
-        rough = nodes.span(bricks.outputs["Fac"], rng.uniform(0.02, 0.3), 0.8)
-        _set(nodes, shader, {"Base_Color": bricks.outputs["Color"], "Roughness": rough})
-        self._bump(
-            nodes, shader, nodes.math("SUBTRACT", 1.0, bricks.outputs["Fac"]), 0.003
-        )
-        return material
+        rough = surface.span(bricks.outputs["Fac"], rng.uniform(0.02, 0.3), 0.8)
+        surface.set(Base_Color=bricks.outputs["Color"], Roughness=rough)
+        self._bump(surface, surface.math("SUBTRACT", 1.0, bricks.outputs["Fac"]), 0.003)
+        return surface.material
 
     def metal(self, size: float = 1.0) -> bpy.types.Material:
         """Steel, brass, copper or coloured metal; polished, brushed or patterned."""
         rng = self.rng
-        material, nodes, shader = self._new("metal")
+        surface = Surface("metal")
         base = rng.choice(
             (
                 (0.9, 0.9, 0.9),
@@ -214,78 +197,71 @@ class Painter:
         rough: Value = rng.choice((0.02, rng.uniform(0.05, 0.5), rng.uniform(0.1, 0.4)))
         if rng.random() < 0.4:
             value = patterns.pattern(
-                nodes,
+                surface,
                 rng,
                 patterns.placed(
-                    nodes, rng, 2 ** rng.uniform(1, 5) / size, rng.choice((1, 0.03, 20))
+                    surface,
+                    rng,
+                    2 ** rng.uniform(1, 5) / size,
+                    rng.choice((1, 0.03, 20)),
                 ),
             )
-            rough = nodes.span(value, rng.uniform(0.02, 0.2), rng.uniform(0.2, 0.6))
-        _set(
-            nodes,
-            shader,
-            {
-                "Base_Color": base,
-                "Metallic": 1.0,
-                "Roughness": rough,
-                "Anisotropic": rng.choice((0.0, 0.0, 0.7)),
-            },
+            rough = surface.span(value, rng.uniform(0.02, 0.2), rng.uniform(0.2, 0.6))
+        surface.set(
+            Base_Color=base,
+            Metallic=1.0,
+            Roughness=rough,
+            Anisotropic=rng.choice((0.0, 0.0, 0.7)),
         )
-        return material
+        return surface.material
 
     def coated(self, size: float = 1.0) -> bpy.types.Material:
         """Car paint, lacquer, porcelain: gloss over a colour, sometimes flakes."""
         rng = self.rng
-        material, nodes, shader = self._new("coated")
+        surface = Surface("coated")
         base: Value = patterns.colour(rng, 0.02, 0.7)
         if rng.random() < 0.4:
-            cells = nodes.add(
-                "TexVoronoi", Vector=patterns.placed(nodes, rng, 300), Scale=1.0
+            cells = surface.add(
+                "TexVoronoi", Vector=patterns.placed(surface, rng, 300), Scale=1.0
             )
-            base = nodes.mix(base, patterns.shade(rng, base), cells.outputs["Color"])
+            base = surface.mix(base, patterns.shade(rng, base), cells.outputs["Color"])
         elif rng.random() < 0.4:
-            value = patterns.pattern(nodes, rng, patterns.placed(nodes, rng, 6 / size))
-            base = patterns.tinted(nodes, rng, value, base, True)
-        _set(
-            nodes,
-            shader,
-            {
-                "Base_Color": base,
-                "Metallic": rng.choice((0.0, 0.0, 0.8)),
-                "Roughness": rng.uniform(0.15, 0.6),
-                "Coat_Weight": 1.0,
-                "Coat_Roughness": rng.choice((0.0, 0.02, 0.1)),
-            },
+            value = patterns.pattern(
+                surface, rng, patterns.placed(surface, rng, 6 / size)
+            )
+            base = patterns.tinted(surface, rng, value, base, True)
+        surface.set(
+            Base_Color=base,
+            Metallic=rng.choice((0.0, 0.0, 0.8)),
+            Roughness=rng.uniform(0.15, 0.6),
+            Coat_Weight=1.0,
+            Coat_Roughness=rng.choice((0.0, 0.02, 0.1)),
         )
-        return material
+        return surface.material
 
     def cloth(self, size: float = 1.0) -> bpy.types.Material:
         """Woven cloth with sheen."""
         rng = self.rng
-        material, nodes, shader = self._new("cloth")
-        weave = patterns._weave(
-            nodes, rng, patterns.placed(nodes, rng, rng.uniform(30, 200))
+        surface = Surface("cloth")
+        weave = patterns.weave(
+            surface, rng, patterns.placed(surface, rng, rng.uniform(30, 200))
         )
         value = weave
         if rng.random() < 0.6:
             value = patterns.pattern(
-                nodes, rng, patterns.placed(nodes, rng, rng.uniform(3, 30))
+                surface, rng, patterns.placed(surface, rng, rng.uniform(3, 30))
             )
         base = patterns.tinted(
-            nodes, rng, value, patterns.colour(rng), rng.random() < 0.3
+            surface, rng, value, patterns.colour(rng), rng.random() < 0.3
         )
-        _set(
-            nodes,
-            shader,
-            {"Base_Color": base, "Roughness": 0.9, "Sheen_Weight": rng.uniform(0, 1)},
-        )
-        self._bump(nodes, shader, weave, 0.002)
-        return material
+        surface.set(Base_Color=base, Roughness=0.9, Sheen_Weight=rng.uniform(0, 1))
+        self._bump(surface, weave, 0.002)
+        return surface.material
 
     def wax(self, size: float = 1.0) -> bpy.types.Material:
         """Subsurface scattering."""
         rng = self.rng
-        return self._solid(
+        return solid(
             "wax",
             Base_Color=patterns.colour(rng, 0.3),
             Roughness=rng.uniform(0.2, 0.6),
@@ -297,7 +273,7 @@ class Painter:
         """Clear or tinted, smooth or frosted glass."""
         rng = self.rng
         tint = rng.choice(((1.0, 1.0, 1.0), patterns.colour(rng, 0.6, 1.0)))
-        return self._solid(
+        return solid(
             "glass",
             Base_Color=tint,
             Transmission_Weight=1.0,
@@ -307,83 +283,75 @@ class Painter:
 
     def pane(self) -> bpy.types.Material:
         """Window glass: thin, does not shut out the sun."""
-        return self._solid(
+        return solid(
             "pane", Base_Color=(1, 1, 1), Roughness=0.0, Alpha=0.1, Metallic=1.0
         )
 
     def mirror(self) -> bpy.types.Material:
         """A clean mirror."""
-        return self._solid(
-            "mirror", Base_Color=(0.95,) * 3, Metallic=1.0, Roughness=0.0
-        )
+        return solid("mirror", Base_Color=(0.95,) * 3, Metallic=1.0, Roughness=0.0)
 
     def glowing(
         self, size: float = 1.0, power: float | None = None
     ) -> bpy.types.Material:
         """A lit surface, plain or with a pattern."""
         rng = self.rng
-        material, nodes, shader = self._new("glowing")
+        surface = Surface("glowing")
         base: Value = patterns.colour(rng, 0.4, 1.0)
         if rng.random() < 0.5:
-            value = patterns.pattern(nodes, rng, patterns.placed(nodes, rng, 8 / size))
-            base = patterns.tinted(nodes, rng, value, base, True)
+            value = patterns.pattern(
+                surface, rng, patterns.placed(surface, rng, 8 / size)
+            )
+            base = patterns.tinted(surface, rng, value, base, True)
         strength = power if power is not None else 2 ** rng.uniform(0, 4)
-        _set(
-            nodes,
-            shader,
-            {
-                "Base_Color": (0.1,) * 3,
-                "Emission_Color": base,
-                "Emission_Strength": strength,
-            },
+        surface.set(
+            Base_Color=(0.1,) * 3,
+            Emission_Color=base,
+            Emission_Strength=strength,
         )
-        return material
+        return surface.material
 
     def leaves(self, alpha: bool = False) -> bpy.types.Material:
-        """Foliage, each island another green; ``alpha`` cuts it to ragged cards."""
+        """Foliage, each island another green; `alpha` cuts it to ragged cards."""
         rng = self.rng
-        material, nodes, shader = self._new("leaves")
-        island = nodes.add("NewGeometry").outputs["Random Per Island"]
+        surface = Surface("leaves")
+        island = surface.add("NewGeometry").outputs["Random Per Island"]
         green = (
             rng.uniform(0.02, 0.2),
             rng.uniform(0.08, 0.3),
             rng.uniform(0.01, 0.08),
         )
-        base = patterns.tinted(nodes, rng, island, green, False)
-        _set(nodes, shader, {"Base_Color": base, "Roughness": rng.uniform(0.3, 0.8)})
+        base = patterns.tinted(surface, rng, island, green, False)
+        surface.set(Base_Color=base, Roughness=rng.uniform(0.3, 0.8))
         if alpha:
-            at = patterns.placed(nodes, rng, rng.uniform(10, 60))
-            holes = nodes.math("GREATER_THAN", patterns._noise(nodes, rng, at), 0.5)
-            nodes.plug(shader.inputs["Alpha"], holes)
-        return material
+            at = patterns.placed(surface, rng, rng.uniform(10, 60))
+            holes = surface.math("GREATER_THAN", patterns.noise(surface, rng, at), 0.5)
+            surface.set(Alpha=holes)
+        return surface.material
 
     def varied(self, gloss: bool = True) -> bpy.types.Material:
         """Each object and each island of it another colour: books, toys, tiles."""
         rng = self.rng
-        material, nodes, shader = self._new("varied")
-        island = nodes.add("NewGeometry").outputs["Random Per Island"]
-        thing = nodes.add("ObjectInfo").outputs["Random"]
-        value = nodes.math("FRACT", nodes.math("ADD", island, thing))
+        surface = Surface("varied")
+        island = surface.add("NewGeometry").outputs["Random Per Island"]
+        thing = surface.add("ObjectInfo").outputs["Random"]
+        value = surface.math("FRACT", surface.math("ADD", island, thing))
         stops = [(i / 8, patterns.colour(rng)) for i in range(8)]
-        base = nodes.ramp(value, stops, "CONSTANT")
+        base = surface.ramp(value, stops, "CONSTANT")
         if rng.random() < 0.5:
             lines = patterns.pattern(
-                nodes, rng, patterns.placed(nodes, rng, rng.uniform(20, 90))
+                surface, rng, patterns.placed(surface, rng, rng.uniform(20, 90))
             )
-            base = nodes.mix(
-                base, patterns.colour(rng), nodes.math("GREATER_THAN", lines, 0.6)
+            base = surface.mix(
+                base, patterns.colour(rng), surface.math("GREATER_THAN", lines, 0.6)
             )
-        _set(
-            nodes,
-            shader,
-            {"Base_Color": base, "Roughness": rng.uniform(0.1 if gloss else 0.5, 0.9)},
-        )
-        return material
+        surface.set(Base_Color=base, Roughness=rng.uniform(0.1 if gloss else 0.5, 0.9))
+        return surface.material
 
     def pictured(
         self, size: float = 1.0, words: tuple[str, ...] = ()
     ) -> bpy.types.Material:
-        """A texture set of the library (whose name has one of ``words``)."""
+        """A texture set of the library (whose name has one of `words`)."""
         if self.library is None:
             return self.patterned(size)
         sets = [
@@ -392,22 +360,21 @@ class Painter:
             if not words or any(w in s.name for w in words)
         ]
         folder = self.rng.choice(sets or list(self.library.textures))
-        material, nodes, shader = self._new(folder.name)
+        surface = Surface(folder.name)
         density = 2 ** self.rng.uniform(-1, 1.5) / min(max(size, 0.1), 2.0)
-        at = patterns.placed(nodes, self.rng, density)
-        self._maps(nodes, shader, folder, at, 0.03 / density)
-        return material
+        at = patterns.placed(surface, self.rng, density)
+        self._maps(surface, folder, at, 0.03 / density)
+        return surface.material
 
     def _maps(
         self,
-        nodes: Nodes,
-        shader: bpy.types.Node,
+        surface: Surface,
         folder: Path,
         at: Value,
         depth: float,
     ) -> None:
         maps = {
-            kind: self._map(nodes, folder, kind, at)
+            kind: self._map(surface, folder, kind, at)
             for kind in (
                 "albedo",
                 "roughness",
@@ -420,53 +387,38 @@ class Painter:
         base = maps["albedo"]
         if self.rng.random() < 0.4:
             tint = patterns.colour(self.rng, 0.3, 1.0)
-            base = nodes.mix(base, tint, self.rng.uniform(0.2, 1.0), "MULTIPLY")
+            base = surface.mix(base, tint, self.rng.uniform(0.2, 1.0), "MULTIPLY")
         rough = maps["roughness"]
-        _set(
-            nodes,
-            shader,
-            {
-                "Base_Color": base,
-                "Roughness": self.rng.uniform(0.2, 0.9) if rough is None else rough,
-                "Metallic": maps["metallic"],
-                "Alpha": maps["opacity"],
-                "Coat_Weight": self.rng.choice((0.0, 0.0, 0.0, 0.7)),
-            },
+        surface.set(
+            Base_Color=base,
+            Roughness=self.rng.uniform(0.2, 0.9) if rough is None else rough,
+            Metallic=maps["metallic"],
+            Alpha=maps["opacity"],
+            Coat_Weight=self.rng.choice((0.0, 0.0, 0.0, 0.7)),
         )
         if maps["normal"] is not None:
-            node = nodes.add("NormalMap", Color=maps["normal"])
-            nodes.plug(shader.inputs["Normal"], node.outputs[0])
+            node = surface.add("NormalMap", Color=maps["normal"])
+            surface.set(Normal=node.outputs[0])
         elif maps["displacement"] is not None:
-            self._bump(nodes, shader, maps["displacement"], depth)
+            self._bump(surface, maps["displacement"], depth)
 
-    def _map(self, nodes: Nodes, folder: Path, kind: str, at: Value) -> Value | None:
+    def _map(
+        self, surface: Surface, folder: Path, kind: str, at: Value
+    ) -> Value | None:
         path = texture_map(folder, kind)
         if path is None or self.library is None:
             return None
         self.library.note(path)
         image = load_image(path, colour=kind == "albedo")
-        return nodes.add("TexImage", image=image, Vector=at).outputs["Color"]
+        return surface.add("TexImage", image=image, Vector=at).outputs["Color"]
 
-    def _drive(
-        self, nodes: Nodes, shader: bpy.types.Node, value: Value, depth: float
-    ) -> None:
+    def _drive(self, surface: Surface, value: Value, depth: float) -> None:
         """Let a pattern change roughness and height as well, sometimes."""
         if self.rng.random() < 0.4:
             low, high = sorted(self.rng.uniform(0.05, 1.0) for _ in range(2))
-            nodes.plug(shader.inputs["Roughness"], nodes.span(value, low, high))
+            surface.set(Roughness=surface.span(value, low, high))
         if self.rng.random() < 0.5:
-            self._bump(nodes, shader, value, depth)
+            self._bump(surface, value, depth)
 
-    def _bump(
-        self, nodes: Nodes, shader: bpy.types.Node, height: Value, depth: float
-    ) -> None:
-        node = nodes.add(
-            "Bump", Height=height, Distance=depth, Strength=self.rng.uniform(0.2, 1.0)
-        )
-        nodes.plug(shader.inputs["Normal"], node.outputs[0])
-
-
-def _set(nodes: Nodes, shader: bpy.types.Node, inputs: dict[str, Value | None]) -> None:
-    for name, value in inputs.items():
-        if value is not None:
-            nodes.plug(shader.inputs[name.replace("_", " ")], value)
+    def _bump(self, surface: Surface, height: Value, depth: float) -> None:
+        surface.bump(height, depth, self.rng.uniform(0.2, 1.0))

@@ -18,21 +18,29 @@ class Nodes:
         self.tree = tree
 
     def add(self, kind: str, /, **values: Value) -> bpy.types.Node:
-        """A new node ``ShaderNode<kind>``.
+        """A new node `ShaderNode<kind>`.
 
-        Lower-case names are attributes of the node, the others are its inputs with
-        ``_`` for a space; an input given a socket is linked, else set.
+        Lower-case names are attributes of the node, the others are its inputs as of
+        `fill`.
         """
         node = self.tree.nodes.new("ShaderNode" + kind)
+        inputs = {}
         for name, value in values.items():
             if name[0].islower():
                 setattr(node, name, value)
             else:
-                self.plug(node.inputs[name.replace("_", " ")], value)
+                inputs[name] = value
+        self.fill(node, **inputs)
         return node
 
+    def fill(self, node: bpy.types.Node, **inputs: Value) -> None:
+        """Plug inputs of a node, `_` for a space in their names; None is left out."""
+        for name, value in inputs.items():
+            if value is not None:
+                self.plug(node.inputs[name.replace("_", " ")], value)
+
     def plug(self, socket: bpy.types.NodeSocket, value: Value) -> None:
-        """Link ``value`` to ``socket`` if it is a socket, else make it the default."""
+        """Link `value` to `socket` if it is a socket, else make it the default."""
         if isinstance(value, bpy.types.NodeSocket):
             self.tree.links.new(value, socket)
         elif socket.type == "RGBA" and len(value) == 3:
@@ -41,7 +49,7 @@ class Nodes:
             socket.default_value = value
 
     def mix(self, a: Value, b: Value, factor: Value, blend: str = "MIX") -> Value:
-        """Colours a and b mixed (or blended in mode ``blend``) by ``factor``."""
+        """Colours a and b mixed (or blended in mode `blend`) by `factor`."""
         # The Mix node has one set of equally named inputs for each data type.
         node = self.add("Mix", data_type="RGBA", blend_type=blend)
         for index, value in ((0, factor), (6, a), (7, b)):
@@ -49,14 +57,14 @@ class Nodes:
         return node.outputs[2]
 
     def math(self, operation: str, a: Value, b: Value = 0.0) -> Value:
-        """The scalar ``operation`` of a and b."""
+        """The scalar `operation` of a and b."""
         node = self.add("Math", operation=operation)
         self.plug(node.inputs[0], a)
         self.plug(node.inputs[1], b)
         return node.outputs[0]
 
     def span(self, value: Value, low: float, high: float) -> Value:
-        """``value`` in 0..1 brought to low..high."""
+        """`value` in 0..1 brought to low..high."""
         return self.math("ADD", self.math("MULTIPLY", value, high - low), low)
 
     def ramp(
@@ -73,3 +81,57 @@ class Nodes:
         ):
             element.position, element.color = position, (*colour, 1.0)
         return node.outputs["Color"]
+
+
+class Surface(Nodes):
+    """A new material's nodes around its Principled BSDF."""
+
+    def __init__(self, name: str, **principled: Value) -> None:
+        self.material = bpy.data.materials.new(name)
+        if not self.material.node_tree:
+            self.material.use_nodes = True
+        super().__init__(self.material.node_tree)
+        self.shader = self.tree.nodes["Principled BSDF"]
+        self.output = self.tree.nodes["Material Output"]
+        self.set(**principled)
+
+    def set(self, **principled: Value) -> None:
+        """Plug inputs of the Principled BSDF, as `fill` does."""
+        self.fill(self.shader, **principled)
+
+    def replace(self, **outputs: Value) -> None:
+        """Plug the material's output with these in place of the Principled BSDF."""
+        self.tree.nodes.remove(self.shader)
+        self.fill(self.output, **outputs)
+
+    def bump(self, height: Value, distance: float, strength: float = 1.0) -> None:
+        """Bend the surface's normal by a height of about `distance` metres."""
+        node = self.add("Bump", Height=height, Distance=distance, Strength=strength)
+        self.set(Normal=node.outputs[0])
+
+
+class World(Nodes):
+    """A new world's nodes around its Background."""
+
+    def __init__(self, name: str) -> None:
+        self.world = bpy.data.worlds.new(name)
+        if not self.world.node_tree:
+            self.world.use_nodes = True
+        super().__init__(self.world.node_tree)
+
+    def light(self, colour: Value = None, strength: Value = None) -> None:
+        """Give the Background a colour and a strength."""
+        background = self.tree.nodes["Background"]
+        self.fill(background, Color=colour, Strength=strength)
+
+
+def solid(name: str, **principled: Value) -> bpy.types.Material:
+    """A material of the Principled BSDF alone."""
+    return Surface(name, **principled).material
+
+
+def air(name: str, density: float) -> bpy.types.Material:
+    """A volume that scatters light, without a surface."""
+    nodes = Surface(name)
+    nodes.replace(Volume=nodes.add("VolumeScatter", Density=density).outputs[0])
+    return nodes.material

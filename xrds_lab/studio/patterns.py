@@ -21,7 +21,7 @@ def wood_colour(rng: random.Random) -> Colour:
 
 
 def shade(rng: random.Random, base: Colour, spread: float = 0.5) -> Colour:
-    """A colour near ``base``, lighter or darker by up to about ``spread``."""
+    """A colour near `base`, lighter or darker by up to about `spread`."""
     factor = 1 + rng.uniform(-spread, spread)
     return tuple(min(0.9, max(0.01, c * factor + rng.gauss(0, 0.02))) for c in base)
 
@@ -29,7 +29,7 @@ def shade(rng: random.Random, base: Colour, spread: float = 0.5) -> Colour:
 def placed(
     nodes: Nodes, rng: random.Random, density: float, stretch: float = 1.0
 ) -> Value:
-    """Surface coordinates with ``density`` units per metre, at a random place."""
+    """Surface coordinates with `density` units per metre, at a random place."""
     source = nodes.add("TexCoord").outputs["UV"]
     return nodes.add(
         "Mapping",
@@ -40,7 +40,8 @@ def placed(
     ).outputs[0]
 
 
-def _noise(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+def noise(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+    """Fractal noise of a random kind."""
     kind = rng.choice(("FBM", "FBM", "RIDGED_MULTIFRACTAL", "HYBRID_MULTIFRACTAL"))
     node = nodes.add(
         "TexNoise",
@@ -54,7 +55,8 @@ def _noise(nodes: Nodes, rng: random.Random, at: Value) -> Value:
     return node.outputs[0]
 
 
-def _voronoi(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+def voronoi(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+    """Cells, their distances or their edges."""
     feature = rng.choice(("F1", "F1", "F2", "SMOOTH_F1", "DISTANCE_TO_EDGE"))
     node = nodes.add("TexVoronoi", feature=feature, Vector=at, Scale=1.0)
     node.inputs["Randomness"].default_value = rng.choice((1.0, 1.0, rng.random(), 0.0))
@@ -63,7 +65,8 @@ def _voronoi(nodes: Nodes, rng: random.Random, at: Value) -> Value:
     return rng.choice((node.outputs["Distance"], node.outputs["Color"]))
 
 
-def _brick(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+def brick(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+    """Bricks with dark mortar."""
     node = nodes.add(
         "TexBrick",
         offset=rng.choice((0.5, 0.5, 0.0, 0.33)),
@@ -80,11 +83,13 @@ def _brick(nodes: Nodes, rng: random.Random, at: Value) -> Value:
     return nodes.math("MULTIPLY", node.outputs["Color"], 1.0)
 
 
-def _checker(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+def checker(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+    """Squares."""
     return nodes.add("TexChecker", Vector=at, Scale=2.0).outputs["Fac"]
 
 
-def _wave(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+def wave(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+    """Bands or rings."""
     return nodes.add(
         "TexWave",
         wave_type=rng.choice(("BANDS", "BANDS", "RINGS")),
@@ -96,7 +101,8 @@ def _wave(nodes: Nodes, rng: random.Random, at: Value) -> Value:
     ).outputs["Fac"]
 
 
-def _magic(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+def magic(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+    """Swirls."""
     node = nodes.add(
         "TexMagic", turbulence_depth=rng.randint(1, 5), Vector=at, Scale=1.5
     )
@@ -104,7 +110,8 @@ def _magic(nodes: Nodes, rng: random.Random, at: Value) -> Value:
     return node.outputs["Fac"]
 
 
-def _weave(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+def weave(nodes: Nodes, rng: random.Random, at: Value) -> Value:
+    """Two crossed waves."""
     parts = [
         nodes.add("TexWave", bands_direction=way, Vector=at, Scale=1.0).outputs["Fac"]
         for way in "XY"
@@ -112,11 +119,11 @@ def _weave(nodes: Nodes, rng: random.Random, at: Value) -> Value:
     return nodes.math(rng.choice(("MULTIPLY", "MAXIMUM", "MINIMUM")), *parts)
 
 
-_KINDS = (_noise, _noise, _voronoi, _voronoi, _brick, _checker, _wave, _magic, _weave)
+_KINDS = (noise, noise, voronoi, voronoi, brick, checker, wave, magic, weave)
 
 
 def pattern(nodes: Nodes, rng: random.Random, at: Value) -> Value:
-    """A random texture of the coordinates ``at``: one value in about 0..1."""
+    """A random texture of the coordinates `at`: one value in about 0..1."""
     first = rng.choice(_KINDS)(nodes, rng, at)
     if rng.random() < 0.6:
         return first
@@ -140,7 +147,7 @@ def grain(nodes: Nodes, rng: random.Random, density: float) -> Value:
 def tinted(
     nodes: Nodes, rng: random.Random, value: Value, base: Colour, varied: bool
 ) -> Value:
-    """``value`` through a random ramp of colours: around ``base``, or any."""
+    """`value` through a random ramp of colours: around `base`, or any."""
     count = rng.choice((2, 2, 3, 4))
     stops = [
         (

@@ -182,15 +182,8 @@ def sign(stage: Stage, at: Point, size: float) -> None:
     letters = "".join(
         stage.rng.choice("ABCDEGHKMPRSTUWXYZ 0123456789") for _ in range(6)
     )
-    curve = bpy.data.curves.new("letters", "FONT")
-    curve.body, curve.size, curve.extrude = letters, size * 0.5, size * 0.03
-    curve.materials.append(stage.paint.any(size))
-    thing = bpy.data.objects.new("letters", curve)
-    thing.location, thing.rotation_euler = (
-        at,
-        (math.pi / 2, 0, stage.rng.uniform(-1, 1)),
-    )
-    stage.scene.collection.objects.link(thing)
+    material, turn = stage.paint.any(size), stage.rng.uniform(-1, 1)
+    stage.write(letters, size * 0.5, material, at, turn, extrude=size * 0.03)
 
 
 def stack(stage: Stage, at: Point, size: float) -> None:
@@ -208,7 +201,7 @@ _SMALL = (vase, vase, block, block, ball, peg, ring, blob, wire, stack, sign)
 
 
 def small_thing(stage: Stage, at: Point, size: float, models: float = 0.25) -> None:
-    """Any thing of about ``size`` standing at ``at``."""
+    """Any thing of about `size` standing at `at`."""
     if stage.library is not None and stage.chance(models):
         stage.model(size, at, turned(stage.rng))
     else:
@@ -251,7 +244,7 @@ def curtain(stage: Stage, at: Point, turn: float, width: float, height: float) -
 
 
 def blinds(stage: Stage, at: Point, turn: float, width: float, height: float) -> None:
-    """Venetian blinds hanging over an opening whose lower edge is at ``at``."""
+    """Venetian blinds hanging over an opening whose lower edge is at `at`."""
     pitch, tilt = stage.rng.uniform(0.02, 0.06), stage.rng.uniform(0.1, 1.2)
     low = stage.rng.uniform(0, 0.6) * height
     slat = box(width, pitch * 0.95, 0.0015).rotated("x", tilt)
@@ -302,7 +295,7 @@ def scattered(stage: Stage, spots: np.ndarray, size: float) -> Shape:
 
 
 def grass(stage: Stage, centre: Point, reach: float, count: int) -> None:
-    """Thin blades over a square of half side ``reach``."""
+    """Thin blades over a square of half side `reach`."""
     dice = stage.dice
     foot = np.zeros((count, 3))
     foot[:, :2] = dice.uniform(-reach, reach, (count, 2))

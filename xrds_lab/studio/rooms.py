@@ -22,7 +22,7 @@ class Side:
     def at(
         self, along: float, height: float, off: float = 0.0
     ) -> tuple[float, float, float]:
-        """A point ``along`` the wall, ``off`` metres into the room."""
+        """A point `along` the wall, `off` metres into the room."""
         c, s = math.cos(self.turn), math.sin(self.turn)
         return (self.x + c * along + s * off, self.y + s * along - c * off, height)
 
@@ -241,9 +241,9 @@ def _light(stage: Stage, room: Room) -> None:
     if day:
         lighting.sky(stage, rng.uniform(1.0, 4.0))
         if stage.chance(0.6):
-            lighting.sun(stage, None, 6.0)
+            lighting.sun(stage, 6.0)
     else:
-        lighting.plain_world(stage, (0.3, 0.4, 0.8), 0.05)
+        stage.even_world((0.3, 0.4, 0.8), 0.05)
     volume = room.x * room.y
     for _ in range(rng.randint(0 if day else 2, 3)):
         kind = rng.random()

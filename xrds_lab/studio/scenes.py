@@ -10,7 +10,8 @@ from mathutils import Vector
 
 from . import clutter, dark, outdoor, rooms, still
 from .assets import Library
-from .stage import Stage, View, aim
+from .builder import aim, use_cycles
+from .stage import Stage, View
 
 VERSION = 2  # of the recipes; written into every data file
 FRAMES = (
@@ -33,9 +34,9 @@ RECIPES = {
 def build_scene(
     seed: int, assets: str | Path | None = None, kind: str | None = None
 ) -> Stage:
-    """Replace the open file by random scene ``seed``; its views are in ``Stage.views``.
+    """Replace the open file by random scene `seed`; its views are in `Stage.views`.
 
-    ``assets`` is a folder as Library describes, ``kind`` one of RECIPES (any if None).
+    `assets` is a folder as Library describes, `kind` one of RECIPES (any if None).
     All data of the file open before is lost. Frames are 1920 px on the long side.
     """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
@@ -52,14 +53,9 @@ def build_scene(
 
 
 def _settings(stage: Stage) -> None:
-    scene, rng = stage.scene, stage.rng
-    scene.render.engine = "CYCLES"
-    scene.render.resolution_x, scene.render.resolution_y = rng.choice(FRAMES)
-    scene.render.resolution_percentage = 100
+    scene, cycles = stage.scene, stage.scene.cycles
+    use_cycles(scene, *stage.rng.choice(FRAMES))
     scene.render.use_persistent_data = True
-    cycles = scene.cycles
-    cycles.device = "CPU"
-    cycles.use_adaptive_sampling = False
     cycles.max_bounces, cycles.diffuse_bounces, cycles.glossy_bounces = 6, 2, 3
     cycles.transmission_bounces, cycles.transparent_max_bounces = 6, 8
     cycles.use_light_tree = stage.chance(0.2)  # a third to a half of a sample's time
@@ -82,20 +78,16 @@ def _moving(stage: Stage) -> None:
 
 
 def _camera(stage: Stage) -> None:
-    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
-    stage.scene.collection.objects.link(camera)
-    stage.scene.camera = camera
+    stage.scene.camera = stage.link("camera", bpy.data.cameras.new("camera"))
     good = [view for view in stage.views if clear(stage, view)]
     stage.views = good or stage.views
     show(stage, stage.views[0])
 
 
-def clear(stage: Stage, view: View, least: float = 0.5) -> bool:
+def clear(stage: Stage, view: View) -> bool:
     """True if nothing stands right before the camera in the middle of its picture."""
     eye = Vector(view.eye)
-    way = Vector(view.target) - eye
-    distance = _hit(stage, eye, way)
-    return distance > least
+    return _hit(stage, eye, Vector(view.target) - eye) > 0.5
 
 
 def _hit(stage: Stage, eye: Vector, way: Vector) -> float:

@@ -1,4 +1,4 @@
-"""What every recipe works with: the scene, the dice, the materials, the views."""
+"""What the recipes of random scenes work with: builder, dice, materials, views."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 from .assets import Library, copied, import_model
-from .geometry import Point, Shape
+from .builder import Builder
+from .geometry import Point
 from .materials import Painter
 
 
@@ -27,10 +27,9 @@ class View:
 
 
 @dataclass
-class Stage:
-    """One scene under construction. Recipes add things and views."""
+class Stage(Builder):
+    """A random scene under construction. Recipes add things and views."""
 
-    scene: bpy.types.Scene
     rng: random.Random
     library: Library | None
     kind: str = ""
@@ -45,29 +44,10 @@ class Stage:
         """True with this probability."""
         return self.rng.random() < probability
 
-    def put(
-        self,
-        shape: Shape,
-        material: bpy.types.Material,
-        at: Point = (0, 0, 0),
-        turn: float = 0.0,
-        bevel: float = 0.0,
-    ) -> bpy.types.Object:
-        """A shape as an object of this material; bevelled edges if ``bevel`` metres."""
-        mesh = shape.mesh(material.name)
-        mesh.materials.append(material)
-        thing = bpy.data.objects.new(material.name, mesh)
-        thing.location, thing.rotation_euler[2] = at, turn
-        self.scene.collection.objects.link(thing)
-        if bevel:
-            edge = thing.modifiers.new("Bevel", "BEVEL")
-            edge.width, edge.segments, edge.limit_method = bevel, 2, "ANGLE"
-        return thing
-
     def model(
         self, size: float, at: Point, turn: float, words: tuple[str, ...] = ()
     ) -> bpy.types.Object | None:
-        """A model (whose name has one of ``words``) standing at ``at``."""
+        """A model (whose name has one of `words`) standing at `at`."""
         if self.library is None:
             return None
         paths = [
@@ -93,17 +73,9 @@ class Stage:
     def look(
         self, eye: Point, target: Point, lens: float, shallow: float = 0.25
     ) -> None:
-        """Add a view; with probability ``shallow`` it has a depth of field."""
+        """Add a view; with probability `shallow` it has a depth of field."""
         fstop = self.rng.uniform(1.2, 6.0) if self.chance(shallow) else 0.0
         self.views.append(View(tuple(eye), tuple(target), lens, fstop))
-
-
-def aim(thing: bpy.types.Object, eye: Point, target: Point, roll: float = 0.0) -> None:
-    """Place a camera or lamp at ``eye`` looking at ``target``."""
-    thing.location = eye
-    way = (Vector(target) - Vector(eye)).to_track_quat("-Z", "Y")
-    thing.rotation_euler = way.to_euler()
-    thing.rotation_euler.rotate_axis("Z", roll)
 
 
 def turned(rng: random.Random) -> float:

@@ -82,7 +82,7 @@ def _light(stage: Stage) -> None:
     if stage.chance(0.65):
         lighting.sky(stage, rng.uniform(0.3, 1.5))
     else:
-        lighting.plain_world(stage, props.tone(stage), rng.uniform(0.02, 0.5))
+        stage.even_world(props.tone(stage), rng.uniform(0.02, 0.5))
     for _ in range(rng.randint(1, 4)):
         angle = turned(rng)
         at = (4 * math.cos(angle), 4 * math.sin(angle), rng.uniform(1.5, 5))
