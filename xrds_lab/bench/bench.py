@@ -7,7 +7,6 @@ folder has measured is kept, and the report is written anew after every scene.
 from __future__ import annotations
 
 import csv
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +15,7 @@ from xrds_blender.command import console
 from xrds_blender.planning.budget import Network
 from xrds_core.atomic import replacing, write_json
 
+from ..progress import report_line
 from . import analysis, machine, report, workload
 from .growth import growth as measure_growth
 from .inputs import Folder
@@ -210,8 +210,3 @@ def _flat(point: dict[str, Any]) -> dict[str, Any]:
         | point["settings"]
         | {f"seconds_{stage}": seconds for stage, seconds in stages.items()}
     )
-
-
-def report_line(line: str) -> None:
-    """Print a line of progress beside the result."""
-    print(line, file=sys.stderr, flush=True)

@@ -19,8 +19,9 @@ from xrds_core import metrics
 from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
 
+from ..progress import silent
 from . import table
-from .inputs import GENERATION, kept, silent
+from .inputs import GENERATION, kept
 from .journal import Strict
 from .pictures import Networks, Pictures
 from .rivals import ENLARGEMENTS
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from .inputs import Progress
+    from ..progress import Progress
     from .windows import Shot
 
     Configs = dict[str, Config]

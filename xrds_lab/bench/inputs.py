@@ -6,7 +6,6 @@ import json
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,8 +24,6 @@ if TYPE_CHECKING:
     from .windows import Shot, Window
 
 Arrays = dict[str, Array]
-Progress = Callable[[str], object]
-"""Gets lines of text."""
 # Counts up whenever the pass code changes what it renders: old files are then left.
 GENERATION = 2
 OFF: Literal["OFF"] = "OFF"
@@ -34,10 +31,6 @@ OFF: Literal["OFF"] = "OFF"
 Mode = Denoiser | Literal["OFF"]
 # Unlike each other and unlike the references', so that no noise is shared.
 SEEDS = {"low": 101, "guides": 202, "full": 303, "plain": 404}
-
-
-def silent(line: str) -> None:
-    """Drop a line of progress."""
 
 
 @dataclass(frozen=True)

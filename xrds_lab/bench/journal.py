@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from contextlib import AbstractContextManager
     from pathlib import Path
 
-    from .inputs import Progress
+    from ..progress import Progress
 
 MOST_KILLS = 3  # so often a task may end with its process before it is left out
 
@@ -23,7 +23,7 @@ class Journal:
     """Keeps one bad configuration from ending a run, even if it ends the process.
 
     The name of the running task lies in a file, so that the next run knows where the
-    last one was killed; a task that was running at ``MOST_KILLS`` ends is left out.
+    last one was killed; a task that was running at `MOST_KILLS` ends is left out.
     """
 
     def __init__(self, path: Path, progress: Progress) -> None:

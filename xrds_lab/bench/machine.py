@@ -45,7 +45,7 @@ def cores() -> int:
 
 @contextmanager
 def only_cores(count: int) -> Iterator[None]:
-    """Hold every thread of this process to the first ``count`` of its cores (Linux).
+    """Hold every thread of this process to the first `count` of its cores (Linux).
 
     Threads made meanwhile inherit it. Raises OSError where there are too few.
     """

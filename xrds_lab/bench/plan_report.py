@@ -23,9 +23,11 @@ from xrds_core import metrics
 from xrds_core.atomic import replacing, write_json
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
 
-    Say = Callable[[str], object]
+    from xrds_core.arrays import Array
+
+    from ..progress import Progress
 
 # Stages of a render; loading Python, Blender and torch is in the wall time alone.
 OVERHEAD = ("sync", "denoise", "guides", "network", "write")
@@ -47,11 +49,11 @@ class Setting:
 
 @dataclass
 class Run:
-    """One process: wall seconds, and what each of its frames told."""
+    """One process: wall seconds, and the record of each of its frames."""
 
     wall: float
     frames: list[dict[str, Any]] = field(default_factory=list)
-    pictures: list[np.ndarray] = field(default_factory=list)
+    pictures: list[Array] = field(default_factory=list)
 
     @property
     def overhead(self) -> float:
@@ -68,7 +70,7 @@ def run(
 ) -> Run:
     """Render in a process of its own; `kind` is still, animation or look-dev."""
     with tempfile.TemporaryDirectory() as folder:
-        asked = {
+        request = {
             "scene": scene,
             "kind": kind,
             "setting": vars(setting),
@@ -76,26 +78,28 @@ def run(
             "seed": seed,
             "out": folder,
         }
-        command = [sys.executable, "-m", f"{__package__}.plan_run", json.dumps(asked)]
+        command = [sys.executable, "-m", f"{__package__}.plan_run", json.dumps(request)]
         start = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         wall = time.perf_counter() - start
-        told = Path(folder) / "told.json"
-        if done.returncode or not told.is_file():
+        answer = Path(folder) / "frames.json"
+        if done.returncode or not answer.is_file():
             raise RuntimeError(f"{scene} {kind} failed: {done.stderr[-2000:]}")
-        frames = json.loads(told.read_text("utf-8"))
+        frames = json.loads(answer.read_text("utf-8"))
         pictures = [np.load(Path(folder) / f"{i}.npy") for i in range(len(frames))]
     return Run(wall, frames, pictures)
 
 
-def measure(scene: str, kind: str, setting: Setting, say: Say) -> dict[str, Any]:
+def measure(
+    scene: str, kind: str, setting: Setting, progress: Progress
+) -> dict[str, Any]:
     """Pairs of runs with and without the plan: one record of the report."""
     kept: list[Run] = []
     planned: list[Run] = []
     for turn in range(setting.rounds):
         kept.append(run(scene, kind, setting, (), SEEDS[0]))
         planned.append(run(scene, kind, setting, SAVINGS, SEEDS[0]))
-        say(
+        progress(
             f"{scene} {kind} {turn + 1}: overhead {kept[-1].overhead:.2f} s with all, "
             f"{planned[-1].overhead:.2f} s with the plan"
         )
@@ -112,17 +116,17 @@ def _seconds(kept: list[Run], planned: list[Run]) -> dict[str, Any]:
     """Medians, and the share of overhead saved by the median pair."""
     pairs = list(zip(kept, planned, strict=True))
     shares = [1 - less.overhead / most.overhead for most, less in pairs]
-    told: dict[str, Any] = {"saved_share": statistics.median(shares)}
+    record: dict[str, Any] = {"saved_share": statistics.median(shares)}
     for name, runs in (("all", kept), ("plan", planned)):
-        told[f"wall_{name}"] = statistics.median(each.wall for each in runs)
-        told[f"overhead_{name}"] = statistics.median(each.overhead for each in runs)
+        record[f"wall_{name}"] = statistics.median(each.wall for each in runs)
+        record[f"overhead_{name}"] = statistics.median(each.overhead for each in runs)
         for stage in ("sync", "beauty", "guides", "network"):
             seconds = statistics.median(each.stage(stage) for each in runs)
-            told[f"{stage}_{name}"] = seconds
-    return told
+            record[f"{stage}_{name}"] = seconds
+    return record
 
 
-def _difference(name: str, picture: np.ndarray, other: np.ndarray) -> dict[str, float]:
+def _difference(name: str, picture: Array, other: Array) -> dict[str, float]:
     same = np.array_equal(picture, other)
     return {
         f"{name}_psnr": 99.0 if same else metrics.psnr(picture, other),
@@ -131,7 +135,11 @@ def _difference(name: str, picture: np.ndarray, other: np.ndarray) -> dict[str, 
 
 
 def report(
-    scenes: Sequence[str], kinds: Sequence[str], setting: Setting, out: Path, say: Say
+    scenes: Sequence[str],
+    kinds: Sequence[str],
+    setting: Setting,
+    out: Path,
+    progress: Progress,
 ) -> dict[str, Any]:
     """Measure every scene and write `out`.json and `out`.md.
 
@@ -141,7 +149,9 @@ def report(
     records = json.loads(path.read_text("utf-8"))["records"] if path.is_file() else []
     for kind in kinds:
         for scene in scenes:
-            record = measure(scene, kind, setting, say) | {"setting": vars(setting)}
+            record = measure(scene, kind, setting, progress) | {
+                "setting": vars(setting)
+            }
             key = record["scene"], record["kind"]
             records = [r for r in records if (r["scene"], r["kind"]) != key]
             records.append(record)
@@ -216,8 +226,8 @@ def _by_decision(records: Sequence[dict[str, Any]]) -> list[str]:
     names = ("guide samples", "guide bounces", "guide lights", "guide cache")
     groups: dict[tuple[str, ...], list[dict[str, Any]]] = {}
     for record in records:
-        told = _decided(record)
-        groups.setdefault(tuple(told.get(n, "") for n in names), []).append(record)
+        decisions = _decided(record)
+        groups.setdefault(tuple(decisions.get(n, "") for n in names), []).append(record)
     lines = [
         f"| {' | '.join(names)} | scenes | guides' seconds saved | of the overhead |",
         "|---" * (len(names) + 3) + "|",
@@ -239,7 +249,7 @@ def _decisions(records: Sequence[dict[str, Any]]) -> list[str]:
     names = [n for n in names if n not in {"low frame", "sessions"}]
     lines = ["| scene | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
     for record in records:
-        told = _decided(record)
-        cells = [told.get(name, "") for name in names]
+        decisions = _decided(record)
+        cells = [decisions.get(name, "") for name in names]
         lines.append(f"| {record['scene']}, {record['kind']} | {' | '.join(cells)} |")
     return lines

@@ -20,24 +20,24 @@ def main() -> None:
     from xrds_blender import render
     from xrds_blender.command.console import leave
 
-    asked = json.loads(sys.argv[1])
-    setting, out = asked["setting"], Path(asked["out"])
-    scene = _scene(asked["scene"], setting)
+    request = json.loads(sys.argv[1])
+    setting, out = request["setting"], Path(request["out"])
+    scene = _scene(request["scene"], setting)
     _warm_up(scene, setting)
-    told = []
-    for index, number in enumerate(_steps(scene, asked["kind"])):
+    frames = []
+    for index, number in enumerate(_steps(scene, request["kind"])):
         picture = render(
             scene,
             setting["scale"],
             samples=setting["samples"],
             guide_samples=setting["guide_samples"],
-            seed=asked["seed"] + number,
-            savings=tuple(asked["savings"]),
+            seed=request["seed"] + number,
+            savings=tuple(request["savings"]),
         )
         np.save(out / f"{index}.npy", picture.radiance)
         plan = [asdict(each) for each in picture.plan]
-        told.append({"seconds": picture.seconds, "plan": plan})
-    (out / "told.json").write_text(json.dumps(told), "utf-8")
+        frames.append({"seconds": picture.seconds, "plan": plan})
+    (out / "frames.json").write_text(json.dumps(frames), "utf-8")
     leave(0)
 
 

@@ -19,7 +19,8 @@ from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_core.atomic import write_json
 
-from .inputs import kept, silent
+from ..progress import silent
+from .inputs import kept
 from .journal import Strict
 from .pictures import Networks, Pictures
 from .sweep import Config, xrds
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from .inputs import Folder, Progress
+    from ..progress import Progress
+    from .inputs import Folder
 
     Record = dict[str, Any]
 

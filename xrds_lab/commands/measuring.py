@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,8 @@ from xrds_blender.command import arguments
 from xrds_blender.command.deferred import need_blender, no_lines
 from xrds_blender.command.options import DEVICE_HELP, GUIDES, PRESETS
 from xrds_core.errors import XRDSError
+
+from ..progress import report_line
 
 STABILITY = ("arrays", "large", "scenes", "shots", "load")
 
@@ -220,8 +221,3 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
 def _bench_lines(result: dict[str, Any]) -> list[str]:
     failed = [f"left out: {name}: {why}" for name, why in result["failures"].items()]
     return [f"{len(result['points'])} points", *failed]
-
-
-def report_line(line: str) -> None:
-    """Print a line of progress beside the result."""
-    print(line, file=sys.stderr, flush=True)

@@ -22,11 +22,11 @@ def _dataset(options: argparse.Namespace) -> dict[str, Any]:
         assets=options.assets,
         scales=options.scales,
     )
-    found = datasheet.files(options.out)
+    windows = datasheet.files(options.out)
     if options.contact is not None:
-        datasheet.contact_sheet(found, options.contact)
+        datasheet.contact_sheet(windows, options.contact)
     result = {"out": str(options.out), "written": written}
-    return result | datasheet.datasheet(found)
+    return result | datasheet.datasheet(windows)
 
 
 def _train(options: argparse.Namespace) -> dict[str, Any] | None:

@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from xrds_blender.command import console
+from xrds_blender.command.picture_file import save
+from xrds_blender.interface.registration import ensure_registered
 from xrds_core import exr
+from xrds_core.arrays import Array
 from xrds_core.atomic import write_json
 
-from xrds_blender.command import console
-from xrds_blender.interface.registration import ensure_registered
-from xrds_blender.command.picture_file import save
 from . import comparison
 from .contest import Contest, Entry
 from .scene import build
@@ -55,24 +56,24 @@ def _demo(options: argparse.Namespace) -> None:
     )
     _write_results(options.out / "results.json", results, reference)
     for entry in entries:
-        told = results[entry.name]
+        errors = results[entry.name]
         print(
-            f"{entry.label:24} {told['seconds']:6.2f} s  PSNR {told['psnr']:6.2f} dB"
-            f"  RelMSE {told['relmse']:.5f}"
+            f"{entry.label:24} {errors['seconds']:6.2f} s  "
+            f"PSNR {errors['psnr']:6.2f} dB  RelMSE {errors['relmse']:.5f}"
         )
     print(f"look at {options.out / 'comparison.png'}")
 
 
 def _columns(
     entries: Sequence[Entry], reference: Entry, results: dict[str, dict[str, float]]
-) -> list[tuple[str, np.ndarray]]:
+) -> list[tuple[str, Array]]:
     """Labels and pictures, from the least to the most that was rendered."""
     height, width = reference.picture.alpha.shape
     low = comparison.enlarged(entries[-2].picture.low_resolution, height, width)
     columns = [(f"what XRDS x{SCALES[-1]} is given\n(low resolution)", low)]
     for entry in reversed(entries):
-        told = results[entry.name]
-        figures = f"{told['seconds']:.1f} s, {told['psnr']:.1f} dB"
+        errors = results[entry.name]
+        figures = f"{errors['seconds']:.1f} s, {errors['psnr']:.1f} dB"
         columns.append((f"{entry.label}\n{figures}", entry.picture.radiance))
     final = f"{reference.label}\n{reference.seconds:.0f} s"
     return [*columns, (final, reference.picture.radiance)]
@@ -106,11 +107,11 @@ def _write_pictures(folder: Path, entries: Sequence[Entry], scene: Any) -> None:
 def _write_results(
     path: Path, results: dict[str, dict[str, float]], reference: Entry
 ) -> None:
-    told = {
+    report = {
         "methods": results,
         "reference": {"label": reference.label, "seconds": reference.seconds},
     }
-    write_json(path, told)
+    write_json(path, report)
 
 
 def _parser() -> argparse.ArgumentParser:

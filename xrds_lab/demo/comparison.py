@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.metrics import to_srgb
 
@@ -20,19 +21,19 @@ LABEL = 46
 PAPER, INK = (24, 24, 26), (235, 235, 230)
 
 
-def to_bytes(linear: np.ndarray) -> np.ndarray:
+def to_bytes(linear: Array) -> Array:
     """Scene-linear (H, W, 3) to sRGB bytes."""
     return np.round(to_srgb(linear) * 255.0).astype(np.uint8)
 
 
-def enlarged(low: np.ndarray, height: int, width: int) -> np.ndarray:
+def enlarged(low: Array, height: int, width: int) -> Array:
     """Repeat low-resolution pixels, to show what the network is given."""
     scale = -(-height // low.shape[0])
     grown = low.repeat(scale, axis=0).repeat(scale, axis=1)
     return grown[:height, :width]
 
 
-def compare(columns: Sequence[tuple[str, np.ndarray]], path: Path) -> None:
+def compare(columns: Sequence[tuple[str, Array]], path: Path) -> None:
     """Write the crops of every method side by side.
 
     Args:

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core import metrics
-
-from xrds_blender.frame.job import Picture, RenderJob
 from xrds_blender import render
+from xrds_blender.frame.job import Picture, RenderJob
+from xrds_blender.planning.plan import savings_but
+from xrds_core import metrics
 
 LOW_SAMPLES = 16  # per low-resolution pixel, the standard measure's
 GUIDE_SAMPLES = 4

@@ -128,7 +128,9 @@ def glass(tint: Colour = WHITE) -> bpy.types.Material:
     )
 
 
-def metal(colour: Colour, roughness: float, hammered: bool = False) -> bpy.types.Material:
+def metal(
+    colour: Colour, roughness: float, hammered: bool = False
+) -> bpy.types.Material:
     """Bare metal with turning marks, or beaten by a hammer."""
     bare = Solid("Metal", Base_Color=colour, Metallic=1.0, Roughness=roughness)
     if hammered:

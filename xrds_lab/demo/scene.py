@@ -85,11 +85,17 @@ def _room(kitchen: Kitchen) -> None:
     """Table, tiled wall and plaster above it."""
     oak = materials.planks()
     kitchen.stand("Table", box(2.6, 1.2, 0.05), oak, (0.0, 0.02, -0.05), bevel=0.004)
-    kitchen.stand("Tiles", box(4.0, 0.05, 0.5), materials.tiles(), (0.0, WALL + 0.025, 0.0))
-    kitchen.stand("Wall", box(4.0, 0.05, 1.5), materials.plaster(), (0.0, WALL + 0.035, 0.5))
+    kitchen.stand(
+        "Tiles", box(4.0, 0.05, 0.5), materials.tiles(), (0.0, WALL + 0.025, 0.0)
+    )
+    kitchen.stand(
+        "Wall", box(4.0, 0.05, 1.5), materials.plaster(), (0.0, WALL + 0.035, 0.5)
+    )
     kitchen.stand("Rail", box(4.0, 0.04, 0.022), oak, (0.0, WALL, 0.5), bevel=0.004)
     cloth = materials.linen((0.8, 0.76, 0.68), (0.5, 0.06, 0.05))
-    kitchen.stand("Cloth", box(0.62, 0.46, 0.003), cloth, (0.16, -0.2, 0.0), 14.0, bevel=0.001)
+    kitchen.stand(
+        "Cloth", box(0.62, 0.46, 0.003), cloth, (0.16, -0.2, 0.0), 14.0, bevel=0.001
+    )
 
 
 def _table_ware(kitchen: Kitchen) -> None:
@@ -167,7 +173,9 @@ def _recipe(kitchen: Kitchen) -> None:
     ink = materials.plain("Ink", (0.03, 0.03, 0.035))
     sheet = materials.plain("Sheet", (0.83, 0.79, 0.7), 0.9)
     frame = box(0.46, 0.025, 0.3)
-    kitchen.stand("Frame", frame, materials.planks(), (CARD[0], WALL - 0.002, 0.18), bevel=0.004)
+    kitchen.stand(
+        "Frame", frame, materials.planks(), (CARD[0], WALL - 0.002, 0.18), bevel=0.004
+    )
     kitchen.stand("Card", box(0.42, 0.004, 0.26), sheet, (CARD[0], WALL - 0.015, 0.2))
     heading, lines = (*CARD, 0.405), (*CARD, 0.355)
     kitchen.write("Tea for four", 0.045, ink, heading, align_x="CENTER", name="Heading")

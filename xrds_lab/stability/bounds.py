@@ -26,7 +26,7 @@ class Exemption:
     """A bound that some weights do not hold: how far off at most, and the reason."""
 
     subject: str
-    """As ``fast x2 fp32``; * stands for anything."""
+    """As `fast x2 fp32`; * stands for anything."""
     limit: float
     reason: str
 

@@ -12,7 +12,8 @@ from .pictures import Inputs, lit_surface, textured
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from .pictures import Array
+    from xrds_core.arrays import Array
+
     from .subject import Subject
 
 _PERMUTATIONS = ((1, 2, 0), (2, 0, 1), (0, 2, 1), (2, 1, 0))
@@ -27,11 +28,11 @@ def grey(subject: Subject) -> Iterator[Measured]:
             textured(subject.side, subject.scale),
         )
     ):
-        found = subject(
+        picture = subject(
             Inputs(_grey(inputs.radiance), _grey(inputs.albedo), inputs.normal)
         )
-        chroma = found.max(axis=2) - found.min(axis=2)
-        curve[number] = float((chroma / np.maximum(found.max(axis=2), 1e-30)).max())
+        chroma = picture.max(axis=2) - picture.min(axis=2)
+        curve[number] = float((chroma / np.maximum(picture.max(axis=2), 1e-30)).max())
     yield worst("grey.chroma", curve)
 
 
@@ -49,8 +50,8 @@ def permutation(subject: Subject) -> Iterator[Measured]:
             np.ascontiguousarray(x[..., order])
             for x in (inputs.radiance, inputs.albedo)
         )
-        found = subject(Inputs(light, albedo, inputs.normal))
-        curve[number] = smape(found, expected[..., order])
+        picture = subject(Inputs(light, albedo, inputs.normal))
+        curve[number] = smape(picture, expected[..., order])
     yield worst("colour.permutation", curve)
 
 

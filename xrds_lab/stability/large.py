@@ -72,6 +72,6 @@ def large(subject: Subject, side: int = SIDE) -> Iterator[Measured]:
             f"{subject.name} ended with {done.returncode} on {side}x{side} pixels: "
             f"{done.stderr.strip().rpartition(chr(10))[2]}"
         )
-    told = json.loads(done.stdout.rpartition("REPORT")[2])
-    yield Measured("shapes.memory", told["peak"] / 2**30)
-    yield Measured("shapes.large_faults", told["bad"])
+    result = json.loads(done.stdout.rpartition("REPORT")[2])
+    yield Measured("shapes.memory", result["peak"] / 2**30)
+    yield Measured("shapes.large_faults", result["bad"])

@@ -14,7 +14,8 @@ from .pictures import Inputs, blocks, constant, dome, lit_surface
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from .pictures import Array
+    from xrds_core.arrays import Array
+
     from .subject import Subject
 
 
@@ -92,9 +93,9 @@ def lies(subject: Subject) -> Iterator[Measured]:
     )
     bad = 0
     for name, lie in LIES.items():
-        found = subject(lie(inputs))
-        bad += faults(found)
-        loss = plain - metrics.psnr(np.nan_to_num(found), truth, stops)
+        picture = subject(lie(inputs))
+        bad += faults(picture)
+        loss = plain - metrics.psnr(np.nan_to_num(picture), truth, stops)
         yield Measured(f"guides.{name}", loss)
     yield Measured("guides.faults", bad)
 
@@ -113,12 +114,12 @@ def rings(subject: Subject) -> Iterator[Measured]:
 
 def _ring(subject: Subject, inputs: Inputs) -> float:
     """Return the largest deviation, of 1, outside the emitter's own pixels."""
-    found: Array = subject(inputs)
+    picture: Array = subject(inputs)
     third, reach = subject.side // 3, 2 * subject.scale
-    outside = np.ones(found.shape[:2], bool)
+    outside = np.ones(picture.shape[:2], bool)
     inner = slice(third - reach, 2 * third + reach)
     outside[inner, inner] = False
-    return float(np.abs(found[outside] - 1.0).max())
+    return float(np.abs(picture[outside] - 1.0).max())
 
 
 CHECKS = (lies, rings)

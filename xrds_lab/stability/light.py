@@ -28,8 +28,8 @@ def scaling(subject: Subject) -> Iterator[Measured]:
 
     def difference(power: int) -> float:
         light = inputs.radiance * np.float32(2.0**power)
-        found = subject(inputs.with_radiance(light)) * np.float32(2.0**-power)
-        return relative_difference(found, expected)
+        picture = subject(inputs.with_radiance(light)) * np.float32(2.0**-power)
+        return relative_difference(picture, expected)
 
     for name, powers in (("range.scaling", _NEAR), ("range.scaling_far", _FAR)):
         yield worst(name, {power: difference(power) for power in powers})
@@ -42,12 +42,12 @@ def spread(subject: Subject) -> Iterator[Measured]:
     middle = subject.side // 2
     factor = np.where(np.arange(subject.side) < middle, dark, bright)[:, None]
     low = inputs.radiance * factor[:: subject.scale, None]
-    found = subject(inputs.with_radiance(low))
+    picture = subject(inputs.with_radiance(low))
     rows = np.s_[: middle - 2 * subject.scale]
-    error = np.abs(found / dark - truth)[rows].mean() / truth[rows].mean()
+    error = np.abs(picture / dark - truth)[rows].mean() / truth[rows].mean()
     bicubic = baselines.bicubic(inputs.radiance, subject.scale)
     plain = np.abs(bicubic - truth)[rows].mean() / truth[rows].mean()
-    yield Measured("range.spread_faults", faults(found))
+    yield Measured("range.spread_faults", faults(picture))
     yield Measured("range.spread_error", float(error / plain))
 
 
@@ -55,8 +55,8 @@ def constants(subject: Subject) -> Iterator[Measured]:
     """One colour everywhere comes back as it went in."""
     curve = {}
     for albedo in (0.0, 0.05, 0.5, 1.0):
-        found = subject(even(subject.side, subject.scale, 0.7, albedo))
-        curve[albedo] = float(np.abs(found / 0.7 - 1.0).max())
+        picture = subject(even(subject.side, subject.scale, 0.7, albedo))
+        curve[albedo] = float(np.abs(picture / 0.7 - 1.0).max())
     yield worst("constant.value", curve)
 
 
@@ -66,21 +66,21 @@ def tiny(subject: Subject) -> Iterator[Measured]:
     bad = 0
     for value in (1e-45, 1e-40, 1.2e-38):
         low = constant(subject.low_side, subject.low_side, value)
-        found = subject(inputs.with_radiance(low))
-        bad += faults(found) + int((found > 100 * value).sum())
+        picture = subject(inputs.with_radiance(low))
+        bad += faults(picture) + int((picture > 100 * value).sum())
     yield Measured("range.denormal_faults", bad)
 
 
 def black(subject: Subject) -> Iterator[Measured]:
     """No light stays no light, whatever the surfaces look like."""
     inputs = textured(subject.side, subject.scale)
-    found = subject(inputs.with_radiance(inputs.radiance * 0))
-    yield Measured("black.all", float(np.abs(found).max()))
+    picture = subject(inputs.with_radiance(inputs.radiance * 0))
+    yield Measured("black.all", float(np.abs(picture).max()))
     half = subject.low_side // 2
     low = inputs.radiance.copy()
     low[:, :half] = 0.0
-    found = subject(inputs.with_radiance(low))
-    dark = found[:, : (half - 1) * subject.scale]
+    picture = subject(inputs.with_radiance(low))
+    dark = picture[:, : (half - 1) * subject.scale]
     yield Measured("black.half", float(dark.max() / low.mean()))
 
 
@@ -90,10 +90,10 @@ def one_pixel(subject: Subject) -> Iterator[Measured]:
     middle = subject.low_side // 2
     low = inputs.radiance * 0
     low[middle, middle] = 1.0
-    found = subject(inputs.with_radiance(low))
+    picture = subject(inputs.with_radiance(low))
     away = distance(subject.side, subject.scale, [(middle, middle)]) > subject.scale
-    total = float(found.sum())
-    yield Measured("lit_pixel.away", float(found[away].sum()) / max(total, 1e-30))
+    total = float(picture.sum())
+    yield Measured("lit_pixel.away", float(picture[away].sum()) / max(total, 1e-30))
     yield Measured("lit_pixel.gain", total / (3 * subject.scale**2))
 
 
@@ -106,13 +106,13 @@ def energy(subject: Subject) -> Iterator[Measured]:
     curve = {}
     for kind, albedo in walls.items():
         truth = light * albedo
-        found = subject(Inputs(area_mean(truth, scale), albedo, facing))
-        curve[kind] = abs(float(found.mean(dtype=np.float64) / truth.mean()) - 1.0)
+        picture = subject(Inputs(area_mean(truth, scale), albedo, facing))
+        curve[kind] = abs(float(picture.mean(dtype=np.float64) / truth.mean()) - 1.0)
     yield worst("energy.smooth", curve)
     albedo = 0.1 + 0.8 * blocks(side, side, 4)
     truth = light * albedo
-    found = subject(Inputs(area_mean(truth, scale), albedo, facing))
-    gain = float(found.mean(dtype=np.float64) / truth.mean(dtype=np.float64))
+    picture = subject(Inputs(area_mean(truth, scale), albedo, facing))
+    gain = float(picture.mean(dtype=np.float64) / truth.mean(dtype=np.float64))
     yield Measured("energy.textured", abs(gain - 1.0))
 
 

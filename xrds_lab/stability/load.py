@@ -41,14 +41,14 @@ class Frame:
 
 
 def drive(scene: Any, count: int, **choices: Any) -> list[Frame]:
-    """Render frames 1 to ``count`` and write them as PNG and EXR in turn.
+    """Render frames 1 to `count` and write them as PNG and EXR in turn.
 
-    ``choices`` are the fields of RenderJob.
+    `choices` are the fields of RenderJob.
     """
     from xrds_blender import render
     from xrds_blender.command import picture_file
 
-    told = []
+    frames = []
     with tempfile.TemporaryDirectory() as folder, _small_guide_cache():
         for number in range(1, count + 1):
             start = time.process_time()
@@ -57,8 +57,8 @@ def drive(scene: Any, count: int, **choices: Any) -> list[Frame]:
             target = Path(folder) / f"frame.{('exr', 'png')[number % 2]}"
             picture_file.save(target, picture.radiance, picture.alpha, scene)
             seconds = time.process_time() - start
-            told.append(Frame(_resident(), _data_blocks(), seconds))
-    return told
+            frames.append(Frame(_resident(), _data_blocks(), seconds))
+    return frames
 
 
 def growth(values: Sequence[float]) -> float:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 if TYPE_CHECKING:
-    from .pictures import Array
+    from xrds_core.arrays import Array
 
 
 class Measured(NamedTuple):
@@ -24,16 +24,16 @@ def worst(name: str, curve: dict[float, float]) -> Measured:
     return Measured(name, max(values), curve)
 
 
-def relative_difference(found: Array, expected: Array) -> float:
+def relative_difference(picture: Array, expected: Array) -> float:
     """Return the largest difference, of the expected value, where there is light."""
     lit = expected > expected.max() * 1e-9
-    difference = np.abs(found.astype(np.float64) - expected)[lit] / expected[lit]
+    difference = np.abs(picture.astype(np.float64) - expected)[lit] / expected[lit]
     return float(difference.max(initial=0.0))
 
 
-def smape(found: Array, expected: Array) -> float:
+def smape(picture: Array, expected: Array) -> float:
     """Return the mean of 2 |a - b| / (|a| + |b|), 0 where both are 0."""
-    a, b = found.astype(np.float64), expected.astype(np.float64)
+    a, b = picture.astype(np.float64), expected.astype(np.float64)
     total = np.abs(a) + np.abs(b)
     return float(np.mean(2 * np.abs(a - b) / np.where(total > 0, total, 1.0)))
 
@@ -46,7 +46,7 @@ def faults(picture: Array) -> int:
 def distance(side: int, scale: int, spots: list[tuple[int, int]]) -> Array:
     """Return output pixels' distance from the nearest spot's own footprint.
 
-    ``spots`` are (row, column) of low-resolution pixels; the distance is the larger of
+    `spots` are (row, column) of low-resolution pixels; the distance is the larger of
     both axes, in output pixels, 0 inside the footprint.
     """
     axis = np.arange(side)

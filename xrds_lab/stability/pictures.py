@@ -1,6 +1,6 @@
 """Pictures made without rendering: known light on known surfaces.
 
-Arrays are float32 (height, width, channels), scene-linear. ``side`` is in output
+Arrays are float32 (height, width, channels), scene-linear. `side` is in output
 pixels; low-resolution pictures are the exact area means of the full ones.
 """
 
@@ -9,9 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float32]
+from xrds_core.arrays import Array
 
 FACING = (0.0, 0.0, 1.0)  # a normal that looks at the camera
 

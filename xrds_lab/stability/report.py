@@ -23,15 +23,15 @@ PLOTS = (
 )
 
 
-def write(folder: Path, told: dict[str, Any], checks: list[Check]) -> None:
+def write(folder: Path, result: dict[str, Any], checks: list[Check]) -> None:
     """Write all of it into an existing folder."""
-    write_json(folder / "results.json", told)
-    plots = _plots(folder, told["curves"])
+    write_json(folder / "results.json", result)
+    plots = _plots(folder, result["curves"])
     with replacing(folder / "report.md") as part:
-        part.write_text(page(told, checks, plots))
+        part.write_text(page(result, checks, plots))
 
 
-def page(told: dict[str, Any], checks: list[Check], plots: list[str]) -> str:
+def page(result: dict[str, Any], checks: list[Check], plots: list[str]) -> str:
     """Return the report as Markdown."""
     failures = [check for check in checks if not check.passed]
     bounded = [check for check in checks if check.bound is not None]
@@ -41,9 +41,9 @@ def page(told: dict[str, Any], checks: list[Check], plots: list[str]) -> str:
         f"{len(bounded)} values have a bound; {len(bounded) - len(failures)} hold it, "
         f"{sum(check.holds for check in failures)} have a measured exception, "
         f"{sum(not check.holds for check in failures)} fail. Written by `xrds "
-        f"stability`: torch {told['machine']['torch']}, Blender "
-        f"{told['machine']['blender']}, {told['machine']['device']}; weights "
-        + ", ".join(f"{w['file']} ({w['sha256'][:8]})" for w in told["weights"])
+        f"stability`: torch {result['machine']['torch']}, Blender "
+        f"{result['machine']['blender']}, {result['machine']['device']}; weights "
+        + ", ".join(f"{w['file']} ({w['sha256'][:8]})" for w in result["weights"])
         + ".",
         "",
         "## Failures",

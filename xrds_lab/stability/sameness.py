@@ -13,7 +13,9 @@ from .pictures import lit_surface
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from .pictures import Array, Inputs
+    from xrds_core.arrays import Array
+
+    from .pictures import Inputs
     from .subject import Subject
 
 
@@ -41,9 +43,9 @@ def precisions(subject: Subject) -> Iterator[Measured]:
     if subject.precision == "fp32":
         return
     inputs, _ = lit_surface(subject.side, subject.scale)
-    expected, found = subject.at("fp32")(inputs), subject(inputs)
-    off = np.abs(found - expected)
-    yield Measured("precision.smape", smape(found, expected))
+    expected, picture = subject.at("fp32")(inputs), subject(inputs)
+    off = np.abs(picture - expected)
+    yield Measured("precision.smape", smape(picture, expected))
     yield Measured(
         "precision.outliers", float(((off > 0.02) & (off > 0.05 * expected)).sum())
     )

@@ -14,7 +14,8 @@ from .pictures import Inputs, blocks, textured
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from .pictures import Array
+    from xrds_core.arrays import Array
+
     from .subject import Subject
 
 # Full-resolution (height, width): tiny, prime, no multiple of scale or window, strips.
@@ -29,12 +30,12 @@ def sizes(subject: Subject) -> Iterator[Measured]:
     bad = 0
     for height, width in SIZES:
         low = (-(-size // subject.scale) for size in (height, width))
-        found = subject(
+        picture = subject(
             Inputs(
                 blocks(*low), blocks(height, width, 1), 2 * blocks(height, width, 2) - 1
             )
         )
-        bad += faults(found) + (found.shape != (height, width, 3))
+        bad += faults(picture) + (picture.shape != (height, width, 3))
     yield Measured("shapes.faults", bad)
 
 

@@ -19,10 +19,12 @@ from .measured import Measured
 from .stiff import GUIDE_SAMPLES, SAMPLES, SCALES, before_denoising, equal_samples
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
 
-    from .pictures import Array
+    from xrds_core.arrays import Array
+
+    from ..progress import Progress
     from .subject import Subject
 
     Arrays = dict[str, Array]
@@ -34,11 +36,11 @@ _STILL = 0.03  # of guides: pixels that change more are taken for moving
 _MARGIN = 4  # pixels around moving ones that are left out with them
 
 
-def frames(folder: Path, name: str, side: int, say: Callable[[str], object]) -> Arrays:
+def frames(folder: Path, name: str, side: int, progress: Progress) -> Arrays:
     """Return the rendered frames of a shot, (frames, height, width, 3) each."""
     path = folder / f"shot-{name}-{side}-{FRAMES}-v{GENERATION}.npz"
     if not path.is_file():
-        say(f"rendering {FRAMES} frames of the {name} shot")
+        progress(f"rendering {FRAMES} frames of the {name} shot")
         made = _rendered(name, side)
         folder.mkdir(parents=True, exist_ok=True)
         with replacing(path) as part, part.open("wb") as file:
@@ -69,18 +71,18 @@ def _rendered(name: str, side: int) -> Arrays:
 
 
 def _frame(passes: Any, frame: int) -> Arrays:
-    """Every frame has its own noise, as users are told to have it."""
-    found = {}
+    """One frame's renders; every frame has noise of its own."""
+    arrays = {}
     for scale in SCALES:
         low = passes.beauty(scale, SAMPLES, seed=100 + frame)
-        found |= {f"low{scale}": low.radiance, f"noisy{scale}": before_denoising(low)}
+        arrays |= {f"low{scale}": low.radiance, f"noisy{scale}": before_denoising(low)}
     guides = passes.guides(GUIDE_SAMPLES, seed=200 + frame)
-    found |= {"albedo": guides.albedo, "normal": guides.normal}
+    arrays |= {"albedo": guides.albedo, "normal": guides.normal}
     for scale in SCALES:
         count = equal_samples(scale)
         picture = passes.beauty(1, count, seed=300 + frame, denoiser=DEFAULT_DENOISER)
-        found[f"plain{scale}"] = picture.radiance
-    return found
+        arrays[f"plain{scale}"] = picture.radiance
+    return arrays
 
 
 def still_pixels(arrays: Arrays) -> Array:

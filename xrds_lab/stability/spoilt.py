@@ -13,7 +13,9 @@ from .pictures import lit_surface, textured
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from .pictures import Array, Inputs
+    from xrds_core.arrays import Array
+
+    from .pictures import Inputs
     from .subject import Subject
 
 POISONS = (np.nan, np.inf, -np.inf, -100.0)
@@ -43,8 +45,8 @@ def invalid(subject: Subject) -> Iterator[Measured]:
         inputs, noisy = _poisoned(
             textured(subject.side, subject.scale), value, spoilt, place
         )
-        found = (subject(inputs, noisy=noisy, exposure=e) for e in (None, 1.0))
-        curve[number] = sum(map(faults, found))
+        pictures = (subject(inputs, noisy=noisy, exposure=e) for e in (None, 1.0))
+        curve[number] = sum(map(faults, pictures))
     yield worst("invalid.faults", curve)
 
 
@@ -57,17 +59,17 @@ def reach(subject: Subject) -> Iterator[Measured]:
     changed, near = 0, []
     for value in (np.nan, -100.0, 3.4e38):
         spoilt, noisy = _poisoned(clean, value, _FIELDS, lambda _: np.s_[2:4, 2:4])
-        found = subject(spoilt, noisy=noisy, exposure=0.1)
+        picture = subject(spoilt, noisy=noisy, exposure=0.1)
         beyond = np.s_[:, (RECEPTIVE_FIELD + 4) * scale :]
-        changed += int((found[beyond] != expected[beyond]).sum())
-        near.append(_disturbed(found, expected, 0.01) / scale)
+        changed += int((picture[beyond] != expected[beyond]).sum())
+        near.append(_disturbed(picture, expected, 0.01) / scale)
     yield Measured("invalid.reach", changed)
     yield Measured("invalid.distance", max(near) - 4)
 
 
-def _disturbed(found: Array, expected: Array, least: float) -> int:
+def _disturbed(picture: Array, expected: Array, least: float) -> int:
     """Return the last column that differs by more than a share of the mean."""
-    off = np.abs(found - expected).max(axis=(0, 2)) > least * expected.mean()
+    off = np.abs(picture - expected).max(axis=(0, 2)) > least * expected.mean()
     return int(np.flatnonzero(off).max(initial=0))
 
 

@@ -18,14 +18,15 @@ from xrds_core.atomic import replacing
 from .measured import Measured, faults
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from pathlib import Path
 
-    from .pictures import Array
+    from xrds_core.arrays import Array
+
+    from ..progress import Progress
     from .subject import Subject
 
     Arrays = dict[str, Array]
-    Say = Callable[[str], object]
 
 GENERATION = 2  # counts up whenever scenes or settings change
 SAMPLES, GUIDE_SAMPLES, REFERENCE_SAMPLES = 16, 4, 64
@@ -47,14 +48,14 @@ def samples_of(name: str) -> int:
 class Gallery:
     """Rendered inputs, rivals and references of the scenes, by scene."""
 
-    def __init__(self, folder: Path, side: int, say: Say) -> None:
-        self.folder, self.side, self.say = folder, side, say
+    def __init__(self, folder: Path, side: int, progress: Progress) -> None:
+        self.folder, self.side, self.progress = folder, side, progress
 
     def arrays(self, name: str) -> Arrays:
         """Return what was rendered of a scene; renders it where that is missing."""
         path = self.folder / f"{name}-{self.side}-v{GENERATION}.npz"
         if not path.is_file():
-            self.say(f"rendering {name}")
+            self.progress(f"rendering {name}")
             made = render(name, self.side)
             self.folder.mkdir(parents=True, exist_ok=True)
             with replacing(path) as part, part.open("wb") as file:
@@ -72,27 +73,27 @@ def render(name: str, side: int) -> Arrays:
     scene, samples = build(name, side), samples_of(name)
 
     def job(passes: Any) -> Arrays:
-        found: Arrays = {}
+        arrays: Arrays = {}
         for scale in SCALES:
             low = passes.beauty(scale, samples, seed=_SEEDS["low"])
-            found[f"low{scale}"] = np.dstack((low.radiance, low.alpha))
-            found[f"noisy{scale}"] = before_denoising(low)
-            found[f"low{scale}_seconds"] = sum(low.seconds.values())
+            arrays[f"low{scale}"] = np.dstack((low.radiance, low.alpha))
+            arrays[f"noisy{scale}"] = before_denoising(low)
+            arrays[f"low{scale}_seconds"] = sum(low.seconds.values())
         for count in RISING if name == "caustics" else ():
             low = passes.beauty(2, count, seed=_SEEDS["low"])
-            found[f"rising{count}"] = low.radiance
-            found[f"rising{count}_noisy"] = before_denoising(low)
+            arrays[f"rising{count}"] = low.radiance
+            arrays[f"rising{count}_noisy"] = before_denoising(low)
         guides = passes.guides(GUIDE_SAMPLES, seed=_SEEDS["guides"])
-        found |= {"albedo": guides.albedo, "normal": guides.normal}
-        found["alpha"] = guides.alpha
-        found["guides_seconds"] = sum(guides.seconds.values())
+        arrays |= {"albedo": guides.albedo, "normal": guides.normal}
+        arrays["alpha"] = guides.alpha
+        arrays["guides_seconds"] = sum(guides.seconds.values())
         plain = {f"plain{s}": equal_samples(s, samples) for s in SCALES}
         for key, count in (plain | {"reference": REFERENCE_SAMPLES}).items():
             seed = _SEEDS["reference" if key == "reference" else "plain"]
             picture = passes.beauty(1, count, seed=seed, denoiser=DEFAULT_DENOISER)
-            found[key] = picture.radiance
-            found[f"{key}_seconds"] = sum(picture.seconds.values())
-        return {key: np.asarray(x, np.float32) for key, x in found.items()}
+            arrays[key] = picture.radiance
+            arrays[f"{key}_seconds"] = sum(picture.seconds.values())
+        return {key: np.asarray(x, np.float32) for key, x in arrays.items()}
 
     return run_job(scene, job)
 
@@ -133,12 +134,12 @@ def scene(subject: Subject, name: str, arrays: Arrays) -> Iterator[Measured]:
     plain, _ = front_end.clean_radiance(arrays[f"plain{subject.scale}"])
     shown = stops(truth)
     start = time.perf_counter()
-    found = enlarged(subject, arrays)
+    picture = enlarged(subject, arrays)
     network = time.perf_counter() - start
-    light = np.nan_to_num(found[..., :3])
+    light = np.nan_to_num(picture[..., :3])
     rival = baselines.bicubic(low, subject.scale)
     ours, bicubic, oidn = (metrics.psnr(x, truth, shown) for x in (light, rival, plain))
-    yield Measured(f"stiff.{name}.faults", faults(found))
+    yield Measured(f"stiff.{name}.faults", faults(picture))
     yield Measured(f"stiff.{name}.below_bicubic", bicubic - ours)
     yield Measured(f"stiff.{name}.below_oidn", oidn - ours)
     seconds = arrays[f"low{subject.scale}_seconds"] + arrays["guides_seconds"]
@@ -156,13 +157,13 @@ def rising(subject: Subject, arrays: Arrays) -> Iterator[Measured]:
     truth, _ = front_end.clean_radiance(arrays["reference"])
     curve = {}
     for count in RISING:
-        found = subject.upscaler(
+        picture = subject.upscaler(
             arrays[f"rising{count}"],
             arrays["albedo"],
             arrays["normal"],
             noisy=arrays[f"rising{count}_noisy"],
         ).radiance
-        curve[count] = metrics.psnr(found, truth, stops(truth))
+        curve[count] = metrics.psnr(picture, truth, stops(truth))
     values = list(curve.values())
     steps = [a - b for a, b in pairwise(values)]
     yield Measured("samples.falling_psnr", max(steps), curve)

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from .pictures import Array, Inputs
+    from xrds_core.arrays import Array
+
+    from .pictures import Inputs
 
 PRECISIONS = ("fp32", "bf16")
 
@@ -39,11 +41,11 @@ class Subject:
 
     @property
     def name(self) -> str:
-        """As ``fast x2 fp32``."""
+        """As `fast x2 fp32`."""
         return f"{self.preset} x{self.scale} {self.precision}"
 
     def __call__(self, inputs: Inputs, **options: Any) -> Array:
-        """Return the picture (H, W, 3 or 4) of ``inputs``."""
+        """Return the picture (H, W, 3 or 4) of `inputs`."""
         if self.upscaler.network.config.guides == "full":
             options["guide_radiance"] = _enlarged(inputs, self.scale)
         return self.upscaler(*inputs, **options).radiance

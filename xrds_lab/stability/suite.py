@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import UsageError
 
+from ..progress import silent
 from . import hues, lies, light, sameness, shapes, spoilt
 from .bounds import STIFF, judge
 
@@ -16,12 +17,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    from ..progress import Progress
     from .bounds import Check
     from .measured import Measured
     from .subject import Subject
 
     Work = Callable[[Subject], Iterator[Measured]]
-    Say = Callable[[str], object]
     Key = tuple[str, str]  # of a value and a subject
 
 GROUPS: dict[str, tuple[Work, ...]] = {
@@ -56,23 +57,21 @@ def stability(
     *,
     parts: Sequence[str] = PARTS,
     cache: Path | None = None,
-    side: int = SIDE,
     device: str = "auto",
     weights: Path | None = None,
-    progress: Say | None = None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Measure all, write the report into ``out`` and return the JSON's content.
+    """Measure all, write the report into `out` and return the JSON's content.
 
     Args:
         out: folder for results.json, report.md and plots; made if need be.
         parts: of `PARTS`.
-        cache: folder that keeps rendered pictures; ``out``/rendered by default.
-        side: pixels of the rendered scenes along one side.
+        cache: folder that keeps rendered pictures; `out`/rendered by default.
         device: as `Upscaler`'s.
         weights: a folder of presets in place of the shipped.
-        progress: given one line of text after every check.
+        progress: gets a line of text after every check.
 
-    Values of the same weights that ``out`` holds from an earlier run, as of other
+    Values of the same weights that `out` holds from an earlier run, as of other
     parts, stay in the report. Raises UsageError for unknown parts, WeightsError for
     damaged weights.
     """
@@ -85,35 +84,34 @@ def stability(
     if unknown:
         raise UsageError(f"{sorted(unknown)} is none of {', '.join(PARTS)}")
     out.mkdir(parents=True, exist_ok=True)
-    say = progress or (lambda _: None)
-    works = list(_works(parts, cache or out / "rendered", side, weights, say))
-    there = available(weights)
-    found, curves = _earlier(out / "results.json", there)
-    told: dict[str, Any] = {}
+    works = list(_works(parts, cache or out / "rendered", weights, progress))
+    records = available(weights)
+    verdicts, curves = _earlier(out / "results.json", records)
+    result: dict[str, Any] = {}
     for subject in shipped(
         directory=weights, device=device, side=ARRAY_SIDE, thorough=True
     ):
         for name, work in works:
             for check, measured in checks(subject, work):
-                found[check.name, subject.name] = check
+                verdicts[check.name, subject.name] = check
                 if measured.curve:
                     curves[check.name, subject.name] = measured.curve
                 if not check.passed:
-                    say(f"{subject.name}: {check.name} is {check.value:.3g}")
-            say(f"{subject.name}: {name} done")
+                    progress(f"{subject.name}: {check.name} is {check.value:.3g}")
+            progress(f"{subject.name}: {name} done")
         # after each of them: what an interrupt leaves is a report of those before
-        told = {
-            "checks": [vars(check) for check in found.values()],
+        result = {
+            "checks": [vars(check) for check in verdicts.values()],
             "curves": [
-                {"name": name, "subject": who, "points": [*map(list, curve.items())]}
-                for (name, who), curve in curves.items()
+                {"name": name, "subject": of, "points": [*map(list, curve.items())]}
+                for (name, of), curve in curves.items()
             ],
             "machine": _machine(subject.upscaler.device),
-            "weights": there,
-            "passed": all(check.holds for check in found.values()),
+            "weights": records,
+            "passed": all(check.holds for check in verdicts.values()),
         }
-        report.write(out, told, list(found.values()))
-    return told
+        report.write(out, result, list(verdicts.values()))
+    return result
 
 
 def _earlier(
@@ -121,14 +119,16 @@ def _earlier(
 ) -> tuple[dict[Key, Check], dict[Key, dict[float, float]]]:
     """Return what an earlier run measured of the same weights, to be added to."""
     try:
-        told = json.loads(path.read_text())
-        if told["weights"] != weights:
+        result = json.loads(path.read_text())
+        if result["weights"] != weights:
             return {}, {}
         verdicts = [
             judge(*(x[k] for k in ("name", "value", "preset", "scale", "precision")))
-            for x in told["checks"]
+            for x in result["checks"]
         ]
-        curves = {(x["name"], x["subject"]): dict(x["points"]) for x in told["curves"]}
+        curves = {
+            (x["name"], x["subject"]): dict(x["points"]) for x in result["curves"]
+        }
     except (OSError, ValueError, KeyError, TypeError):
         return {}, {}
     return {
@@ -137,7 +137,7 @@ def _earlier(
 
 
 def _works(
-    parts: Sequence[str], folder: Path, side: int, weights: Path | None, say: Say
+    parts: Sequence[str], folder: Path, weights: Path | None, progress: Progress
 ) -> Iterator[tuple[str, Work]]:
     if "arrays" in parts:
         for group in GROUPS.values():
@@ -147,19 +147,19 @@ def _works(
 
         yield "large", large
     if "scenes" in parts:
-        yield from _scenes(folder, side, say)
+        yield from _scenes(folder, progress)
     if "shots" in parts:
-        yield from _shots(folder, side, say)
+        yield from _shots(folder, progress)
     if "load" in parts:
         from .load import load
 
         yield "load", partial(load, weights=weights)
 
 
-def _scenes(folder: Path, side: int, say: Say) -> Iterator[tuple[str, Work]]:
+def _scenes(folder: Path, progress: Progress) -> Iterator[tuple[str, Work]]:
     from . import stiff
 
-    gallery = stiff.Gallery(folder, side, say)
+    gallery = stiff.Gallery(folder, SIDE, progress)
     for name in STIFF:
         yield (
             name,
@@ -168,10 +168,10 @@ def _scenes(folder: Path, side: int, say: Say) -> Iterator[tuple[str, Work]]:
     yield "rising", lambda subject: stiff.rising(subject, gallery.arrays("caustics"))
 
 
-def _shots(folder: Path, side: int, say: Say) -> Iterator[tuple[str, Work]]:
+def _shots(folder: Path, progress: Progress) -> Iterator[tuple[str, Work]]:
     from . import shots
 
-    load = partial(shots.frames, folder, side=side // 2, say=say)
+    load = partial(shots.frames, folder, side=SIDE // 2, progress=progress)
     for name in shots.SHOTS:
         yield (
             name,

@@ -28,17 +28,17 @@ class Library:
     def at(cls, folder: str | Path) -> Library:
         """The library in `folder`; UsageError where there is nothing to use."""
         root = Path(folder)
-        found = cls(
+        library = cls(
             tuple(sorted(root.glob("models/*.glb"))),
             tuple(sorted(root.glob("hdris/*.exr"))),
             tuple(sorted(path.parent for path in root.glob("textures/*/albedo.*"))),
         )
-        if not (found.models and found.skies and found.textures):
+        if not (library.models and library.skies and library.textures):
             raise UsageError(
                 f"no models/*.glb, hdris/*.exr and textures/*/albedo.* in {root}: "
                 "give the folder that holds all three, or no assets at all"
             )
-        return found
+        return library
 
     def note(self, path: Path) -> None:
         """Remember that the scene uses `path`."""

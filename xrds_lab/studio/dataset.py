@@ -30,13 +30,14 @@ from tqdm import tqdm
 from xrds_blender import run_job
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 
 from . import framing, scenes
 from .framing import Window
 from .stage import Stage, View
 
-Arrays = dict[str, np.ndarray]
+Arrays = dict[str, Array]
 HALF_MAX = 65504.0  # the largest half-precision number
 VALIDATION_EVERY = 10
 JOURNAL = "scenes.jsonl"
@@ -174,17 +175,17 @@ def _windows(
             continue
         frame = (stage.scene.render.resolution_x, stage.scene.render.resolution_y)
         detail = framing.interest(radiance, albedo, normal)
-        found = framing.choose(
+        windows = framing.choose(
             rng, frame, recipe.window, recipe.windows, detail, radiance.mean(-1)
         )
-        for window in found:
+        for window in windows:
             yield view, window, float(auto_exposure(radiance))
-        used += bool(found)
+        used += bool(windows)
         if used == recipe.views:
             return
 
 
-def _probe(stage: Stage, view: View, seed: int) -> tuple[np.ndarray, ...]:
+def _probe(stage: Stage, view: View, seed: int) -> tuple[Array, ...]:
     """A tiny, noisy picture of the whole frame: radiance, albedo, normal."""
     scenes.show(stage, view)
     framing.set_border(stage.scene, None)
@@ -225,7 +226,7 @@ def _write(
         np.savez_compressed(file, meta=np.array(json.dumps(meta)), **halves)
 
 
-def _half(array: np.ndarray) -> np.ndarray:
+def _half(array: Array) -> Array:
     clean = np.nan_to_num(array, nan=0.0, posinf=HALF_MAX, neginf=-HALF_MAX)
     return np.clip(clean, -HALF_MAX, HALF_MAX).astype(np.float16)
 

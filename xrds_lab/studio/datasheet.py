@@ -49,33 +49,33 @@ def _meta(path: Path) -> dict[str, Any]:
         ) from None
 
 
-def datasheet(found: list[File]) -> dict[str, Any]:
+def datasheet(windows: list[File]) -> dict[str, Any]:
     """Windows by split and kind, scenes, assets, bytes and CPU seconds of a window."""
     stages = Counter[str]()
-    for file in found:
+    for file in windows:
         for name, seconds in file.meta["seconds"].items():
             if name.endswith("_cpu"):
                 stages[name.removesuffix("_cpu")] += seconds
     return {
-        "windows": dict(Counter(file.path.parent.name for file in found)),
-        "kinds": dict(Counter(file.meta["kind"] for file in found)),
-        "scenes": len({file.meta["seed"] for file in found}),
-        "assets": len({name for file in found for name in file.meta["assets"]}),
-        "mean_bytes": statistics.fmean(f.path.stat().st_size for f in found)
-        if found
+        "windows": dict(Counter(file.path.parent.name for file in windows)),
+        "kinds": dict(Counter(file.meta["kind"] for file in windows)),
+        "scenes": len({file.meta["seed"] for file in windows}),
+        "assets": len({name for file in windows for name in file.meta["assets"]}),
+        "mean_bytes": statistics.fmean(f.path.stat().st_size for f in windows)
+        if windows
         else 0.0,
-        "mean_cpu_seconds": {name: s / len(found) for name, s in stages.items()},
+        "mean_cpu_seconds": {name: s / len(windows) for name, s in stages.items()},
     }
 
 
-def contact_sheet(found: list[File], path: Path) -> None:
+def contact_sheet(windows: list[File], path: Path) -> None:
     """Write a JPEG of the references, one window a scene, drawn evenly if many.
 
     Raises UsageError where there is no window.
     """
     from PIL import Image
 
-    scenes = list({file.meta["seed"]: file for file in found}.values())
+    scenes = list({file.meta["seed"]: file for file in windows}.values())
     if not scenes:
         raise UsageError(f"no window to show in {path.name}: render some first")
     shown = scenes[:: math.ceil(len(scenes) / MOST)]
@@ -94,13 +94,14 @@ def contact_sheet(found: list[File], path: Path) -> None:
         sheet.save(part, "JPEG", quality=QUALITY)
 
 
-def lines(told: dict[str, Any]) -> list[str]:
+def lines(sheet: dict[str, Any]) -> list[str]:
     """The datasheet to be read."""
-    stages = ", ".join(f"{k} {s:.1f}" for k, s in told["mean_cpu_seconds"].items())
+    stages = ", ".join(f"{k} {s:.1f}" for k, s in sheet["mean_cpu_seconds"].items())
     return [
-        f"windows: {_counts(told['windows'])}; {_counts(told['kinds'])}",
-        f"{told['scenes']} scenes, {told['assets']} files of assets",
-        f"a window: {told['mean_bytes'] / 1e6:.2f} MB; CPU seconds: {stages or 'none'}",
+        f"windows: {_counts(sheet['windows'])}; {_counts(sheet['kinds'])}",
+        f"{sheet['scenes']} scenes, {sheet['assets']} files of assets",
+        f"a window: {sheet['mean_bytes'] / 1e6:.2f} MB; "
+        f"CPU seconds: {stages or 'none'}",
     ]
 
 

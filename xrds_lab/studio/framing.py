@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-Array = np.ndarray
+from xrds_core.arrays import Array
+
 GRID = 8  # window origins are multiples of this, so that every scale divides them
 PROBE_PERCENT = 12
 LEAST_INTEREST = 0.05  # the noise of the probe alone reaches about 0.03
@@ -94,13 +95,13 @@ def choose(
     bright = [_mean(luminance, place, width) for place in places]
     lit_up = [b > 0.05 * float(np.median(bright)) and b > 1e-4 for b in bright]
     good, fair = np.quantile(scores, (0.7, 0.4))
-    found: list[Window] = []
+    chosen: list[Window] = []
     for place, score, seen in zip(places, scores, lit_up, strict=True):
         rich = score >= good or (score >= fair and rng.random() < 0.1)
         wanted = seen and rich and score > LEAST_INTEREST
-        if wanted and not any(place.overlaps(other) for other in found):
-            found.append(place)
-    return found[:count]
+        if wanted and not any(place.overlaps(other) for other in chosen):
+            chosen.append(place)
+    return chosen[:count]
 
 
 def _mean(picture: Array, window: Window, width: int) -> float:

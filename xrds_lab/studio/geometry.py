@@ -15,7 +15,8 @@ import bpy
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Vertices = NDArray[np.float64]
+"""Points or texture coordinates, one in each row."""
 Point = Sequence[float]
 Profile = Sequence[tuple[float, float]]
 
@@ -24,9 +25,9 @@ Profile = Sequence[tuple[float, float]]
 class Shape:
     """Vertices (n, 3), faces as vertex indices, texture coordinates (corners, 2)."""
 
-    vertices: Array
+    vertices: Vertices
     faces: list[tuple[int, ...]]
-    uv: Array
+    uv: Vertices
     smooth: bool = False
 
     def moved(self, offset: Point = (0, 0, 0), turn: float = 0.0) -> Shape:
@@ -48,11 +49,11 @@ class Shape:
         out[:, j] = s * self.vertices[:, i] + c * self.vertices[:, j]
         return self._with(out)
 
-    def bent(self, bend: Callable[[Array], Array]) -> Shape:
+    def bent(self, bend: Callable[[Vertices], Vertices]) -> Shape:
         """Vertices replaced by `bend(vertices)`."""
         return self._with(bend(self.vertices))
 
-    def _with(self, vertices: Array) -> Shape:
+    def _with(self, vertices: Vertices) -> Shape:
         return Shape(vertices, self.faces, self.uv, self.smooth)
 
     def mesh(self, name: str) -> bpy.types.Mesh:
@@ -103,7 +104,7 @@ def box(x: float, y: float, z: float) -> Shape:
     return Shape(vertices, faces, np.concatenate(uv))
 
 
-def quads(points: Array) -> Shape:
+def quads(points: Vertices) -> Shape:
     """Separate quadrilaterals, points (n, 4, 3); each with its own coordinates."""
     count = len(points)
     faces = [tuple(range(4 * i, 4 * i + 4)) for i in range(count)]
@@ -124,7 +125,7 @@ def sheet(width: float, depth: float, columns: int = 1, rows: int = 1) -> Shape:
     return _grid(points, flat, columns + 1, rows + 1)
 
 
-def _grid(points: Array, uv: Array, columns: int, rows: int) -> Shape:
+def _grid(points: Vertices, uv: Vertices, columns: int, rows: int) -> Shape:
     index = np.arange(columns * rows).reshape(rows, columns)
     cells = np.stack(
         [index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], -1
@@ -220,7 +221,7 @@ def lumpy(
 ) -> Shape:
     """Vertices pushed from the origin by smooth noise of wavelength `size`."""
 
-    def push(vertices: Array) -> Array:
+    def push(vertices: Vertices) -> Vertices:
         waves = rng.normal(0, 1 / size, (12, 3))
         phase = rng.uniform(0, 2 * math.pi, 12)
         noise = np.sin(vertices @ waves.T * 2 + phase).mean(1, keepdims=True)

@@ -11,6 +11,7 @@ from . import patterns
 from .geometry import (
     Point,
     Shape,
+    Vertices,
     box,
     cone,
     cylinder,
@@ -231,7 +232,7 @@ def curtain(stage: Stage, at: Point, turn: float, width: float, height: float) -
     waves, deep = stage.rng.uniform(4, 14) / width, stage.rng.uniform(0.02, 0.06)
     shape = sheet(width, height, 120, 6).rotated("x", math.pi / 2)
 
-    def fold(vertices: np.ndarray) -> np.ndarray:
+    def fold(vertices: Vertices) -> Vertices:
         out = vertices.copy()
         x, z = vertices[:, 0], vertices[:, 2]
         out[:, 1] += (
@@ -282,7 +283,7 @@ def plant(stage: Stage, at: Point, size: float) -> None:
     stage.put(cone(size * 0.03, size * 0.015, size * 0.7), stage.paint.wood(0.5), at)
 
 
-def scattered(stage: Stage, spots: np.ndarray, size: float) -> Shape:
+def scattered(stage: Stage, spots: Vertices, size: float) -> Shape:
     """Kite-shaped leaves at the points (n, 3), in random directions."""
     dice, count = stage.dice, len(spots)
     along = dice.normal(size=(count, 3))

@@ -7,7 +7,17 @@ import math
 import numpy as np
 
 from . import lighting, props
-from .geometry import Shape, box, cylinder, joined, lathe, sheet, sphere, torus
+from .geometry import (
+    Shape,
+    Vertices,
+    box,
+    cylinder,
+    joined,
+    lathe,
+    sheet,
+    sphere,
+    torus,
+)
 from .stage import Stage, turned
 
 
@@ -146,7 +156,7 @@ def _body(stage: Stage, x: float, y: float, z: float) -> Shape:
     """A superellipsoid with random roundness."""
     power = stage.rng.uniform(0.35, 0.8)
 
-    def squared(vertices: np.ndarray) -> np.ndarray:
+    def squared(vertices: Vertices) -> Vertices:
         return np.sign(vertices) * np.abs(vertices) ** power * (x / 2, y / 2, z / 2)
 
     return sphere(1.0, 96).bent(squared)

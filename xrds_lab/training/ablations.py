@@ -90,7 +90,7 @@ def ablate(
 ) -> dict[str, Any]:
     """Train every variant of a table and write OUT/TABLE.json, which is returned.
 
-    ``changes`` are those of `read_config`, for all runs. Runs lie in OUT/runs, named by
+    `changes` are those of `read_config`, for all runs. Runs lie in OUT/runs, named by
     what they change, so that tables share them; they go on where they were interrupted,
     and those that are done are only read.
 
@@ -105,10 +105,10 @@ def ablate(
         for name, own in TABLES[table].items()
     }
     common = read_config(config, changes)
-    told = {"table": table, "scale": common.scale, "steps": common.steps}
-    told |= {"seeds": seeds, "rows": rows}
-    write_json(out / f"{table}.json", told)
-    return told
+    result = {"table": table, "scale": common.scale, "steps": common.steps}
+    result |= {"seeds": seeds, "rows": rows}
+    write_json(out / f"{table}.json", result)
+    return result
 
 
 def _run_name(changes: Changes) -> str:
@@ -133,12 +133,12 @@ def _row(config: Path, run: Path, changes: Sequence[str], seeds: int) -> dict[st
     }
 
 
-def lines(told: dict[str, Any]) -> list[str]:
+def lines(result: dict[str, Any]) -> list[str]:
     """The table to be read, and where it lies."""
-    head = f"x{told['scale']}, {told['steps']} steps, {told['seeds']} seeds"
+    head = f"x{result['scale']}, {result['steps']} steps, {result['seeds']} seeds"
     figures = "dB of validation, spread, parameters, MACs a pixel"
-    rows = [f"{told['table']}: {head}; {figures}"]
-    for name, row in told["rows"].items():
+    rows = [f"{result['table']}: {head}; {figures}"]
+    for name, row in result["rows"].items():
         figures = f"{row['mean']:6.2f} {row['spread']:5.2f} {row['parameters']:9}"
         rows.append(f"  {name:<34}{figures} {row['macs_per_pixel']:9.0f}")
     return rows

@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from xrds_core.arrays import Array
+
 from .crop import Crop
-from .windows import Array
 
 
 def shade(

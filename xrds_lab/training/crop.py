@@ -9,9 +9,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from xrds_core.arrays import Array
 from xrds_core.front_end import transfer
-
-from .windows import Array
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
 from xrds_core.front_end import clean_albedo, clean_radiance
 
@@ -18,7 +19,7 @@ from .augmentation import (
     transpose_and_flip,
 )
 from .crop import Batch, Crop
-from .windows import LOW_RENDERS, WHOLE, Array, Box, Window, low_name
+from .windows import LOW_RENDERS, WHOLE, Box, Window, low_name
 
 # Of radiance at the automatic exposure: darker than this, noise is not transplanted.
 NOISE_FLOOR = 0.01

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.metrics import psnr, to_srgb
 
@@ -18,7 +19,7 @@ INCH = 100  # pixels
 PICTURE = 256  # pixels of a sample's side
 LABEL = 24  # pixels above it
 
-Pictures = Mapping[str, np.ndarray]
+Pictures = Mapping[str, Array]
 
 
 def write_curve(records: Sequence[Mapping[str, Any]], path: Path) -> None:
@@ -70,7 +71,7 @@ def write_samples(rows: Sequence[Pictures], path: Path) -> None:
     write(figure, path)
 
 
-def label(name: str, picture: np.ndarray, reference: np.ndarray) -> str:
+def label(name: str, picture: Array, reference: Array) -> str:
     """The name, with the PSNR where it can be measured."""
     if picture is reference or picture.shape != reference.shape:
         return name

@@ -157,7 +157,7 @@ class Learner:
         guides, other, samples = batch
         for group in self.optimizer.param_groups:
             group["lr"] = self.learning_rate()
-        # the fewer samples, the less the other render tells
+        # the fewer samples, the noisier the other render
         loss = (sum(errors(self.network(guides), other)) * samples).mean()
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
@@ -209,8 +209,8 @@ def error_left(network: GuideFilter, pairs: Sequence[Pair]) -> dict[str, float]:
     for pair in pairs:
         for guides, other, noise in noisy_first(pair):
             with torch.inference_mode():
-                found = [(x - other).square() for x in (network(guides), guides)]
-            values = [[float(y.mean()) for y in x.split(3, dim=1)] for x in found]
+                errors = [(x - other).square() for x in (network(guides), guides)]
+            values = [[float(y.mean()) for y in x.split(3, dim=1)] for x in errors]
             sums += np.array(values) - noise * np.array(values[1])
     parts = [float(s[0] / s[1]) if s[1] else 1.0 for s in sums.T]
     return dict(zip(("albedo", "normal"), parts, strict=True))
@@ -224,9 +224,9 @@ def noisy_first(pair: Pair) -> Iterator[tuple[Tensor, Tensor, float]]:
             yield pair.guides[None, i], pair.guides[None, 1 - i], own / total
 
 
-def lines(told: dict[str, Any]) -> list[str]:
+def lines(result: dict[str, Any]) -> list[str]:
     """What became of it."""
     left = ", ".join(
-        f"{part:.0%} of {name}" for name, part in told["error_left"].items()
+        f"{part:.0%} of {name}" for name, part in result["error_left"].items()
     )
-    return [f"{told['out']}: {told['steps']} steps; squared error left: {left}"]
+    return [f"{result['out']}: {result['steps']} steps; squared error left: {left}"]

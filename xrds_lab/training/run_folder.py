@@ -1,4 +1,4 @@
-"""The folder of one run: what it was told, how it went, and what it learnt.
+"""The folder of one run: its configuration, its figures and its weights.
 
 `config.toml` begins the run anew; `checkpoint.pt` lets it go on; `stats.jsonl` has a
 line for each validation, drawn in `curve.png`; `samples.png` shows some windows;
@@ -69,12 +69,12 @@ class RunFolder:
             with replacing(self.files) as part:
                 part.write_text(json.dumps(files))
 
-    def _compare(self, kept: TrainingConfig, given: TrainingConfig) -> None:
+    def _compare(self, kept: TrainingConfig, wanted: TrainingConfig) -> None:
         for name, value in vars(kept).items():
-            if name not in FREE and value != getattr(given, name):
+            if name not in FREE and value != getattr(wanted, name):
                 raise UsageError(
                     f"{self.path} holds a run with {name} = {value!r}, not "
-                    f"{getattr(given, name)!r}: give another folder with --out, and "
+                    f"{getattr(wanted, name)!r}: give another folder with --out, and "
                     f"start = {str(self.weights)!r} to go on from its weights"
                 )
 

@@ -117,7 +117,7 @@ class Run:
             write_samples(shown, self.folder.samples)
         self.save()
 
-    def record(self, told: dict[str, Any]) -> None:
+    def record(self, figures: dict[str, Any]) -> None:
         """Add a line to the statistics; keep the weights if they are the best."""
         steps = len(self.losses)
         line = {
@@ -125,7 +125,7 @@ class Run:
             "loss": float(np.mean(self.losses)) if steps else None,
             "learning_rate": self.config.learning_rate_at(self.step),
             "seconds_per_step": self.seconds / steps if steps else None,
-            **told,
+            **figures,
         }
         self.records.append(line)
         self.losses, self.seconds, self.validated = [], 0.0, self.step
@@ -135,14 +135,14 @@ class Run:
         if self.processes.lead:
             self.folder.write_records(self.records)
             if better:
-                self.save_weights(told)
+                self.save_weights(figures)
 
-    def save_weights(self, told: dict[str, Any]) -> None:
+    def save_weights(self, figures: dict[str, Any]) -> None:
         """Write the averaged weights with what they were trained on."""
         training = {
             "step": self.step,
             "windows": {split: len(some) for split, some in self.windows.items()},
-            "validation": told,
+            "validation": figures,
             "config": asdict(replace(self.config, data=(), start="")),
         }
         record = {

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from xrds_core.arrays import Array
 from xrds_core.baselines import bicubic
 from xrds_core.front_end import demodulated_base, inverse_transfer
 from xrds_core.metrics import psnr
@@ -26,7 +27,7 @@ SETS = {"rendered": Variation(), "shaded": Variation(shaded=1.0)}
 SHOWN = (0.0, 0.5, 1.0)  # of the windows of a set, first to last
 METHODS = ("xrds", "bicubic", "demodulated")
 
-Pictures = dict[str, np.ndarray]
+Pictures = dict[str, Array]
 
 
 @dataclass(frozen=True)
@@ -112,6 +113,6 @@ def pictures(forward: Callable[[Batch], Tensor], batch: Batch) -> Pictures:
     }
 
 
-def to_picture(t: Tensor) -> np.ndarray:
+def to_picture(t: Tensor) -> Array:
     """(1, 3, H, W) in the transfer domain to linear (H, W, 3)."""
     return inverse_transfer(t.float(), 1.0)[0].permute(1, 2, 0).numpy()

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xrds_core.arrays import Array
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.front_end import auto_exposure, clean_radiance
 
-Array = NDArray[np.float32]
 Box = tuple[slice, slice]
 
 # What numpy and zipfile raise for files that are not whole or claim the impossible.
@@ -153,10 +153,10 @@ def find_windows(folders: Sequence[Path], split: str, names: Sequence[str]) -> F
         UsageError: there are none.
         PictureError: one is damaged.
     """
-    found = [sorted((folder / split).glob("*.npz")) for folder in folders]
-    kept = [[path.name for path in paths if holds(path, names)] for paths in found]
+    listed = [sorted((folder / split).glob("*.npz")) for folder in folders]
+    kept = [[path.name for path in paths if holds(path, names)] for paths in listed]
     if not any(kept):
-        total = sum(map(len, found))
+        total = sum(map(len, listed))
         raise UsageError(
             f"{total or 'no'} windows in the {split} folder of "
             f"{', '.join(map(str, folders))}"
