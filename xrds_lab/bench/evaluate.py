@@ -165,7 +165,8 @@ class _Scene:
     ) -> None:
         self.pictures, self.rows, self.progress = pictures, rows, progress
         self.sheet = Sheet()
-        self._render([c for configs in rows.values() for c in configs.values()])
+        self._configs = [c for configs in rows.values() for c in configs.values()]
+        pictures.render_missing(self._configs, progress)
         self.times = self._measured_times(rounds) if rounds else None
 
     def records(self) -> list[Record]:
@@ -179,7 +180,7 @@ class _Scene:
     def _record(self, network: Network, configs: Configs) -> Record:
         if self.times is not None and "xrds" in configs:
             configs["oidn_equal_time"] = _equal_time(self.times, configs)
-            self._render([configs["oidn_equal_time"]])
+            self.pictures.render_missing([configs["oidn_equal_time"]], self.progress)
         stages = {} if self.times is None else _seconds(self.times, configs)
         made = {name: self.pictures.picture(c) for name, c in configs.items()}
         shot, reference = self.pictures.shot, self.pictures.reference()
@@ -201,14 +202,6 @@ class _Scene:
         }
         return record | ({} if self.times is None else {"frame_seconds": stages})
 
-    def _render(self, configs: Sequence[Config]) -> None:
-        name = self.pictures.shot.name
-        self.pictures.render(
-            self.pictures.missing(configs),
-            Strict(),
-            lambda r: self.progress(f"{name}: rendered {r.kind} {r.samples} spp"),
-        )
-
     def _measured_times(self, rounds: int) -> StageTimes:
         """Seconds of the stages of whole frames; runs in the folder are not repeated.
 
@@ -216,7 +209,6 @@ class _Scene:
         change them.
         """
         shot, networks = self.pictures.shot, self.pictures.networks
-        configs = [c for row in self.rows.values() for c in row.values()]
         sizes = [
             networks[network].network.config.to_dict()
             for network in self.rows
@@ -227,8 +219,8 @@ class _Scene:
         version = f"v{GENERATION}-blender{_blender_version().replace(' ', '')}"
         name = f"{shot.identity}-seconds-{machine}-{version}-{digest[:8]}.json"
         times = StageTimes(self.pictures.folder.directory / name)
-        timed = tasks(shot, configs, networks)
-        watch = Stopwatch(shot, times, anchors(configs), timed, Strict())
+        timed = tasks(shot, self._configs, networks)
+        watch = Stopwatch(shot, times, anchors(self._configs), timed, Strict())
         watch.measure(rounds, lambda n: self.progress(f"{shot.name}: timed {n}"))
         return times
 

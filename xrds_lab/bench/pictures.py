@@ -17,6 +17,7 @@ from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
 
 from .inputs import Folder, Request, open_scene
+from .journal import Strict
 from .rivals import ENLARGEMENTS
 
 if TYPE_CHECKING:
@@ -24,8 +25,9 @@ if TYPE_CHECKING:
 
     from xrds_core.arrays import Array
 
+    from ..progress import Progress
     from .inputs import Arrays
-    from .journal import Journal, Strict
+    from .journal import Journal
     from .sweep import Config
     from .windows import Shot
 
@@ -129,6 +131,14 @@ class Pictures:
             scene = open_scene(self.shot.path, self.shot.window)
             exposure = np.float32(scene.view_settings.exposure)
             run_job(scene, job)
+
+    def render_missing(self, configs: Sequence[Config], progress: Progress) -> None:
+        """Render all that the configurations lack; the first failure is raised."""
+        self.render(
+            self.missing(configs),
+            Strict(),
+            lambda r: progress(f"{self.shot.name}: rendered {r.kind} {r.samples} spp"),
+        )
 
     # --- pictures ---------------------------------------------------------------------
 

@@ -9,7 +9,6 @@ from . import pareto
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from pathlib import Path
 
     Point = dict[str, Any]
     Line = list[tuple[float, float]]
@@ -90,11 +89,6 @@ def growth_plot(growth: dict[str, Any]) -> bytes:
                 panel.plot(*zip(*shown, strict=True), color=f"C{number}", label=name,
                            marker="osD^v<>"[number % 7], markersize=4)  # fmt: skip
     return _svg(figure, panels, outside=True)
-
-
-def save(svg: bytes, path: Path) -> None:
-    """Write an SVG file."""
-    path.write_bytes(svg)
 
 
 def _figure(title: str, axis: str) -> tuple[Any, Any]:

@@ -36,7 +36,7 @@ def write(out: Path, report: Report, scenes: Sequence[SceneBench]) -> None:
     sections = [_machine(report), _failures(report)]
     if timed:
         overall = plots.mean_plot(timed)
-        plots.save(overall, out / "pareto.svg")
+        (out / "pareto.svg").write_bytes(overall)
         sections[:0] = [_figure(overall), _mean_table(report), _picker(report)]
     if "growth" in report:
         sections.append(_growth(out, report["growth"]))
@@ -47,7 +47,7 @@ def write(out: Path, report: Report, scenes: Sequence[SceneBench]) -> None:
         if name in timed:
             floor = scene["reference_psnr_floor"]
             svg = plots.scene_plot(name, *timed[name], floor)
-            plots.save(svg, out / f"pareto-{name}.svg")
+            (out / f"pareto-{name}.svg").write_bytes(svg)
             sections += [_facts(report, scene), _figure(svg), _table(report, name)]
             sections.append(viewer(report, by_name[name]))
     page = Template(PAGE.read_text("utf-8")).substitute(body="\n".join(sections))
@@ -194,7 +194,7 @@ def _failures(report: Report) -> str:
 
 def _growth(out: Path, growth: dict[str, Any]) -> str:
     svg = plots.growth_plot(growth)
-    plots.save(svg, out / "growth.svg")
+    (out / "growth.svg").write_bytes(svg)
     rows = [
         [
             row["task"],

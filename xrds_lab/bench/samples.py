@@ -21,7 +21,6 @@ from xrds_core.atomic import write_json
 
 from ..progress import silent
 from .inputs import kept
-from .journal import Strict
 from .pictures import Networks, Pictures
 from .sweep import Config, xrds
 from .windows import find_shots
@@ -99,11 +98,7 @@ def _measured(
 ) -> list[Record]:
     """One record per configuration."""
     folder, shot = pictures.folder, pictures.shot
-    pictures.render(
-        pictures.missing(configs),
-        Strict(),
-        lambda r: progress(f"{shot.name}: rendered {r.kind} {r.samples} spp"),
-    )
+    pictures.render_missing(configs, progress)
     records = []
     for config in configs:
         errors = pictures.errors(config)

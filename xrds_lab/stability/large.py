@@ -51,7 +51,7 @@ print("REPORT" + json.dumps({"peak": peak, "bad": bad, "tiles": result.tiles}))
 """
 
 
-def large(subject: Subject, side: int = SIDE) -> Iterator[Measured]:
+def large(subject: Subject) -> Iterator[Measured]:
     """Bytes beside the arrays given and returned, with a limit of 2 GiB.
 
     The lower half is background, which the network does not see: both ways count.
@@ -59,17 +59,17 @@ def large(subject: Subject, side: int = SIDE) -> Iterator[Measured]:
     """
     if subject.precision != "fp32":
         return
-    words = [subject.preset, subject.scale, subject.precision, side, LIMIT]
+    words = [subject.preset, subject.scale, subject.precision, SIDE, LIMIT]
     done = subprocess.run(
         [sys.executable, "-c", _PROGRAM, *map(str, words)],
         capture_output=True,
         text=True,
         check=False,
-        cwd=Path(__file__).parents[3],
+        cwd=Path(__file__).parents[2],
     )
     if done.returncode:
         raise XRDSError(
-            f"{subject.name} ended with {done.returncode} on {side}x{side} pixels: "
+            f"{subject.name} ended with {done.returncode} on {SIDE}x{SIDE} pixels: "
             f"{done.stderr.strip().rpartition(chr(10))[2]}"
         )
     result = json.loads(done.stdout.rpartition("REPORT")[2])

@@ -35,7 +35,7 @@ class Frame:
     """What the process holds after a frame, and what it took."""
 
     memory: int
-    """Resident, in bytes; 0 where the system does not tell."""
+    """Resident, in bytes; 0 where the system does not report it."""
     data_blocks: int
     cpu_seconds: float
 
@@ -73,9 +73,7 @@ def settled(frames: list[Frame]) -> list[Frame]:
     return frames[len(frames) // 3 :]
 
 
-def load(
-    subject: Subject, weights: Path | None, count: int = FRAMES
-) -> Iterator[Measured]:
+def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
     """Growth over a shot; only in fp32, for its network is the same for Blender."""
     if subject.precision != "fp32":
         return
@@ -85,14 +83,14 @@ def load(
 
     scene = build("one_sample", SIDE)
     thing = scene.objects["steel"]
-    for frame, angle in ((1, 0.0), (count, 6.0)):
+    for frame, angle in ((1, 0.0), (FRAMES, 6.0)):
         thing.rotation_euler[2] = angle
         thing.keyframe_insert("rotation_euler", frame=frame)
     guides = subject.upscaler.network.config.guides
-    with stdout_to(Path(os.devnull)):  # Blender tells of every sample
+    with stdout_to(Path(os.devnull)):  # Blender prints a line for every sample
         frames = drive(
             scene,
-            count,
+            FRAMES,
             scale=subject.scale,
             samples=2,
             preset=subject.preset.removesuffix("_full"),
@@ -102,7 +100,7 @@ def load(
         )
     frames = settled(frames)
     memory = [frame.memory / 2**10 for frame in frames]
-    numbers = range(count - len(frames) + 1, count + 1)
+    numbers = range(FRAMES - len(frames) + 1, FRAMES + 1)
     above = dict(zip(numbers, (x - memory[0] for x in memory), strict=True))
     yield Measured("load.memory", growth(memory), above)
     blocks = [frame.data_blocks for frame in frames]

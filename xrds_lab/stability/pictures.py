@@ -84,11 +84,11 @@ def textured(side: int, scale: int, seed: int = 0, width: int | None = None) -> 
     )
 
 
-def lit_surface(side: int, scale: int, seed: int = 0) -> tuple[Inputs, Array]:
+def lit_surface(side: int, scale: int) -> tuple[Inputs, Array]:
     """Return inputs and the true picture: a lamp's light on a painted, bumpy wall."""
-    albedo = 0.1 + 0.8 * blocks(side, side, seed)
+    albedo = 0.1 + 0.8 * blocks(side, side)
     normal = dome(side, side)
-    light = waves(side, side, seed) * (0.2 + normal[..., :1] ** 2 + normal[..., 2:])
+    light = waves(side, side) * (0.2 + normal[..., :1] ** 2 + normal[..., 2:])
     truth = (albedo * light).astype(np.float32)
     return Inputs(area_mean(truth, scale), albedo, normal), truth
 

@@ -14,7 +14,6 @@ a whole frame. One `.npz` file per window holds, in half precision and row 0 on 
 from __future__ import annotations
 
 import json
-import os
 import random
 import sys
 import time
@@ -264,22 +263,3 @@ def _arrays(passes: CyclesPasses, samples: Samples) -> tuple[Arrays, dict[str, f
     )
     arrays["reference"] = reference.radiance
     return arrays, seconds
-
-
-def main(arguments: Sequence[str]) -> None:
-    """`OUT ASSETS|- SEED COUNT`: generate, then leave at once."""
-    from xrds_blender.interface.registration import ensure_registered
-
-    out, assets, seed, count = arguments
-    ensure_registered()
-    try:
-        generate(out, int(seed), int(count), assets=None if assets == "-" else assets)
-    except KeyboardInterrupt:
-        os._exit(130)
-    # Blender can hang at interpreter exit with a Python engine registered.
-    sys.stderr.flush()
-    os._exit(0)
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

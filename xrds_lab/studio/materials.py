@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable
-from pathlib import Path
 
 import bpy
 
-from . import patterns
-from .assets import Library, load_image, texture_map
+from . import patterns, textures
+from .assets import Library
 from .nodes import Surface, Value, solid
 
 
@@ -89,10 +88,8 @@ class Painter:
         rng = self.rng
         surface = Surface("patterned")
         density = 2 ** rng.uniform(0, 5.5) / size
-        at = patterns.placed(
-            surface, rng, density, rng.choice((1, 1, 1, rng.uniform(0.1, 4)))
-        )
-        value = patterns.pattern(surface, rng, at)
+        stretch = rng.choice((1, 1, 1, rng.uniform(0.1, 4)))
+        value = self._pattern(surface, density, stretch)
         base = patterns.tinted(
             surface, rng, value, patterns.colour(rng), rng.random() < 0.5
         )
@@ -196,15 +193,8 @@ class Painter:
         )
         rough: Value = rng.choice((0.02, rng.uniform(0.05, 0.5), rng.uniform(0.1, 0.4)))
         if rng.random() < 0.4:
-            value = patterns.pattern(
-                surface,
-                rng,
-                patterns.placed(
-                    surface,
-                    rng,
-                    2 ** rng.uniform(1, 5) / size,
-                    rng.choice((1, 0.03, 20)),
-                ),
+            value = self._pattern(
+                surface, 2 ** rng.uniform(1, 5) / size, rng.choice((1, 0.03, 20))
             )
             rough = surface.span(value, rng.uniform(0.02, 0.2), rng.uniform(0.2, 0.6))
         surface.set(
@@ -226,9 +216,7 @@ class Painter:
             )
             base = surface.mix(base, patterns.shade(rng, base), cells.outputs["Color"])
         elif rng.random() < 0.4:
-            value = patterns.pattern(
-                surface, rng, patterns.placed(surface, rng, 6 / size)
-            )
+            value = self._pattern(surface, 6 / size)
             base = patterns.tinted(surface, rng, value, base, True)
         surface.set(
             Base_Color=base,
@@ -248,9 +236,7 @@ class Painter:
         )
         value = weave
         if rng.random() < 0.6:
-            value = patterns.pattern(
-                surface, rng, patterns.placed(surface, rng, rng.uniform(3, 30))
-            )
+            value = self._pattern(surface, rng.uniform(3, 30))
         base = patterns.tinted(
             surface, rng, value, patterns.colour(rng), rng.random() < 0.3
         )
@@ -299,9 +285,7 @@ class Painter:
         surface = Surface("glowing")
         base: Value = patterns.colour(rng, 0.4, 1.0)
         if rng.random() < 0.5:
-            value = patterns.pattern(
-                surface, rng, patterns.placed(surface, rng, 8 / size)
-            )
+            value = self._pattern(surface, 8 / size)
             base = patterns.tinted(surface, rng, value, base, True)
         strength = power if power is not None else 2 ** rng.uniform(0, 4)
         surface.set(
@@ -329,7 +313,7 @@ class Painter:
             surface.set(Alpha=holes)
         return surface.material
 
-    def varied(self, gloss: bool = True) -> bpy.types.Material:
+    def varied(self) -> bpy.types.Material:
         """Each object and each island of it another colour: books, toys, tiles."""
         rng = self.rng
         surface = Surface("varied")
@@ -339,13 +323,11 @@ class Painter:
         stops = [(i / 8, patterns.colour(rng)) for i in range(8)]
         base = surface.ramp(value, stops, "CONSTANT")
         if rng.random() < 0.5:
-            lines = patterns.pattern(
-                surface, rng, patterns.placed(surface, rng, rng.uniform(20, 90))
-            )
+            lines = self._pattern(surface, rng.uniform(20, 90))
             base = surface.mix(
                 base, patterns.colour(rng), surface.math("GREATER_THAN", lines, 0.6)
             )
-        surface.set(Base_Color=base, Roughness=rng.uniform(0.1 if gloss else 0.5, 0.9))
+        surface.set(Base_Color=base, Roughness=rng.uniform(0.1, 0.9))
         return surface.material
 
     def pictured(
@@ -362,55 +344,13 @@ class Painter:
         folder = self.rng.choice(sets or list(self.library.textures))
         surface = Surface(folder.name)
         density = 2 ** self.rng.uniform(-1, 1.5) / min(max(size, 0.1), 2.0)
-        at = patterns.placed(surface, self.rng, density)
-        self._maps(surface, folder, at, 0.03 / density)
+        textures.cover(surface, self.rng, self.library, folder, density)
         return surface.material
 
-    def _maps(
-        self,
-        surface: Surface,
-        folder: Path,
-        at: Value,
-        depth: float,
-    ) -> None:
-        maps = {
-            kind: self._map(surface, folder, kind, at)
-            for kind in (
-                "albedo",
-                "roughness",
-                "metallic",
-                "opacity",
-                "normal",
-                "displacement",
-            )
-        }
-        base = maps["albedo"]
-        if self.rng.random() < 0.4:
-            tint = patterns.colour(self.rng, 0.3, 1.0)
-            base = surface.mix(base, tint, self.rng.uniform(0.2, 1.0), "MULTIPLY")
-        rough = maps["roughness"]
-        surface.set(
-            Base_Color=base,
-            Roughness=self.rng.uniform(0.2, 0.9) if rough is None else rough,
-            Metallic=maps["metallic"],
-            Alpha=maps["opacity"],
-            Coat_Weight=self.rng.choice((0.0, 0.0, 0.0, 0.7)),
-        )
-        if maps["normal"] is not None:
-            node = surface.add("NormalMap", Color=maps["normal"])
-            surface.set(Normal=node.outputs[0])
-        elif maps["displacement"] is not None:
-            self._bump(surface, maps["displacement"], depth)
-
-    def _map(
-        self, surface: Surface, folder: Path, kind: str, at: Value
-    ) -> Value | None:
-        path = texture_map(folder, kind)
-        if path is None or self.library is None:
-            return None
-        self.library.note(path)
-        image = load_image(path, colour=kind == "albedo")
-        return surface.add("TexImage", image=image, Vector=at).outputs["Color"]
+    def _pattern(self, surface: Surface, density: float, stretch: float = 1) -> Value:
+        """Any pattern, at a random place of the surface."""
+        at = patterns.placed(surface, self.rng, density, stretch)
+        return patterns.pattern(surface, self.rng, at)
 
     def _drive(self, surface: Surface, value: Value, depth: float) -> None:
         """Let a pattern change roughness and height as well, sometimes."""
