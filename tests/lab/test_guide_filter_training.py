@@ -52,11 +52,11 @@ def weights_of(path: Path) -> list[torch.Tensor]:
 
 def test_noise_falls_though_no_clean_guide_was_seen(data: Path, tmp_path: Path) -> None:
     out = tmp_path / "guide_filter.safetensors"
-    told = train_guide_filter([data], out, steps=60)
-    assert told["windows"] == {"train": 3, "validation": 1}
+    result = train_guide_filter([data], out, steps=60)
+    assert result["windows"] == {"train": 3, "validation": 1}
     untrained = Learner(1, 0, tmp_path / "none").network
     before = error_left(untrained, read_pairs([data], "validation"))
-    for name, left in told["error_left"].items():
+    for name, left in result["error_left"].items():
         assert left < 0.25 < before[name] < 1.0
     assert [p.name for p in tmp_path.iterdir()] == [out.name]
 

@@ -11,26 +11,26 @@ SETTING = {"width": 96, "height": 54, "scale": 2, "samples": 16, "guide_samples"
 
 def record(scene: str, guides: float, lights: str, **changed: float) -> dict[str, Any]:
     """One second of network and one of guides, of which `guides` are left."""
-    told: dict[str, Any] = {"scene": scene, "kind": "still", "saved_share": 0.0}
+    record: dict[str, Any] = {"scene": scene, "kind": "still", "saved_share": 0.0}
     for name in ("wall", "overhead", "sync", "beauty", "network"):
-        told |= {f"{name}_all": 2.0, f"{name}_plan": 2.0}
-    told |= {"guides_all": 1.0, "guides_plan": guides}
-    told |= {"plan_psnr": 60.0, "seed_psnr": 50.0, "plan_flip": 0.0, "seed_flip": 0.1}
+        record |= {f"{name}_all": 2.0, f"{name}_plan": 2.0}
+    record |= {"guides_all": 1.0, "guides_plan": guides}
+    record |= {"plan_psnr": 60.0, "seed_psnr": 50.0, "plan_flip": 0.0, "seed_flip": 0.1}
     decisions = {"guide samples": "4", "guide bounces": "0", "guide lights": lights}
     plan = [{"decision": name, "value": value} for name, value in decisions.items()]
-    return told | {"plan": plan, "setting": SETTING | {"rounds": 1}} | changed
+    return record | {"plan": plan, "setting": SETTING | {"rounds": 1}} | changed
 
 
 def test_savings_are_told_by_what_was_decided() -> None:
-    told = text(
+    page = text(
         [
             record("wall", 0.5, "none sampled"),
             record("floor", 0.7, "none sampled"),
             record("glass", 1.0, "lamps alone"),
         ]
     )
-    assert "| 4 | 0 | none sampled |  | wall, floor | 40% | 20% |" in told
-    assert "| 4 | 0 | lamps alone |  | glass | 0% | 0% |" in told
+    assert "| 4 | 0 | none sampled |  | wall, floor | 40% | 20% |" in page
+    assert "| 4 | 0 | lamps alone |  | glass | 0% | 0% |" in page
 
 
 def test_a_difference_above_the_noise_is_counted() -> None:

@@ -30,14 +30,14 @@ def measure(monkeypatch: pytest.MonkeyPatch, out: Path, *works: suite.Work) -> d
 
 
 def test_failures_come_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    told = measure(monkeypatch, tmp_path, uneven)
-    assert not told["passed"]
-    assert told == json.loads((tmp_path / "results.json").read_text())
+    result = measure(monkeypatch, tmp_path, uneven)
+    assert not result["passed"]
+    assert result == json.loads((tmp_path / "results.json").read_text())
     page = (tmp_path / "report.md").read_text()
     failures = page[page.index("## Failures") : page.index("## All values")]
     assert "| `grey.chroma` | fast x4 bf16 | 4 | 0.001 | **none** |" in failures
     assert {"name", "preset", "scale", "precision", "value", "bound", "passed"} < set(
-        told["checks"][0]
+        result["checks"][0]
     )
 
 
@@ -58,9 +58,9 @@ def test_a_second_run_adds_to_the_first(
 def test_other_weights_start_anew(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    told = measure(monkeypatch, tmp_path, even)
-    told["weights"] = []
-    (tmp_path / "results.json").write_text(json.dumps(told))
+    result = measure(monkeypatch, tmp_path, even)
+    result["weights"] = []
+    (tmp_path / "results.json").write_text(json.dumps(result))
     names = {c["name"] for c in measure(monkeypatch, tmp_path, uneven)["checks"]}
     assert names == {"energy.smooth", "grey.chroma"}
 

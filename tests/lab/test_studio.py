@@ -183,14 +183,14 @@ def test_a_seed_gives_the_same_windows(made: Path, tmp_path: Path) -> None:
 
 def test_datasheet_counts_and_shows(made: Path, tmp_path: Path) -> None:
     found = datasheet.files(made)
-    told = datasheet.datasheet(found)
-    assert told["windows"] == {"validation": 2}
-    assert sum(told["kinds"].values()) == 2
-    assert told["scenes"] == 1
-    assert told["mean_bytes"] > 10_000
+    sheet = datasheet.datasheet(found)
+    assert sheet["windows"] == {"validation": 2}
+    assert sum(sheet["kinds"].values()) == 2
+    assert sheet["scenes"] == 1
+    assert sheet["mean_bytes"] > 10_000
     stages = {"low2", "low4", "low8", "guides", "full", "reference"}
-    assert set(told["mean_cpu_seconds"]) == stages
-    assert "2 validation" in datasheet.lines(told)[0]
+    assert set(sheet["mean_cpu_seconds"]) == stages
+    assert "2 validation" in datasheet.lines(sheet)[0]
     datasheet.contact_sheet(found, tmp_path / "contact.jpg")
     with Image.open(tmp_path / "contact.jpg") as sheet:
         assert sheet.size == (datasheet.COLUMNS * datasheet.SIDE, datasheet.SIDE)

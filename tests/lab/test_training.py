@@ -161,7 +161,7 @@ def test_divergence_is_said_and_not_kept(
 
 def test_run_writes_its_folder(config: TrainingConfig, tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    told = train(config, folder)
+    result = train(config, folder)
     assert {path.name for path in folder.iterdir()} == {
         "config.toml",
         "windows.json",
@@ -175,8 +175,8 @@ def test_run_writes_its_folder(config: TrainingConfig, tmp_path: Path) -> None:
     lines = records(folder)
     assert [line["step"] for line in lines] == [0, 3, 6]
     assert lines[0]["loss"] is None
-    assert told["gain"] == lines[-1]["gain"]
-    assert told["best"]["gain"] == max(line["gain"] for line in lines)
+    assert result["gain"] == lines[-1]["gain"]
+    assert result["best"]["gain"] == max(line["gain"] for line in lines)
     with Image.open(folder / "samples.png") as samples:
         assert samples.size == (5 * 256, 2 * (256 + 24))  # one window, both sets
     with Image.open(folder / "curve.png") as curve:
@@ -185,7 +185,7 @@ def test_run_writes_its_folder(config: TrainingConfig, tmp_path: Path) -> None:
     assert network.config.scale == 2
     assert record["blender_series"] == "4.5"
     training = json.loads(record["training"])
-    assert training["step"] == told["best"]["step"]
+    assert training["step"] == result["best"]["step"]
     assert training["windows"] == {"train": 3, "validation": 1}
     assert training["config"]["variation"]["symmetries"]
 
@@ -207,8 +207,8 @@ def test_finished_run_is_left_alone_and_can_be_made_longer(
     config: TrainingConfig, tmp_path: Path
 ) -> None:
     folder = tmp_path / "run"
-    told = train(config, folder)
-    assert train(config, folder) == told
+    result = train(config, folder)
+    assert train(config, folder) == result
     longer = train(replace(config, steps=8), folder)
     assert longer["step"] == 8
     assert [line["step"] for line in records(folder)] == [0, 3, 6, 8]
@@ -415,7 +415,7 @@ def test_gain_is_over_the_better_enlargement_of_each_window() -> None:
         methods = ("xrds", "bicubic", "demodulated")
         return Score(name, index, dict(zip(methods, psnr, strict=True)))
 
-    told = summary(
+    result = summary(
         [
             score("rendered", 0, 30.0, 29.0, 10.0),
             score("rendered", 1, 31.0, 20.0, 33.0),
@@ -423,10 +423,10 @@ def test_gain_is_over_the_better_enlargement_of_each_window() -> None:
             score("shaded", 1, 41.0, 30.0, 42.0),
         ]
     )
-    assert told["gain"] == pytest.approx((1 - 2 - 3 - 1) / 4)
-    assert told["gains"] == {"rendered": -0.5, "shaded": -2.0}
-    assert told["worst"] == {"rendered": -2.0, "shaded": -3.0}
-    assert told["psnr"]["rendered"]["demodulated"] == 21.5
+    assert result["gain"] == pytest.approx((1 - 2 - 3 - 1) / 4)
+    assert result["gains"] == {"rendered": -0.5, "shaded": -2.0}
+    assert result["worst"] == {"rendered": -2.0, "shaded": -3.0}
+    assert result["psnr"]["rendered"]["demodulated"] == 21.5
 
 
 # --- ablations ------------------------------------------------------------------------
@@ -439,18 +439,18 @@ def test_table_of_runs_that_differ_in_one_thing(
     (tmp_path / "run.toml").write_text(to_toml(config))
     steps = ["steps = 2", "validate_every = 2"]
     out = tmp_path / "tables"
-    told = ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps)
-    assert json.loads((out / "base.json").read_text()) == told
-    assert told["steps"] == 2
-    (pixels, kernels) = told["rows"].values()
+    result = ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps)
+    assert json.loads((out / "base.json").read_text()) == result
+    assert result["steps"] == 2
+    (pixels, kernels) = result["rows"].values()
     for row in (pixels, kernels):
         assert row["mean"] == pytest.approx(sum(row["psnr"]) / 2)
         assert row["spread"] == abs(row["psnr"][0] - row["psnr"][1]) > 0
     assert kernels["mean"] > pixels["mean"] + 3  # two steps teach nobody to paint
     assert kernels["parameters"] != pixels["parameters"]
-    assert "kernels over" in "\n".join(lines(told))
+    assert "kernels over" in "\n".join(lines(result))
     monkeypatch.setattr("xrds_lab.training.train.Run.train_step", pytest.fail)
-    assert ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps) == told
+    assert ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps) == result
 
 
 def test_tables_share_runs_of_the_same_changes_only() -> None:

@@ -1,4 +1,4 @@
-"""From points to what the report says: frontiers, budgets, crossings, the model."""
+"""What the report derives from points: frontiers, budgets, crossings, the model."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _budgets(
 
 
 def _short(point: Point | None) -> dict[str, Any] | None:
-    """What a table needs of a point."""
+    """The figures of a point that tables show."""
     if point is None:
         return None
     measures = [key for key in point if key.startswith(("psnr", "relmse", "flip"))]
@@ -194,7 +194,7 @@ def fitted(scenes: Sequence[SceneBench], points: Sequence[Point]) -> budget.Mode
 
 
 def _weights(scene: SceneBench) -> str:
-    """The networks with the beginnings of their files' checksums."""
+    """The networks, each with the first digits of its file's checksum."""
     chosen = scene.settings
     return ", ".join(
         f"{n.preset} x{n.scale} {n.guides} {chosen.networks.digest(n)}"
@@ -232,7 +232,7 @@ def _speeds(
 
 
 def _ratio(scenes: Sequence[SceneBench], seconds: Any) -> float:
-    """Median over scenes of seconds over those of the denoiser that is probed."""
+    """Median over scenes of the seconds, as a multiple of the default denoiser's."""
     unit = DEFAULT_DENOISER
     ratios = [seconds(s) / max(s.times.denoising(unit), 1e-6) for s in scenes]
     return round(statistics.median(ratios), 4)

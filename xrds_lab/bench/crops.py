@@ -105,7 +105,7 @@ def largest(plane: Array, width: int, height: int, step: int = 1) -> Box:
 
 
 def _encoded(linear: Array, stops: float) -> str:
-    """A data URI of the picture as it is shown."""
+    """A data URI of the picture in sRGB."""
     from PIL import Image
 
     pixels = np.round(to_srgb(linear, stops) * 255).astype(np.uint8)

@@ -118,7 +118,9 @@ def evaluate(
 def _check_guides(guides: Sequence[str]) -> None:
     unknown = set(guides) - set(GUIDES)
     if unknown:
-        raise UsageError(f"guides {sorted(unknown)} do not exist: take {GUIDES}")
+        raise UsageError(
+            f"unknown guides {', '.join(sorted(unknown))}: take {' or '.join(GUIDES)}"
+        )
 
 
 def _timed(
@@ -128,7 +130,9 @@ def _timed(
     known = {shot.name for shot in shots}
     absent = set(names or ()) - known
     if absent:
-        raise UsageError(f"{sorted(absent)} cannot be timed: not among the scenes")
+        raise UsageError(
+            f"cannot time {', '.join(sorted(absent))}: not among the scenes"
+        )
     return (known if names is None else set(names)) if timing else set()
 
 

@@ -55,7 +55,7 @@ class Request:
         return self.kind in {"guides", "full"}
 
     def file_name(self, shot: Shot) -> str:
-        """Name that changes with everything the pixels depend on."""
+        """A name that depends on everything the pixels depend on."""
         import bpy
 
         mode = "" if self.denoiser is None else f"-{self.denoiser}"
@@ -107,7 +107,7 @@ class Folder:
         directory.mkdir(parents=True, exist_ok=True)
 
     def read(self, name: str) -> Arrays | None:
-        """Arrays of a file, or None when there is none that can be read."""
+        """Arrays of a file; None if it is missing or damaged."""
         try:
             with np.load(self.directory / name) as file:
                 return dict(file)
@@ -115,7 +115,7 @@ class Folder:
             return None
 
     def has(self, name: str) -> bool:
-        """Whether there is such a file and it was written to its end."""
+        """Whether the file exists and is complete."""
         path = self.directory / name
         return path.is_file() and zipfile.is_zipfile(path)
 
@@ -129,7 +129,7 @@ class Folder:
 
 @contextmanager
 def kept(directory: Path | None) -> Iterator[Folder]:
-    """A folder of rendered inputs; without a directory it goes with the block."""
+    """A folder of rendered inputs; without a directory, a temporary one."""
     if directory is not None:
         yield Folder(directory)
         return

@@ -1,4 +1,4 @@
-"""What failed, and what was running when a run was killed."""
+"""A record of what failed, and of what ran when a process was killed."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ MOST_KILLS = 3  # so often a task may end with its process before it is left out
 
 
 class Journal:
-    """Keeps one bad configuration from ending a run, even if it ends the process.
+    """Keeps one bad configuration from ending a run, even if it kills the process.
 
-    The name of the running task lies in a file, so that the next run knows where the
-    last one was killed; a task that was running at `MOST_KILLS` ends is left out.
+    The name of the running task is kept in a file, so that the next run knows where
+    the last one was killed. A task that was killed `MOST_KILLS` times is left out.
     """
 
     def __init__(self, path: Path, progress: Progress) -> None:
@@ -44,7 +44,7 @@ class Journal:
 
     @contextmanager
     def attempt(self, name: str) -> Iterator[None]:
-        """Run the body; an error in it is written down and swallowed."""
+        """Run the body; an error in it is recorded and not raised."""
         self._running = name
         self._write()
         try:
@@ -81,9 +81,9 @@ class Strict:
     """A journal in which the first failure ends the run."""
 
     def attempt(self, name: str) -> AbstractContextManager[None]:
-        """Run the body; its error is the caller's."""
+        """Run the body; its errors are raised."""
         return nullcontext()
 
     def gives_up(self, name: str) -> bool:
-        """No task is ever left out."""
+        """Never: no task is left out."""
         return False

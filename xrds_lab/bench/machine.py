@@ -16,7 +16,7 @@ _SELF = Path("/proc/self")
 
 
 def describe(device: str = "cpu") -> dict[str, Any]:
-    """Processor, cores, memory and versions, as they stand in a report."""
+    """Processor, cores, memory and versions, for a report."""
     import bpy
     import torch
 
@@ -73,7 +73,7 @@ def _hold(chosen: set[int]) -> None:
 def forget_peak() -> bool:
     """Start a new peak of resident memory; False where the system cannot (not Linux).
 
-    What the C library keeps for itself is given back first.
+    Memory that the C library keeps is released first.
     """
     try:
         ctypes.CDLL(None).malloc_trim(0)

@@ -35,7 +35,7 @@ DEFAULT = Config("oidn", 1, DEFAULT_DENOISER)  # the unit of the budgets
 
 @dataclass(frozen=True)
 class Settings:
-    """What every scene of a run is measured by."""
+    """The settings that all scenes of a run share."""
 
     sweep: Sweep
     folder: Folder
@@ -49,7 +49,7 @@ class Settings:
 
 
 class SceneBench:
-    """Measures one shot; everything that is done is kept in files and not redone."""
+    """Measures one shot; keeps every result in files and repeats nothing."""
 
     def __init__(self, shot: Shot, settings: Settings) -> None:
         self.shot, self.settings = shot, settings
@@ -65,7 +65,7 @@ class SceneBench:
 
     @property
     def name(self) -> str:
-        """Of the scene."""
+        """The scene's name."""
         return self.shot.name
 
     @property
@@ -77,7 +77,7 @@ class SceneBench:
         return [c for c in self._configs if self._predicted(c) <= limit]
 
     def _predicted(self, config: Config) -> float:
-        """Seconds of its frame: as timed, or by the probes before anything was."""
+        """Seconds of its frame: as timed, or from the probes where nothing is timed."""
         try:
             return self.times.cost(config).total
         except KeyError:
@@ -87,7 +87,7 @@ class SceneBench:
 
     @cached_property
     def costs(self) -> budget.Costs:
-        """Of the scene's whole frame, from the product's own probes."""
+        """Costs of the scene's whole frame, from the product's own probes."""
         from xrds_blender import run_job
 
         model = budget.shipped()
@@ -100,7 +100,7 @@ class SceneBench:
         return run_job(scene, lambda passes: probe(passes, model, known, start))
 
     def estimate(self) -> float:
-        """Predicted seconds of what is left to do."""
+        """Predicted seconds of the work that is left."""
         part, window = workload.share(self.shot.window), self.shot.window
         seconds = [
             workload.render_seconds(request, self.costs, part)
@@ -126,7 +126,7 @@ class SceneBench:
 
     @property
     def megapixels(self) -> float:
-        """Of the whole frame."""
+        """Megapixels of the whole frame."""
         return self.shot.window.frame_width * self.shot.window.frame_height / 1e6
 
     def growth_estimate(self, megapixels: float) -> float:
@@ -214,7 +214,7 @@ class SceneBench:
         return [multiple for multiple in wanted if f"{multiple:g}" not in done]
 
     def _pick(self, multiple: float, meter: Meter) -> None:
-        """Let the product keep to a budget, whole frame; its error on the window."""
+        """Render a whole frame within a budget; measure its error on the window."""
         seconds = multiple * self.unit()
         networks = self.settings.networks
         job = RenderJob(
@@ -276,7 +276,7 @@ class SceneBench:
         return entry | self._timed() if self.settings.timing else entry
 
     def _timed(self) -> dict[str, Any]:
-        """What was timed; nothing where a stage that all else rests on failed."""
+        """The timed part of the entry; empty where a stage that it needs failed."""
         try:
             beauty, guide = (self.times.line(k)[1] for k in ("plain", "guides"))
             modes = {mode: self.times.denoising(mode) for mode in DENOISERS}
@@ -298,7 +298,7 @@ class SceneBench:
         }
 
     def _loads(self) -> dict[str, float]:
-        """Seconds of loading each network's weights: the first time of a process."""
+        """Seconds that loading each network's weights takes the first time."""
         return {
             name: max(run.get("load") or 0.0 for run in runs)
             for name, runs in self.times.runs.items()

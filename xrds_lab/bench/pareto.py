@@ -43,7 +43,7 @@ GROUPS: dict[str, Callable[[Point], bool]] = {
 
 
 def groups(points: Sequence[Point]) -> dict[str, list[Point]]:
-    """Points by group; XRDS also by scale, by guides and with them for nothing."""
+    """Points by group; XRDS also by scale, by guides, and with guides for free."""
     members = {name: [p for p in points if has(p)] for name, has in GROUPS.items()}
     ours = members["XRDS"]
     for scale in sorted({p["settings"]["scale"] for p in ours}):
@@ -74,7 +74,7 @@ def better(a: Point, b: Point, measure: str = "psnr") -> bool:
 
 
 def frontier(points: Iterable[Point], measure: str = "psnr") -> list[Point]:
-    """Those that no other beats in both seconds and error, by rising seconds."""
+    """Points that no other beats in both seconds and error, by rising seconds."""
     line: list[Point] = []
     for point in sorted(points, key=lambda p: (p["seconds"]["total"], -p["psnr"])):
         if not line or better(point, line[-1], measure):

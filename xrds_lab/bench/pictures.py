@@ -51,7 +51,7 @@ class Networks:
         self.filter_digest = files.guide_filter_record(weights)["sha256"][:12]
 
     def digest(self, network: Network) -> str:
-        """Of the weights file."""
+        """The first digits of the weights file's checksum."""
         return str(self.records[network]["sha256"])[:12]
 
     def __getitem__(self, network: Network) -> Any:
@@ -85,7 +85,7 @@ class Pictures:
     # --- rendering --------------------------------------------------------------------
 
     def halves(self) -> list[Request]:
-        """The reference's two halves, where the shot brings none."""
+        """Renders of the reference's two halves; none if the shot has a reference."""
         if self.shot.reference is not None:
             return []
         samples = self.reference_samples
@@ -94,7 +94,7 @@ class Pictures:
         ]
 
     def missing(self, configs: Sequence[Config]) -> list[Request]:
-        """What is still to be rendered for them and the reference, fewest rays first.
+        """Renders still missing for them and the reference, fewest rays first.
 
         In this order one session of Cycles serves them all.
         """
@@ -110,7 +110,7 @@ class Pictures:
         journal: Journal | Strict,
         done: Callable[[Request], object],
     ) -> None:
-        """Render requests into the folder; the journal has what fails."""
+        """Render requests into the folder; failures go into the journal."""
         from xrds_blender import run_job
 
         names = {r: f"{self.shot.name}: {r.file_name(self.shot)}" for r in requests}
@@ -133,7 +133,7 @@ class Pictures:
             run_job(scene, job)
 
     def render_missing(self, configs: Sequence[Config], progress: Progress) -> None:
-        """Render all that the configurations lack; the first failure is raised."""
+        """Render what the configurations still need; raises the first failure."""
         self.render(
             self.missing(configs),
             Strict(),
@@ -143,7 +143,7 @@ class Pictures:
     # --- pictures ---------------------------------------------------------------------
 
     def picture(self, config: Config) -> Array:
-        """Radiance (H, W, 3) of the shot's window; SceneError without its renders."""
+        """Radiance (H, W, 3) of the window; raises SceneError without its renders."""
         beauty, *rest = (_cleaned(self._read(r)) for r in config.requests())
         radiance = beauty["radiance"]
         if config.scale == 1:

@@ -1,7 +1,7 @@
 """`xrds plan-report`: what every saving is worth, and what it does to the picture.
 
 Each run is a process of its own, timed from outside. Runs with and without take turns,
-so that a busy machine touches both.
+so that a busy machine slows both.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SEEDS = (1, 101)
 
 @dataclass(frozen=True)
 class Setting:
-    """What all runs of a report share."""
+    """The settings that all runs of a report share."""
 
     scale: int = 2
     samples: int = 16

@@ -16,7 +16,7 @@ FRAMES = 10
 
 
 def main() -> None:
-    """Render what the JSON on the command line asks for, and leave pictures there."""
+    """Render as the JSON on the command line asks; write pictures to its `out`."""
     from xrds_blender import render
     from xrds_blender.command.console import leave
 
@@ -51,7 +51,7 @@ def _warm_up(scene: Any, setting: dict[str, Any]) -> None:
 
 
 def _scene(name: str, setting: dict[str, Any]) -> Any:
-    """A file, or one of the small scenes; at the report's size."""
+    """Open a file or build one of the small scenes, at the report's size."""
     from xrds_blender.command.scene_file import open_scene
 
     from ..studio import traps
@@ -67,7 +67,7 @@ def _scene(name: str, setting: dict[str, Any]) -> Any:
 
 
 def _steps(scene: Any, kind: str) -> Iterator[int]:
-    """Change the scene as the kind has it, before each render."""
+    """Change the scene before each render, as its kind needs it."""
     import bpy
 
     if kind == "still":

@@ -108,7 +108,7 @@ def _figure(title: str, axis: str) -> tuple[Any, Any]:
 
 
 def _group(panel: Any, name: str, members: Sequence[Point], measure: str) -> None:
-    """Its points faintly, its frontier as a line."""
+    """Draw a group: its points faintly, its frontier as a line."""
     colour, _, mark = STYLES[name]
     if name != pareto.CACHED:
         shown = [(p["seconds"]["total"], p[measure]) for p in members]

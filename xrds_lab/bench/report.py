@@ -143,7 +143,7 @@ def _facts(report: Report, scene: dict[str, Any]) -> str:
 
 
 def _changes(changes: list[dict[str, Any]]) -> str:
-    """Which is better, from which budget on."""
+    """The better method, from each budget on."""
     if not changes:
         return "no XRDS with weights."
     lines = [

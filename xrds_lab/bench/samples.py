@@ -78,7 +78,7 @@ def samples_table(
 
 
 def configurations(scale: int, preset: str, full: bool) -> Iterator[Config]:
-    """All that the table compares, each once."""
+    """Every configuration of the table, each once."""
     low = sorted({*LOW_SAMPLES, *(n * scale**2 for n in RATES)})
     for n in low:
         yield xrds(Network(preset, scale, "fast"), n, DEFAULT_DENOISER, GUIDE_SAMPLES)
@@ -117,7 +117,7 @@ def _measured(
 
 
 def _render_seconds(folder: Folder, name: str) -> float:
-    """Of a kept render, without sync."""
+    """Seconds of a kept render, without sync."""
     arrays = folder.read(name)
     assert arrays is not None
     stages = json.loads(str(arrays["seconds"]))
@@ -125,7 +125,7 @@ def _render_seconds(folder: Folder, name: str) -> float:
 
 
 def summary(records: list[Record]) -> dict[str, Any]:
-    """What the table asks, scene by scene and on the mean.
+    """The table's figures, by scene and on the mean.
 
     `over_oidn`: dB over OIDN of n samples, and of its seconds the product's share;
     `full_over_oidn`: the same for `full` guides at so many samples on the average;
@@ -170,7 +170,7 @@ def _against(
     ours: tuple[Any, ...],
     theirs: tuple[Any, ...],
 ) -> dict[str, Any]:
-    """By scene dB better and the share of their seconds; the means of both."""
+    """Gain in dB and share of seconds over the rival: by scene, and the means."""
     gains, shares = {}, {}
     for scene, by_key in by_scene.items():
         gains[scene] = by_key[ours]["psnr"] - by_key[theirs]["psnr"]

@@ -42,7 +42,7 @@ STAGES = ("sync", "beauty", "denoise", "guides", "network", "other")
 
 @dataclass
 class Cost:
-    """What one configuration's frame takes."""
+    """Seconds and memory of one configuration's frame."""
 
     seconds: dict[str, float]
     cpu_seconds: float
@@ -72,11 +72,11 @@ class StageTimes:
         write_json(self.path, self.runs)
 
     def count(self, name: str) -> int:
-        """How often it has run."""
+        """Number of its runs."""
         return len(self.runs.get(name, ()))
 
     def median(self, name: str, key: str = "seconds") -> float:
-        """Median over the runs; raises KeyError for what has none."""
+        """Median over the runs; raises KeyError if there are none."""
         return statistics.median(run[key] for run in self.runs[name])
 
     def peak(self, *names: str) -> int | None:
@@ -85,7 +85,7 @@ class StageTimes:
         return None if None in peaks else int(max(peaks))
 
     def paired(self, name: str, less: str, key: str = "seconds") -> float:
-        """Median over the rounds of what `name` takes more than `less`."""
+        """Median over the rounds of the difference `name` minus `less`."""
         pairs = zip(self.runs[name], self.runs[less], strict=False)
         return statistics.median(a[key] - b[key] for a, b in pairs)
 
@@ -147,14 +147,14 @@ class StageTimes:
 
 
 def task_name(request: Request) -> str:
-    """As a render stands in the file of runs."""
+    """Name of a render in the file of runs."""
     undenoised = request.is_guide or request.denoiser == OFF
     denoiser = "" if undenoised else f" {request.denoiser or 'default'}"
     return f"{request.kind} x{request.scale}, {request.samples} spp{denoiser}"
 
 
 def network_name(config: Config) -> str:
-    """As an enlargement stands in the file of runs."""
+    """Name of an enlargement in the file of runs."""
     if config.method != "xrds":
         return f"{config.method} x{config.scale}"
     full = " full" if config.guides == "full" else ""
@@ -177,7 +177,7 @@ class Stopwatch:
         self.tasks = tasks
 
     def left(self, rounds: int) -> list[str]:
-        """Names of the runs still to be made, as often as they are."""
+        """Names of the runs still to be made, one entry for each run."""
         names = [*self.renders, *self.tasks]
         return [n for n in names for _ in range(rounds - self.times.count(n))]
 
@@ -200,7 +200,7 @@ class Stopwatch:
         return f"{self.times.path.stem}: {name}"
 
     def _render(self, names: list[str], done: Callable[[str], object]) -> None:
-        """All renders of a round in one session of Cycles, so that sync shows apart."""
+        """Make all renders of a round in one session of Cycles, to time sync apart."""
         from xrds_blender import run_job
 
         def job(passes: Any) -> None:
@@ -222,7 +222,7 @@ class Stopwatch:
             run_job(scene, job)
 
     def _clocked(self, request: Request, passes: Any) -> Run:
-        """Sync apart from the rest, which holds the reading back of the pixels."""
+        """Time a render without its sync; reading the pixels back counts."""
         stages: dict[str, float] = {}
 
         def task() -> None:

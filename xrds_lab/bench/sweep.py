@@ -47,7 +47,7 @@ class Config:
 
     @property
     def label(self) -> str:
-        """As it is named in plots and tables."""
+        """Name in plots and tables."""
         if self.method in {"cycles", "oidn"}:
             name = "Cycles" if self.method == "cycles" else f"OIDN {self.denoiser}"
             return f"{name}, {self.samples} spp"
@@ -60,7 +60,7 @@ class Config:
 
     @property
     def key(self) -> str:
-        """Unlike that of every other configuration; in file names and journals."""
+        """Unique name in files and journals."""
         return "_".join(str(value) for value in asdict(self).values() if value != "")
 
     @property
@@ -89,7 +89,7 @@ class Config:
         )
 
     def requests(self) -> list[Request]:
-        """All that must be rendered for it."""
+        """All renders that it needs."""
         guide = self.guide()
         return [self.beauty()] + ([] if guide is None else [guide])
 
@@ -190,5 +190,5 @@ def anchors(configs: Iterable[Config]) -> list[Request]:
 
 
 def describe(config: Config) -> dict[str, Any]:
-    """The configuration as it stands in results.json under `settings`."""
+    """The entry `settings` of results.json."""
     return {key: value for key, value in asdict(config).items() if key != "method"}

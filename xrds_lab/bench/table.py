@@ -51,7 +51,7 @@ def worst(records: list[Record]) -> dict[str, dict[str, dict[str, Any]]]:
 
 
 def line(record: Record) -> str:
-    """One window's PSNR by method, as it is reported on the way."""
+    """One window's PSNR by method, as a line of progress."""
     figures = ", ".join(
         f"{COLUMNS[name]} {figure['psnr']:.2f}"
         for name, figure in record["methods"].items()
@@ -98,7 +98,7 @@ def _case(record: Record) -> str:
 
 
 def _key(record: Record) -> tuple[str, str]:
-    """Scale and preset as they stand in the JSON."""
+    """Scale and preset as keys of the JSON."""
     scale, preset = _case(record).removeprefix("x").split()
     return scale, preset
 

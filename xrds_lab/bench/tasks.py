@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str, Task]:
-    """By name, everything that `Stopwatch` is to time beside the renders."""
+    """Everything that `Stopwatch` times beside the renders, by name."""
     window = shot.window.whole
     timed: dict[str, Task] = {}
     used: list[Network] = []
@@ -58,8 +58,8 @@ def plain_job() -> RenderJob:
 def frame(shot: Shot, job: RenderJob) -> tuple[Picture, Run]:
     """Render a whole frame as a user does, from a freshly opened file.
 
-    Every frame pays for its own guides. `other` is what no stage holds; weights
-    are loaded before.
+    Every frame renders its own guides. `other` is the time outside all stages;
+    weights are loaded before.
     """
     from xrds_blender import render
     from xrds_blender.frame.networks import load_upscaler
@@ -91,7 +91,7 @@ def _baseline(enlarge: Enlargement, window: Window, scale: int) -> Task:
 
 
 def _guide_filter(networks: Networks, network: Network, window: Window) -> Task:
-    """Of a whole frame; the same whatever the network."""
+    """Time the filter of a whole frame's guides; all networks share it."""
     import torch
 
     from xrds_core.guide_filter import filter_guides
@@ -112,7 +112,7 @@ def _guide_filter(networks: Networks, network: Network, window: Window) -> Task:
 
 
 def _network(networks: Networks, network: Network, window: Window) -> Task:
-    """Loading shows apart, as `load`; the first run of a process is thrown away."""
+    """Time a network; loading counts apart, as `load`, and the first run is dropped."""
     warm: list[bool] = []
 
     def task() -> Run:

@@ -34,7 +34,7 @@ class Window:
 
     @property
     def label(self) -> str:
-        """As it stands in file names: frame size, then x, y, width and height."""
+        """Name in files: frame size, then x, y, width and height."""
         place = f"{self.x}_{self.y}_{self.width}_{self.height}"
         return f"{self.frame_width}x{self.frame_height}-{place}"
 
@@ -72,7 +72,7 @@ class Shot:
 
     @property
     def identity(self) -> str:
-        """Scene and frame as they stand in the names of files of seconds."""
+        """Scene and frame size, for the names of files of seconds."""
         frame = f"{self.window.frame_width}x{self.window.frame_height}"
         return f"{self.name}-{self.digest}-{frame}"
 
@@ -144,5 +144,5 @@ def _whole(path: Path, resolution: tuple[int, int] | None) -> Window:
 
 
 def digest(path: Path) -> str:
-    """Of a scene file, short; part of every cached file's name."""
+    """A short checksum of a scene file, part of every cached file's name."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:12]

@@ -80,7 +80,7 @@ def _columns(
 
 
 def _write_pictures(folder: Path, entries: Sequence[Entry], scene: Any) -> None:
-    """Every method's picture, and what the network was given."""
+    """Write every method's picture and the network's inputs."""
     for entry in entries:
         picture = entry.picture
         for suffix in (".exr", ".png"):

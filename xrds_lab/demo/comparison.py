@@ -1,4 +1,4 @@
-"""One PNG on which a person can judge the methods at a glance."""
+"""One PNG that compares the methods at a glance."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def to_bytes(linear: Array) -> Array:
 
 
 def enlarged(low: Array, height: int, width: int) -> Array:
-    """Repeat low-resolution pixels, to show what the network is given."""
+    """Repeat low-resolution pixels, to show the network's input."""
     scale = -(-height // low.shape[0])
     grown = low.repeat(scale, axis=0).repeat(scale, axis=1)
     return grown[:height, :width]

@@ -17,13 +17,13 @@ from xrds_core import metrics
 
 LOW_SAMPLES = 16  # per low-resolution pixel, the standard measure's
 GUIDE_SAMPLES = 4
-FIT_SAMPLES = (1, 3)  # plain renders that tell what a sample and the rest cost
+FIT_SAMPLES = (1, 3)  # of the plain renders that samples and fixed costs are fitted to
 REFERENCE_SAMPLES = 512  # at most
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One method's picture and what it took."""
+    """One method's picture and its seconds."""
 
     name: str
     label: str
@@ -70,7 +70,7 @@ class Contest:
         return self._run(f"xrds_x{scale}", f"XRDS x{scale}", job)
 
     def plain(self, name: str, samples: int, label: str = "Cycles + OIDN") -> Entry:
-        """Cycles and OIDN as the file has them, at full resolution."""
+        """Render with Cycles and OIDN as the file sets them, at full resolution."""
         job = RenderJob(plain=True, samples=samples)
         return self._run(name, f"{label}, {samples} spp", job)
 

@@ -1,4 +1,4 @@
-"""The demo scene: a kitchen still life, built from nothing but this folder.
+"""The demo scene: a kitchen still life, built without any other file.
 
 It is made to be hard where super-resolution is: thin text, woven cloth, painted
 tiles, wood grain, hammered copper, and glass before a pattern.
@@ -76,7 +76,7 @@ class Kitchen(Builder):
         degrees: float = 0.0,
         bevel: float = 0.0,
     ) -> bpy.types.Object:
-        """A shape with finely rounded edges."""
+        """Place a shape with finely rounded edges."""
         turn = math.radians(degrees)
         return self.put(shape, material, at, turn, bevel, name, segments=3)
 

@@ -1,7 +1,7 @@
 """The bounds: one table, which the report prints and the document repeats.
 
-A measured value is at most its limit, or fails; where it fails, an exception may say
-how far it was found off at the most, and why. Without a limit it is only reported.
+A measured value fails above its limit. An exemption may state how far off it was at
+the most, and why. A value without a limit is only reported.
 """
 
 from __future__ import annotations

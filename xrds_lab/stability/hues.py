@@ -1,4 +1,4 @@
-"""Colour: grey stays grey, and no channel is another's better."""
+"""Colour: grey stays grey, and all channels are treated alike."""
 
 from __future__ import annotations
 

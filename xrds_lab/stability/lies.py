@@ -1,4 +1,4 @@
-"""Guides that say what is not there, against bicubic, which asks no guide."""
+"""Wrong guides: the network against bicubic, which uses no guides."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def scaling(subject: Subject) -> Iterator[Measured]:
 
 
 def spread(subject: Subject) -> Iterator[Measured]:
-    """Twelve decades in one picture: its dark half is a picture still."""
+    """Twelve decades in one picture: the dark half keeps its detail."""
     inputs, truth = lit_surface(subject.side, subject.scale)
     dark, bright = np.float32(1e-6), np.float32(1e6)
     middle = subject.side // 2
@@ -52,7 +52,7 @@ def spread(subject: Subject) -> Iterator[Measured]:
 
 
 def constants(subject: Subject) -> Iterator[Measured]:
-    """One colour everywhere comes back as it went in."""
+    """A picture of one colour is not changed."""
     curve = {}
     for albedo in (0.0, 0.05, 0.5, 1.0):
         picture = subject(even(subject.side, subject.scale, 0.7, albedo))

@@ -1,4 +1,4 @@
-"""What a check says, and how two pictures are told apart."""
+"""Results of checks, and measures of how two pictures differ."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ FACING = (0.0, 0.0, 1.0)  # a normal that looks at the camera
 
 
 class Inputs(NamedTuple):
-    """What an upscale is given."""
+    """The inputs of an enlargement."""
 
     radiance: Array
     """(h, w, 3)"""

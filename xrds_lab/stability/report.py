@@ -24,7 +24,7 @@ PLOTS = (
 
 
 def write(folder: Path, result: dict[str, Any], checks: list[Check]) -> None:
-    """Write all of it into an existing folder."""
+    """Write the report into an existing folder."""
     write_json(folder / "results.json", result)
     plots = _plots(folder, result["curves"])
     with replacing(folder / "report.md") as part:

@@ -1,4 +1,4 @@
-"""The same again: between runs, threads and precisions."""
+"""Equal results of several runs, threads and precisions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def runs(subject: Subject) -> Iterator[Measured]:
-    """Two runs give the same bytes; one thread what several do."""
+    """Two runs give the same bytes; one thread gives the same as several."""
     inputs, _ = lit_surface(subject.side, subject.scale)
     first, second = (subject(inputs) for _ in range(2))
     yield Measured("same.runs", float((first != second).sum()))

@@ -52,7 +52,7 @@ class Gallery:
         self.folder, self.side, self.progress = folder, side, progress
 
     def arrays(self, name: str) -> Arrays:
-        """Return what was rendered of a scene; renders it where that is missing."""
+        """Return the renders of a scene; renders them if they are missing."""
         path = self.folder / f"{name}-{self.side}-v{GENERATION}.npz"
         if not path.is_file():
             self.progress(f"rendering {name}")
@@ -99,7 +99,7 @@ def render(name: str, side: int) -> Arrays:
 
 
 def before_denoising(beauty: Any) -> Array:
-    """Return the noisy radiance (h, w, 3); in a Blender without OIDN it is all."""
+    """Return the noisy radiance (h, w, 3); without OIDN the radiance itself."""
     return beauty.radiance if beauty.noisy is None else beauty.noisy
 
 

@@ -86,7 +86,7 @@ def caustics(stage: Builder) -> None:
 
 
 def bright_sky(stage: Builder) -> None:
-    """A sky whose sun, of 60000, stands in the picture."""
+    """A sky with its sun, of strength 60000, in the picture."""
     still(stage)
     nodes = stage.world()
     way = nodes.add("TexCoord").outputs["Generated"]

@@ -1,4 +1,4 @@
-"""What is put to the test: shipped weights at one precision."""
+"""The subject of a check: shipped weights at one precision."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Subject:
 
     @property
     def name(self) -> str:
-        """As `fast x2 fp32`."""
+        """Name in the report, as `fast x2 fp32`."""
         return f"{self.preset} x{self.scale} {self.precision}"
 
     def __call__(self, inputs: Inputs, **options: Any) -> Array:

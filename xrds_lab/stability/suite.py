@@ -117,7 +117,7 @@ def stability(
 def _earlier(
     path: Path, weights: list[dict[str, Any]]
 ) -> tuple[dict[Key, Check], dict[Key, dict[float, float]]]:
-    """Return what an earlier run measured of the same weights, to be added to."""
+    """Return the results of an earlier run with the same weights."""
     try:
         result = json.loads(path.read_text())
         if result["weights"] != weights:

@@ -10,7 +10,7 @@ import bpy
 from mathutils import Vector
 
 from .geometry import Point, Shape
-from .nodes import Colour, Value, World
+from .nodes import Colour, World
 
 ORIGIN = (0.0, 0.0, 0.0)
 
@@ -41,7 +41,7 @@ class Builder:
     def link(
         self, name: str, data: Any, at: Point = ORIGIN, turn: float = 0.0
     ) -> bpy.types.Object:
-        """A new object of any data, turned about z."""
+        """Add an object with this data, turned about z."""
         thing = bpy.data.objects.new(name, data)
         thing.location, thing.rotation_euler[2] = at, turn
         self.scene.collection.objects.link(thing)
@@ -57,7 +57,7 @@ class Builder:
         name: str = "",
         segments: int = 2,
     ) -> bpy.types.Object:
-        """A shape of one material, its edges rounded by `bevel` in `segments` steps."""
+        """Add a shape of one material; `bevel` rounds its edges in `segments` steps."""
         name = name or material.name
         mesh = shape.mesh(name)
         mesh.materials.append(material)
@@ -77,7 +77,7 @@ class Builder:
         name: str = "letters",
         **settings: Any,
     ) -> bpy.types.Object:
-        """Upright text in Blender's own font, facing -y before the turn."""
+        """Add upright text in Blender's own font, facing -y before the turn."""
         curve = bpy.data.curves.new(name, "FONT")
         curve.body, curve.size = text, size
         _assign(curve, settings)
@@ -95,7 +95,7 @@ class Builder:
         name: str = "",
         **settings: Any,
     ) -> bpy.types.Object:
-        """A lamp of a kind (AREA, POINT, SPOT, SUN) that shines at `target`."""
+        """Add a lamp of a kind (AREA, POINT, SPOT, SUN) that shines at `target`."""
         light = bpy.data.lights.new(name or kind, kind)
         light.energy = energy
         _assign(light, settings)
@@ -104,7 +104,7 @@ class Builder:
         return thing
 
     def camera(self, eye: Point, target: Point, lens: float) -> bpy.types.Object:
-        """A camera that looks at `target`; it becomes the scene's."""
+        """Add a camera that looks at `target` and make it the scene's."""
         thing = self.link("Camera", bpy.data.cameras.new("Camera"))
         thing.data.lens = lens
         aim(thing, eye, target)
@@ -112,13 +112,13 @@ class Builder:
         return thing
 
     def world(self) -> World:
-        """A new world for the scene, to be given its light."""
+        """Give the scene a new world; `World.light` sets its light."""
         world = World("World")
         self.scene.world = world.world
         return world
 
-    def even_world(self, colour: Colour | Value, strength: float) -> None:
-        """The same light from everywhere."""
+    def even_world(self, colour: Colour, strength: float) -> None:
+        """Give the scene the same light from everywhere."""
         self.world().light(colour, strength)
 
 

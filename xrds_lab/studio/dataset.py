@@ -102,10 +102,10 @@ def generate(
     assets: str | Path | None = None,
     **options: Any,
 ) -> int:
-    """Render `count` scenes from number `seed` on; how many windows were written.
+    """Render `count` scenes from number `seed` on; returns the windows written.
 
-    Finished scenes and windows are skipped, so an interrupted run is taken up again
-    by the same call. `options` are further fields of Recipe.
+    Finished scenes and windows are skipped, so the same call resumes an interrupted
+    run. `options` are further fields of Recipe.
     """
     assets = Path(assets) if assets is not None else None
     recipe = Recipe(Path(out), tuple(scales), assets, **options)

@@ -1,4 +1,4 @@
-"""What a training set holds: counts, bytes, seconds of rendering, and a look at it."""
+"""Contents of a training set: counts, bytes, render seconds, a contact sheet."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ QUALITY = 85  # of the JPEG
 
 @dataclass(frozen=True)
 class File:
-    """One window's file and what it says of itself."""
+    """One window's file and its metadata."""
 
     path: Path
     meta: dict[str, Any]
@@ -95,7 +95,7 @@ def contact_sheet(windows: list[File], path: Path) -> None:
 
 
 def lines(sheet: dict[str, Any]) -> list[str]:
-    """The datasheet to be read."""
+    """The datasheet as lines of text."""
     stages = ", ".join(f"{k} {s:.1f}" for k, s in sheet["mean_cpu_seconds"].items())
     return [
         f"windows: {_counts(sheet['windows'])}; {_counts(sheet['kinds'])}",

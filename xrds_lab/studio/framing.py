@@ -1,4 +1,4 @@
-"""Which parts of a frame become training windows: those with something to see."""
+"""Choice of training windows: the parts of a frame with detail."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def set_border(scene: bpy.types.Scene, window: Window | None) -> None:
 
 
 def interest(radiance: Array, albedo: Array, normal: Array) -> Array:
-    """How much there is to see at each pixel of a small, noisy picture (h, w)."""
+    """Amount of detail at each pixel of a small, noisy picture (h, w)."""
     luminance = _blurred(radiance.mean(-1, keepdims=True))
     light = np.log(luminance + 0.02 * luminance.mean() + 1e-6)
     parts = ((np.clip(albedo, 0, 1), 1.0), (normal, 0.5), (light, 0.2))

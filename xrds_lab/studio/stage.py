@@ -1,4 +1,4 @@
-"""What the recipes of random scenes work with: builder, dice, materials, views."""
+"""The stage that recipes of random scenes build on: dice, materials, views."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ def _row(config: Path, run: Path, changes: Sequence[str], seeds: int) -> dict[st
 
 
 def lines(result: dict[str, Any]) -> list[str]:
-    """The table to be read, and where it lies."""
+    """The table and its path, as lines of text."""
     head = f"x{result['scale']}, {result['steps']} steps, {result['seeds']} seeds"
     figures = "dB of validation, spread, parameters, MACs a pixel"
     rows = [f"{result['table']}: {head}; {figures}"]

@@ -107,7 +107,7 @@ class Learner:
             self.resume()
 
     def learn(self, pairs: Sequence[Pair]) -> None:
-        """Take the steps that are left."""
+        """Train for the steps that are left."""
         bar = tqdm(total=self.steps, initial=self.step, unit="step")
         with bar, Interruption() as stop:
             while self.step < self.steps:
@@ -166,7 +166,7 @@ class Learner:
         return float(loss.item())
 
     def learning_rate(self) -> float:
-        """Of the next step: falls along a cosine."""
+        """Learning rate of the next step: falls along a cosine."""
         return cosine(LEARNING_RATE, FINAL_LEARNING_RATE, self.step / self.steps)
 
     def keep(self) -> None:
@@ -225,7 +225,7 @@ def noisy_first(pair: Pair) -> Iterator[tuple[Tensor, Tensor, float]]:
 
 
 def lines(result: dict[str, Any]) -> list[str]:
-    """What became of it."""
+    """The result as lines of text."""
     left = ", ".join(
         f"{part:.0%} of {name}" for name, part in result["error_left"].items()
     )

@@ -81,6 +81,6 @@ class Processes:
         return values
 
     def leave(self) -> None:
-        """Part from the others."""
+        """Leave the group of processes."""
         if self.count > 1 and distributed.is_initialized():
             distributed.destroy_process_group()

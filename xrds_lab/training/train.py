@@ -174,7 +174,7 @@ class Run:
         return {"out": str(self.folder.path), **self.records[-1], "best": best}
 
     def go_on(self, bar: tqdm, stop: Interruption) -> None:
-        """The loop."""
+        """Train, validate and save until the last step."""
         if self.due():
             self.validate(stop)
         while self.step < self.config.steps:

@@ -59,7 +59,7 @@ def summary(scores: Sequence[Score]) -> dict[str, Any]:
 
 
 def mean(values: Sequence[float]) -> float:
-    """As a plain float."""
+    """The mean as a plain float."""
     return float(np.mean(values))
 
 

@@ -56,7 +56,7 @@ class Window:
 
     @property
     def size(self) -> int:
-        """Bytes that it holds."""
+        """Bytes in memory."""
         return sum(array.nbytes for array in self.arrays.values())
 
 
