@@ -181,6 +181,15 @@ def test_weights_and_whole_frames(world: World) -> None:
         assert sheet.height == 2 * (WINDOW[3] * 4 + 2 * 18)
 
 
+def test_rivals_are_timed_without_weights(world: World) -> None:
+    folder = world.folder / "empty"
+    folder.mkdir()
+    report = world.run(weights=folder, timing=True, timing_rounds=1)
+    (record,) = report["scenes"]
+    assert set(record["methods"]) == set(ENLARGEMENTS) | {"oidn_equal_spp"}
+    assert all(row["seconds"] > 0 for row in record["methods"].values())
+
+
 def test_unknown_names_are_refused(world: World) -> None:
     with pytest.raises(UsageError, match="noisy"):
         world.run(guides=["noisy"])

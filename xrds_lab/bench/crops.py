@@ -34,7 +34,7 @@ def viewer(report: Report, scene: SceneBench) -> str:
     shown: dict[str, str] = {}
     budgets = []
     for entry in (e for e in report["budgets"] if e["scene"] == scene.name):
-        columns = []
+        columns: list[dict[str, str]] = []
         for name in SHOWN:
             best = entry["best"].get(name)
             if best is None or best["label"] in {c["label"] for c in columns}:

@@ -150,7 +150,7 @@ def _less_network(name: str) -> str:
     return f"{_frame(name)}, less the network"
 
 
-def _alone(denoiser: str) -> str:
+def _alone(denoiser: Denoiser) -> str:
     return f"OIDN {denoiser} alone"
 
 

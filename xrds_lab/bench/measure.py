@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.picking import probe
 from xrds_blender.planning import budget
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_core.atomic import write_json
 
 from . import tasks, workload
@@ -244,7 +244,7 @@ class SceneBench:
         for config in self.configs:
             if not self.pictures.knows(config):
                 continue
-            point = {
+            point: Point = {
                 "scene": self.name,
                 "method": config.method,
                 "settings": describe(config),
@@ -308,7 +308,8 @@ class SceneBench:
 
 def picked_config(job: RenderJob) -> Config:
     """The configuration of a job that the picker made."""
-    denoiser, samples = job.denoiser or OFF, job.samples or 0
+    denoiser = OFF if job.denoiser is None else Denoiser(job.denoiser)
+    samples = job.samples or 0
     if job.is_plain:
         return Config("oidn", samples, denoiser)
     return Config(

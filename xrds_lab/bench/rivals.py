@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 from xrds_core import baselines, front_end
 from xrds_core.arrays import Array
 
-# (radiance, radiance before denoising, albedo, normal, scale) -> picture
-Enlargement = Callable[[Array, Array, Array, Array, int], Array]
+# (radiance, radiance before denoising, albedo, normal, scale) -> picture; those that
+# need no guides take None
+Enlargement = Callable[[Array, Array, Any, Any, int], Array]
 
 # By the method's name in every report.
 ENLARGEMENTS: dict[str, Enlargement] = {

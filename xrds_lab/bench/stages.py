@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from .sweep import Config
     from .windows import Shot
 
-    Run = dict[str, float | None]
+    Run = dict[str, Any]  # seconds, cpu, peak (None if not known) and own stages
     Task = Callable[[], object]
 
 ROUNDS = 3

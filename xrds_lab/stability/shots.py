@@ -72,7 +72,7 @@ def _rendered(name: str, side: int) -> Arrays:
 
 def _frame(passes: Any, frame: int) -> Arrays:
     """One frame's renders; every frame has noise of its own."""
-    arrays = {}
+    arrays: Arrays = {}
     for scale in SCALES:
         low = passes.beauty(scale, SAMPLES, seed=100 + frame)
         arrays |= {f"low{scale}": low.radiance, f"noisy{scale}": before_denoising(low)}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import random
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -45,6 +47,14 @@ class Library:
         name = path.parent.name + "/" + path.name
         if name not in self.used:
             self.used.append(name)
+
+
+def chosen(
+    rng: random.Random, paths: Sequence[Path], words: Sequence[str] = ()
+) -> Path:
+    """One of the paths whose name has one of `words`; any if there is none."""
+    named = [path for path in paths if any(word in path.name for word in words)]
+    return rng.choice(named or paths)
 
 
 def texture_map(folder: Path, kind: str) -> Path | None:

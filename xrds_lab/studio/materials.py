@@ -8,7 +8,7 @@ from collections.abc import Callable
 import bpy
 
 from . import patterns, textures
-from .assets import Library
+from .assets import Library, chosen
 from .nodes import Surface, Value, solid
 
 
@@ -77,10 +77,8 @@ class Painter:
         light = rng.random() < 0.7
         base = patterns.colour(rng, 0.4 if light else 0.05, 0.9)
         surface.set(Base_Color=base, Roughness=rng.uniform(0.4, 0.95))
-        height = patterns.noise(
-            surface, rng, patterns.placed(surface, rng, rng.uniform(5, 90))
-        )
-        self._bump(surface, height, 0.002)
+        at = patterns.placed(surface, rng, rng.uniform(5, 90))
+        self._bump(surface, patterns.noise(surface, rng, at), 0.002)
         return surface.material
 
     def patterned(self, size: float = 1.0) -> bpy.types.Material:
@@ -231,9 +229,8 @@ class Painter:
         """Woven cloth with sheen."""
         rng = self.rng
         surface = Surface("cloth")
-        weave = patterns.weave(
-            surface, rng, patterns.placed(surface, rng, rng.uniform(30, 200))
-        )
+        at = patterns.placed(surface, rng, rng.uniform(30, 200))
+        weave = patterns.weave(surface, rng, at)
         value = weave
         if rng.random() < 0.6:
             value = self._pattern(surface, rng.uniform(3, 30))
@@ -288,11 +285,8 @@ class Painter:
             value = self._pattern(surface, 8 / size)
             base = patterns.tinted(surface, rng, value, base, True)
         strength = power if power is not None else 2 ** rng.uniform(0, 4)
-        surface.set(
-            Base_Color=(0.1,) * 3,
-            Emission_Color=base,
-            Emission_Strength=strength,
-        )
+        surface.set(Emission_Color=base, Emission_Strength=strength)
+        surface.set(Base_Color=(0.1,) * 3)
         return surface.material
 
     def leaves(self, alpha: bool = False) -> bpy.types.Material:
@@ -300,12 +294,9 @@ class Painter:
         rng = self.rng
         surface = Surface("leaves")
         island = surface.add("NewGeometry").outputs["Random Per Island"]
-        green = (
-            rng.uniform(0.02, 0.2),
-            rng.uniform(0.08, 0.3),
-            rng.uniform(0.01, 0.08),
-        )
-        base = patterns.tinted(surface, rng, island, green, False)
+        red, green = rng.uniform(0.02, 0.2), rng.uniform(0.08, 0.3)
+        base = (red, green, rng.uniform(0.01, 0.08))
+        base = patterns.tinted(surface, rng, island, base, False)
         surface.set(Base_Color=base, Roughness=rng.uniform(0.3, 0.8))
         if alpha:
             at = patterns.placed(surface, rng, rng.uniform(10, 60))
@@ -336,12 +327,7 @@ class Painter:
         """A texture set of the library (whose name has one of `words`)."""
         if self.library is None:
             return self.patterned(size)
-        sets = [
-            s
-            for s in self.library.textures
-            if not words or any(w in s.name for w in words)
-        ]
-        folder = self.rng.choice(sets or list(self.library.textures))
+        folder = chosen(self.rng, self.library.textures, words)
         surface = Surface(folder.name)
         density = 2 ** self.rng.uniform(-1, 1.5) / min(max(size, 0.1), 2.0)
         textures.cover(surface, self.rng, self.library, folder, density)

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from . import lighting, props
-from .geometry import box, joined, rod, sheet, wall
+from .geometry import Shape, box, joined, rod, sheet, wall
 from .stage import Stage, turned
 
 
@@ -103,7 +103,7 @@ def _windows(stage: Stage, side: Side, height: float) -> list[tuple[float, ...]]
     return holes
 
 
-def _frame(stage: Stage, x: float, z: float) -> object:
+def _frame(stage: Stage, x: float, z: float) -> Shape:
     edge, rng = stage.rng.uniform(0.03, 0.07), stage.rng
     bars = [box(edge, 0.16, z).shifted((i * x / 2, 0.07, 0)) for i in (-1, 1)]
     bars += [box(x, 0.16, edge).shifted((0, 0.07, k)) for k in (0, z - edge)]

@@ -10,7 +10,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from .assets import Library, copied, import_model
+from .assets import Library, chosen, copied, import_model
 from .builder import Builder
 from .geometry import Point
 from .materials import Painter
@@ -50,12 +50,7 @@ class Stage(Builder):
         """A model (whose name has one of `words`) standing at `at`."""
         if self.library is None:
             return None
-        paths = [
-            path
-            for path in self.library.models
-            if not words or any(word in path.name for word in words)
-        ]
-        path = self.rng.choice(paths or list(self.library.models))
+        path = chosen(self.rng, self.library.models, words)
         base = copied(self._imported(path))
         base.location, base.rotation_euler[2] = at, turn
         base.scale = (size, size, size)
