@@ -62,7 +62,7 @@ def samples_table(
     """
     shots = find_shots(scenes, windows, references)
     networks = Networks(weights, "auto")
-    full = (preset, scale, "full") in networks.records
+    full = Network(preset, scale, "full") in networks.records
     configs = list(configurations(scale, preset, full))
     records: list[Record] = []
     with kept(cache) as folder:
@@ -138,26 +138,20 @@ def summary(records: list[Record]) -> dict[str, Any]:
         by_scene.setdefault(record["scene"], {})[key] = record
     area = max(record["scale"] for record in records) ** 2
     full = any(record["guides"] == "full" for record in records)
+
+    def over_oidn(guides: str, samples: dict[int, int]) -> dict[str, Any]:
+        return {
+            mode: {
+                str(n): _against(by_scene, ("xrds", guides, low), ("oidn", "", n, oidn))
+                for n, low in samples.items()
+            }
+            for mode, oidn in OIDN.items()
+        }
+
+    averages = {n: area * n // 2 for n in AVERAGES if full}
     return {
-        "over_oidn": {
-            mode: {
-                str(n): _against(
-                    by_scene, ("xrds", "fast", area * n), ("oidn", "", n, d)
-                )
-                for n in RATES
-            }
-            for mode, d in OIDN.items()
-        },
-        "full_over_oidn": {
-            mode: {
-                str(n): _against(
-                    by_scene, ("xrds", "full", area * n // 2), ("oidn", "", n, d)
-                )
-                for n in AVERAGES
-                if full
-            }
-            for mode, d in OIDN.items()
-        },
+        "over_oidn": over_oidn("fast", {n: area * n for n in RATES}),
+        "full_over_oidn": over_oidn("full", averages),
         "more_samples": {
             scene: [by_key["xrds", "fast", n]["psnr"] for n in LOW_SAMPLES]
             for scene, by_key in by_scene.items()

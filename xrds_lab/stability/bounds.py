@@ -18,7 +18,7 @@ class Bound:
     """The most that a value may be, and what the value is."""
 
     limit: float | None
-    says: str
+    meaning: str
 
 
 @dataclass(frozen=True)
