@@ -9,23 +9,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from torch.nn import functional
 
 from .front_end import upsample_alpha, upsample_bilinear
+from .layout import to_picture, to_planes
 
 if TYPE_CHECKING:
-    from .front_end import Picture
+    from .arrays import Array
 
 _BAND = 64  # low-resolution rows at a time bound the memory of what is in between
 
 
-def finish(
-    picture: Picture, low: Picture, guide_alpha: Picture | None, scale: int
-) -> None:
-    """Fill in the alpha of ``picture`` (H, W, 4) and free its radiance of fringes.
+def finish(picture: Array, low: Array, guide_alpha: Array | None, scale: int) -> None:
+    """Fill in the alpha of `picture` (H, W, 4) and free its radiance of fringes.
 
-    ``picture`` was made from ``low`` (h, w, 4); ``guide_alpha`` is (H, W).
+    `picture` was made from `low` (h, w, 4); `guide_alpha` is (H, W).
     """
     height = low.shape[0]
     for top in range(0, height, _BAND):
@@ -42,17 +40,16 @@ def finish(
 
 
 def _alpha(
-    low: Picture, guide: Picture | None, shape: tuple[int, ...], scale: int
-) -> Picture:
+    low: Array, guide: Array | None, shape: tuple[int, ...], scale: int
+) -> Array:
     if guide is not None:
         return upsample_alpha(low, guide, scale)
-    plane = torch.from_numpy(np.clip(low, 0.0, 1.0))[None, None]
-    large: Picture = upsample_bilinear(plane, scale)[0, 0].numpy()
-    return large[: shape[0], : shape[1]]
+    large = upsample_bilinear(to_planes(np.clip(low, 0.0, 1.0)[..., None]), scale)
+    return to_picture(large)[: shape[0], : shape[1], 0]
 
 
-def _bounded(radiance: Picture, alpha: Picture, low: Picture, scale: int) -> Picture:
-    """Keep the colour behind ``alpha`` among those of the 3x3 pixels of ``low``.
+def _bounded(radiance: Array, alpha: Array, low: Array, scale: int) -> Array:
+    """Keep the colour behind `alpha` among those of the 3x3 pixels of `low`.
 
     Only near edges: where all nine are opaque, radiance may be anything. Light that
     covers nothing (alpha 0), as of fire, sets no upper bound.
@@ -65,7 +62,7 @@ def _bounded(radiance: Picture, alpha: Picture, low: Picture, scale: int) -> Pic
     return np.fmax(np.fmin(radiance, brightest), darkest)
 
 
-def _colour_range(low: Picture) -> tuple[Picture, Picture]:
+def _colour_range(low: Array) -> tuple[Array, Array]:
     """Return the least and largest radiance / alpha around pixels, both (h, w, 3)."""
     radiance, alpha = low[..., :3], low[..., 3:]
     with np.errstate(all="ignore"):
@@ -78,11 +75,10 @@ def _colour_range(low: Picture) -> tuple[Picture, Picture]:
     return darkest, brightest
 
 
-def _largest_around(x: Picture) -> Picture:
-    planes = torch.from_numpy(np.ascontiguousarray(x.transpose(2, 0, 1)))
-    pooled = functional.max_pool2d(planes, kernel_size=3, stride=1, padding=1)
-    return np.ascontiguousarray(pooled.permute(1, 2, 0).numpy())
+def _largest_around(x: Array) -> Array:
+    pooled = functional.max_pool2d(to_planes(x), kernel_size=3, stride=1, padding=1)
+    return to_picture(pooled)
 
 
-def _expand(x: Picture, scale: int) -> Picture:
+def _expand(x: Array, scale: int) -> Array:
     return x.repeat(scale, axis=0).repeat(scale, axis=1)

@@ -19,9 +19,9 @@ _unfinished: set[Path] = set()
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Yield a path beside ``path`` to write to; it takes ``path``'s place at the end.
+    """Yield a path beside `path` to write to; it takes `path`'s place at the end.
 
-    On an error nothing is left of it and ``path`` is as it was. Any number of threads,
+    On an error nothing is left of it and `path` is as it was. Any number of threads,
     processes and machines may replace one path at once: it is whole at any time. The
     folder must exist.
     """
@@ -51,7 +51,7 @@ def abandon() -> None:
 
 
 def sweep(folder: Path) -> None:
-    """Remove from ``folder`` what processes left that were killed while they wrote."""
+    """Remove from `folder` what processes left that were killed while they wrote."""
     for path in folder.glob(f".*{_SUFFIX}"):
         with suppress(OSError):  # another sweep may be at it
             if time.time() - path.stat().st_mtime > _DEAD:

@@ -7,19 +7,13 @@ area mean of the full-resolution one, guides are full-resolution.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
 import torch
 from torch.nn import functional
 
+from .arrays import Array
 from .errors import PictureError
 from .front_end import upsample_bilinear
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float32]
+from .layout import to_picture, to_planes
 
 # Chosen on the very windows that are measured, which favours this rival alone.
 SPATIAL_SIGMA = 0.5  # of a low-resolution pixel
@@ -30,7 +24,7 @@ RADIUS = 2
 
 def bilinear(picture: Array, scale: int) -> Array:
     """Enlarge (h, w, C) to (scale h, scale w, C): half-pixel centres, edges held."""
-    return _picture(upsample_bilinear(_planes(picture), scale))
+    return to_picture(upsample_bilinear(to_planes(picture), scale))
 
 
 def bicubic(radiance: Array, scale: int) -> Array:
@@ -38,12 +32,12 @@ def bicubic(radiance: Array, scale: int) -> Array:
 
     The overshoot below zero is cut off.
     """
-    planes = _planes(radiance)
+    planes = to_planes(radiance)
     # antialias takes Keys' own a = -0.5; without it a = -0.75, which bends ramps
     large = functional.interpolate(
         planes, scale_factor=scale, mode="bicubic", align_corners=False, antialias=True
     )
-    return _picture(large.clamp_min(0))
+    return to_picture(large.clamp_min(0))
 
 
 def joint_bilateral(
@@ -62,7 +56,7 @@ def joint_bilateral(
             f"guides of shapes {albedo.shape} and {normal.shape} do not fit a "
             f"{width}x{height} picture at scale {scale}"
         )
-    low, guide = _planes(radiance), _guide_planes(albedo, normal)
+    low, guide = to_planes(radiance), _guide_planes(albedo, normal)
     low_guide = functional.avg_pool2d(guide, scale)
     around = torch.cat([low, low_guide], dim=1)
     around = functional.pad(around, (radius,) * 4, mode="replicate")
@@ -78,13 +72,13 @@ def joint_bilateral(
             weight = torch.exp(-0.5 * (unlike + distance).clamp_max(150))
             total += weight * near[:, :3]
             weights += weight
-    return _picture(total / weights)
+    return to_picture(total / weights)
 
 
 def _guide_planes(albedo: Array, normal: Array) -> torch.Tensor:
     """Both guides as (1, 6, H, W), in units of their sigmas."""
     return torch.cat(
-        [_planes(albedo) / ALBEDO_SIGMA, _planes(normal) / NORMAL_SIGMA], dim=1
+        [to_planes(albedo) / ALBEDO_SIGMA, to_planes(normal) / NORMAL_SIGMA], dim=1
     )
 
 
@@ -100,14 +94,3 @@ def _squared_distance(
 
 def _nearest(x: torch.Tensor, scale: int) -> torch.Tensor:
     return functional.interpolate(x, scale_factor=scale, mode="nearest")
-
-
-def _planes(picture: Array) -> torch.Tensor:
-    """(H, W, C) to (1, C, H, W)."""
-    plain = np.ascontiguousarray(picture.transpose(2, 0, 1), np.float32)
-    return torch.from_numpy(plain)[None]
-
-
-def _picture(planes: torch.Tensor) -> Array:
-    """(1, C, H, W) to (H, W, C)."""
-    return np.ascontiguousarray(planes[0].permute(1, 2, 0).numpy())

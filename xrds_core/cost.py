@@ -68,7 +68,7 @@ def leaves(network: nn.Module) -> list[nn.Module]:
 
 
 def measure(network: XRDS) -> Cost:
-    """Run ``network`` in float32 on two by two windows and return its cost.
+    """Run `network` in float32 on two by two windows and return its cost.
 
     Everything it computes grows with the number of pixels, so that a tiny picture
     tells of a large one: but for the areas of a `KernelTail`, of which there are many

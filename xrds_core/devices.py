@@ -12,7 +12,7 @@ PRECISIONS = {"fp32": torch.float32, "bf16": torch.bfloat16}
 
 
 def choose_device(name: str = "auto") -> torch.device:
-    """Return the named device; for ``auto`` the fastest kind there is.
+    """Return the named device; for `auto` the fastest kind there is.
 
     Raises UsageError if this machine, or this build of torch, has no such device.
     """
@@ -31,7 +31,7 @@ def choose_device(name: str = "auto") -> torch.device:
 
 
 def choose_precision(name: str, device: torch.device) -> torch.dtype:
-    """Return the type that layers compute in; for ``auto`` the fast one that holds.
+    """Return the type that layers compute in; for `auto` the fast one that holds.
 
     On processors bf16 is slower than fp32 unless they have special units for it.
     Raises UsageError for other names than auto, fp32, bf16.
@@ -65,7 +65,7 @@ def is_out_of_memory(error: BaseException) -> bool:
 
 
 def free_memory(device: torch.device) -> float:
-    """Return the bytes that can be taken on ``device``, infinity where not known.
+    """Return the bytes that can be taken on `device`, infinity where not known.
 
     Linux lets a process take more than there is and then kills it, so it is asked.
     """

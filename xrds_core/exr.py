@@ -18,11 +18,8 @@ from .atomic import replacing
 from .errors import PictureError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from .arrays import Array
     from .exr_library import Part
-
-    Array = NDArray[np.float32]
 
 _COMPONENTS = ("RGB", "XYZ", "rgb", "xyz")
 _COMPOSITED = "Composite."  # Blender's layer of what its compositor made
@@ -71,7 +68,7 @@ class Guides:
 
 
 def read_channels(path: str | Path) -> dict[str, Array]:
-    """Read every channel of all parts: full name, as ``ViewLayer.Depth.Z``, to (H, W).
+    """Read every channel of all parts: full name, as `ViewLayer.Depth.Z`, to (H, W).
 
     Raises PictureError if the file cannot be read.
     """
@@ -80,7 +77,7 @@ def read_channels(path: str | Path) -> dict[str, Array]:
 
 
 def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
-    """Read the picture: the pass ``names.beauty``, or plain R, G, B.
+    """Read the picture: the pass `names.beauty`, or plain R, G, B.
 
     With it, where there is one, the noisy pass. Raises PictureError if the file cannot
     be read or has no such pass.
@@ -94,7 +91,7 @@ def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
 def read_guides(
     path: str | Path, *, full: bool = False, names: Names = CYCLES
 ) -> Guides:
-    """Read albedo and normal and, where there is one, alpha; for ``full``, radiance.
+    """Read albedo and normal and, where there is one, alpha; for `full`, radiance.
 
     The radiance is that of the noisy pass or, in a file of an undenoised render, that
     of the picture. Raises PictureError if the file cannot be read or lacks a pass.
@@ -111,7 +108,7 @@ def read_guides(
 def write_picture(path: str | Path, channels: Mapping[str, Array]) -> None:
     """Write (H, W) planes by channel name, as float32, all at once or not at all.
 
-    Raises PictureError, and leaves ``path`` as it was, if it cannot be written.
+    Raises PictureError, and leaves `path` as it was, if it cannot be written.
     """
     path = Path(path)
     planes = {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}
@@ -123,7 +120,7 @@ def write_picture(path: str | Path, channels: Mapping[str, Array]) -> None:
 
 
 class _File:
-    """The channels of a file by full name, as ``ViewLayer.Combined.R``."""
+    """The channels of a file by full name, as `ViewLayer.Combined.R`."""
 
     def __init__(self, path: str | Path) -> None:
         self.path = path
@@ -133,7 +130,7 @@ class _File:
         return self._prefix(wanted) is not None
 
     def colour(self, wanted: str, *, plain: bool = False) -> Array:
-        """Return (H, W, 3) of a pass; ``plain``: or of R, G, B without a pass."""
+        """Return (H, W, 3) of a pass; `plain`: or of R, G, B without a pass."""
         prefix = self._prefix(wanted)
         if prefix is None and plain and self._components(""):
             prefix = ""
@@ -206,7 +203,7 @@ def _read(path: str | Path) -> Iterator[tuple[str, Part, Any]]:
 
 
 def _placed(pixels: Any, part: Part) -> Array:
-    """Return ``pixels`` of the data window in the display window, zero around."""
+    """Return `pixels` of the data window in the display window, zero around."""
     (left, top), (right, bottom) = part.display_window
     x, y = part.data_window[0]
     size = (bottom - top + 1, right - left + 1)
@@ -220,7 +217,7 @@ def _placed(pixels: Any, part: Part) -> Array:
 
 
 def _shared(offset: int, length: int, limit: int) -> tuple[slice, slice]:
-    """Return where ``length`` pixels at ``offset`` go, and which of them."""
+    """Return where `length` pixels at `offset` go, and which of them."""
     start, stop = max(offset, 0), min(offset + length, limit)
     stop = max(start, stop)
     return slice(start, stop), slice(start - offset, stop - offset)

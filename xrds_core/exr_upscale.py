@@ -38,8 +38,8 @@ def upscale_file(
     Args:
         beauty: the low-resolution render, denoised, with alpha or without; the noisy
             picture, where the file has one too, tells what the denoiser took away.
-        guide_file: albedo and normal; for ``full`` guides also a noisy picture.
-        output: gets R, G, B, scene-linear, and A where ``beauty`` has alpha.
+        guide_file: albedo and normal; for `full` guides also a noisy picture.
+        output: gets R, G, B, scene-linear, and A where `beauty` has alpha.
         weights: a folder of presets, or a file, in place of the shipped ones.
         names: what the passes are called in both files.
 

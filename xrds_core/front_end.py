@@ -2,7 +2,7 @@
 
 NumPy pictures are float32 (height, width, channels), row 0 on top, scene-linear
 Rec.709, radiance premultiplied by alpha. Torch tensors are (batch, channels,
-height, width). ``exposure`` is the dimensionless factor e of one whole picture.
+height, width). `exposure` is the dimensionless factor e of one whole picture.
 """
 
 from __future__ import annotations
@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
+from .arrays import Array
+from .layout import to_picture, to_planes
 from .regression import ALBEDO_EPSILON, explain
 
-Picture = NDArray[np.float32]
-ArrayOrTensor = TypeVar("ArrayOrTensor", NDArray[np.float32], Tensor)
+ArrayOrTensor = TypeVar("ArrayOrTensor", Array, Tensor)
 
 TRANSFER_GAIN = 10.0
 EXPOSURE_KEY = 0.18
@@ -38,10 +39,10 @@ _LARGEST_EXPOSED = 1e18
 _LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
 
 
-def clean_radiance(x: Picture) -> tuple[Picture, int]:
+def clean_radiance(x: Array) -> tuple[Array, int]:
     """Return (x, bad pixels): NaN and infinities filled in, negative values 0.
 
-    ``x`` itself is returned where nothing is wrong with it; else a copy.
+    `x` itself is returned where nothing is wrong with it; else a copy.
     """
     if not x.size or (x.min() >= 0.0 and np.isfinite(x.max())):
         return x, 0
@@ -51,7 +52,7 @@ def clean_radiance(x: Picture) -> tuple[Picture, int]:
     return fill_holes(np.where(finite & (x < 0.0), np.float32(0.0), x))[0], bad
 
 
-def clean_albedo(x: Picture) -> tuple[Picture, int]:
+def clean_albedo(x: Array) -> tuple[Array, int]:
     """Return (x in [0, 1], pixels that held NaN or infinities).
 
     Values above 1 are no fault: Cycles adds emission and background to its
@@ -61,7 +62,7 @@ def clean_albedo(x: Picture) -> tuple[Picture, int]:
     return np.clip(x, 0.0, 1.0), holes
 
 
-def clean_normal(x: Picture) -> tuple[Picture, int]:
+def clean_normal(x: Array) -> tuple[Array, int]:
     """Return (x in [-1, 1], pixels that held NaN or infinities); zero stays zero.
 
     Cycles' denoising normals are means of unit vectors, so shorter than 1 at
@@ -71,10 +72,10 @@ def clean_normal(x: Picture) -> tuple[Picture, int]:
     return np.clip(x, -1.0, 1.0), holes
 
 
-def fill_holes(x: Picture) -> tuple[Picture, int]:
+def fill_holes(x: Array) -> tuple[Array, int]:
     """Replace pixels with NaN or infinities by the mean of finite ones near them.
 
-    Returns (x, holes); ``x`` itself where there are none. A picture without a
+    Returns (x, holes); `x` itself where there are none. A picture without a
     single finite pixel becomes 0.
     """
     # min and max propagate NaN and need no array of the size of the picture
@@ -84,7 +85,7 @@ def fill_holes(x: Picture) -> tuple[Picture, int]:
     return _pull_push(x, finite), int(finite.size - finite.sum())
 
 
-def _pull_push(x: Picture, known: NDArray[np.bool_]) -> Picture:
+def _pull_push(x: Array, known: NDArray[np.bool_]) -> Array:
     """Fill unknown pixels from the means of 2x2 blocks, coarser where need be."""
     if known.all():
         return x
@@ -104,15 +105,15 @@ def _pull_push(x: Picture, known: NDArray[np.bool_]) -> Picture:
     return np.where(known[..., None], x, fine)
 
 
-def _pair_sums(x: Picture, axis: int) -> Picture:
+def _pair_sums(x: Array, axis: int) -> Array:
     even, odd = (np.take(x, range(i, x.shape[axis], 2), axis=axis) for i in (0, 1))
     return np.asarray(even + odd)
 
 
-def auto_exposure(radiance: Picture) -> float:
+def auto_exposure(radiance: Array) -> float:
     """Return e: the key over the geometric mean luminance of the picture's bins.
 
-    ``radiance`` (h, w, 3 or more) is clean and low-resolution. Its bins are at
+    `radiance` (h, w, 3 or more) is clean and low-resolution. Its bins are at
     most 16 x 16, whatever its size, so that a tiny render of a frame gives the
     frame's own exposure. Bins far from the bright ones, in either direction, are left
     out. After OIDN's auto-exposure (Afra, 2019).
@@ -143,7 +144,7 @@ def _bin_means(x: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
 def transfer(x: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
     """Return t(x) = log(1 + k e x) in float32, for radiance >= 0 of any range.
 
-    ``exposure`` may be a tensor that broadcasts against ``x``, one e a picture.
+    `exposure` may be a tensor that broadcasts against `x`, one e a picture.
     """
     if isinstance(x, Tensor):
         exposed = x.float() * (TRANSFER_GAIN * exposure)
@@ -154,7 +155,7 @@ def transfer(x: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
 
 
 def inverse_transfer(t: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
-    """Return the radiance whose transfer is ``t``; finite for every finite t."""
+    """Return the radiance whose transfer is `t`; finite for every finite t."""
     if isinstance(t, Tensor):
         exposed = torch.expm1(t.float().clamp(max=_LARGEST_TRANSFERRED))
         return (exposed / (TRANSFER_GAIN * exposure)).clamp(max=float(_LARGEST))
@@ -182,20 +183,20 @@ def upsample_bilinear(x: Tensor, scale: int) -> Tensor:
     )
 
 
-def demodulated_base(radiance: Picture, albedo: Picture, scale: int) -> Picture:
+def demodulated_base(radiance: Array, albedo: Array, scale: int) -> Array:
     """Return up(L / down(A')) A' with A' = albedo + epsilon, albedo in [0, 1].
 
-    ``radiance`` (h, w, 3) and ``albedo`` (s h, s w, 3) are clean; the result is
+    `radiance` (h, w, 3) and `albedo` (s h, s w, 3) are clean; the result is
     radiance (s h, s w, 3). Lighting is smoother than texture, so it is what is
     interpolated.
     """
-    guide = _to_tensor(albedo) + ALBEDO_EPSILON
-    return _to_picture(_modulated(_to_tensor(radiance), guide, scale))
+    guide = to_planes(albedo) + ALBEDO_EPSILON
+    return to_picture(_modulated(to_planes(radiance), guide, scale))
 
 
 def regressed_base(
-    radiance: Picture, noisy: Picture, albedo: Picture, normal: Picture, scale: int
-) -> Picture:
+    radiance: Array, noisy: Array, albedo: Array, normal: Array, scale: int
+) -> Array:
     """Return up(L / down(E)) E with E what the guides explain of L around every pixel.
 
     As `demodulated_base`, but the picture itself, with what it was before denoising,
@@ -203,10 +204,10 @@ def regressed_base(
     back into L what denoising took of these: see `regression.explain`.
     """
     gain = _gain(auto_exposure(radiance))
-    guides = torch.cat((_to_tensor(albedo), _to_tensor(normal)), dim=1)
-    low, before = _to_tensor(radiance * gain), _to_tensor(noisy * gain)
+    guides = torch.cat((to_planes(albedo), to_planes(normal)), dim=1)
+    low, before = to_planes(radiance * gain), to_planes(noisy * gain)
     found = explain(low, before, guides, scale)
-    return _to_picture(_modulated(found.low, found.factor, scale)) / gain
+    return to_picture(_modulated(found.low, found.factor, scale)) / gain
 
 
 def _modulated(low: Tensor, modulator: Tensor, scale: int) -> Tensor:
@@ -214,8 +215,8 @@ def _modulated(low: Tensor, modulator: Tensor, scale: int) -> Tensor:
     return upsample_bilinear(low / area_mean(modulator, scale), scale) * modulator
 
 
-def pad_guide(guide: Picture, low: Picture, scale: int) -> Picture:
-    """Return the guide (H, W, ...) as far as the pixels of ``low`` (h, w, ...) reach.
+def pad_guide(guide: Array, low: Array, scale: int) -> Array:
+    """Return the guide (H, W, ...) as far as the pixels of `low` (h, w, ...) reach.
 
     The edge is repeated at the bottom and right; H <= s h, W <= s w.
     """
@@ -226,28 +227,18 @@ def pad_guide(guide: Picture, low: Picture, scale: int) -> Picture:
     return np.pad(guide, (*missing, *[(0, 0)] * (guide.ndim - 2)), "edge")
 
 
-def upsample_alpha(low_alpha: Picture, guide_alpha: Picture, scale: int) -> Picture:
-    """Return alpha (H, W): the edges of ``guide_alpha``, the cover of ``low_alpha``.
+def upsample_alpha(low_alpha: Array, guide_alpha: Array, scale: int) -> Array:
+    """Return alpha (H, W): the edges of `guide_alpha`, the cover of `low_alpha`.
 
-    ``low_alpha`` (h, w), ``guide_alpha`` (H, W) with H <= s h, W <= s w. Exactly 0
+    `low_alpha` (h, w), `guide_alpha` (H, W) with H <= s h, W <= s w. Exactly 0
     or 1 wherever the low-resolution pixel and the guide both are.
     """
     height, width = guide_alpha.shape
-    low = _to_tensor(np.clip(low_alpha, 0.0, 1.0)[..., None])
+    low = to_planes(np.clip(low_alpha, 0.0, 1.0)[..., None])
     padded = pad_guide(np.clip(guide_alpha, 0.0, 1.0), low_alpha, scale)
-    guide = _to_tensor(padded[..., None])
+    guide = to_planes(padded[..., None])
     missing = upsample_bilinear(low - area_mean(guide, scale), scale)
     alpha = (guide + missing).clamp(0.0, 1.0)
     block = functional.interpolate(low, scale_factor=float(scale), mode="nearest")
     agreed = (block == guide) & ((guide == 0.0) | (guide == 1.0))
-    return _to_picture(torch.where(agreed, guide, alpha))[:height, :width, 0]
-
-
-def _to_tensor(x: Picture) -> Tensor:
-    """(H, W, C) array -> (1, C, H, W) tensor."""
-    return torch.from_numpy(np.ascontiguousarray(x.transpose(2, 0, 1)))[None].float()
-
-
-def _to_picture(x: Tensor) -> Picture:
-    """(1, C, H, W) tensor -> (H, W, C) array."""
-    return np.ascontiguousarray(x[0].permute(1, 2, 0).numpy())
+    return to_picture(torch.where(agreed, guide, alpha))[:height, :width, 0]

@@ -14,7 +14,7 @@ from .front_end import demodulated_base, pad_guide
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .front_end import Picture
+    from .arrays import Array
     from .inputs import Inputs
 
     Area = tuple[slice, slice]
@@ -31,9 +31,9 @@ _BAND = 64  # low-resolution rows that the base is found for at once
 def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
     """Return the rectangle outside which the base is the picture.
 
-    Blocks of ``block`` low-resolution pixels are idle where nothing but background is
+    Blocks of `block` low-resolution pixels are idle where nothing but background is
     seen (normal 0, albedo that holds its radiance), or where every input is even. The
-    rectangle lies on blocks and keeps at least ``margin`` pixels around what is busy.
+    rectangle lies on blocks and keeps at least `margin` pixels around what is busy.
     None where nothing is busy; the whole picture where too little is idle.
     """
     height, width = inputs.low.shape[:2]
@@ -52,8 +52,8 @@ def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
     return (rows, columns) if kept < (1 - _WORTH) * height * width else whole
 
 
-def write_base(picture: Picture, inputs: Inputs) -> None:
-    """Write the demodulated base into ``picture`` (H, W, 3), a band at a time."""
+def write_base(picture: Array, inputs: Inputs) -> None:
+    """Write the demodulated base into `picture` (H, W, 3), a band at a time."""
     height, scale = inputs.low.shape[0], inputs.scale
     for top in range(0, height, _BAND):
         # one more row at each end: as far as interpolation looks
@@ -102,14 +102,14 @@ def _sums(x: NDArray[Any], block: int) -> NDArray[np.float64]:
     return np.asarray(x.sum(-1))
 
 
-def _is_even(extremes: tuple[Picture, Picture]) -> NDArray[np.bool_]:
+def _is_even(extremes: tuple[Array, Array]) -> NDArray[np.bool_]:
     least, most = extremes
     largest = np.maximum(np.abs(least), np.abs(most)).max(-1)
     spread: NDArray[np.bool_] = (most - least).max(-1) <= _EVEN * largest
     return spread
 
 
-def _extremes(x: Picture, block: int) -> tuple[Picture, Picture]:
+def _extremes(x: Array, block: int) -> tuple[Array, Array]:
     """Return the least and the largest value of each block, (rows, columns, C)."""
     starts = [range(0, size, block) for size in x.shape[:2]]
     least = np.minimum.reduceat(x, starts[0], axis=0)

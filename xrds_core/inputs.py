@@ -11,11 +11,12 @@ import torch
 from .errors import PictureError, UsageError
 from .front_end import clean_radiance, fill_holes, pad_guide, transfer
 from .guide_filter import FEW_SAMPLES
+from .layout import to_planes
 
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from .front_end import Picture
+    from .arrays import Array
     from .tiling import Tile
 
 _SCALES = (1, 2, 4, 8, 16)  # to propose in a message
@@ -26,16 +27,16 @@ class Inputs:
     """One picture and its guides, without NaN, infinities or negative radiance."""
 
     scale: int
-    low: Picture
+    low: Array
     """Radiance (h, w, 3), or (h, w, 4) with alpha."""
-    noisy: Picture | None
+    noisy: Array | None
     """Radiance (h, w, 3) before denoising."""
-    albedo: Picture
+    albedo: Array
     """(H, W, 3), as the normal; scale (h - 1) < H <= scale h, and so W."""
-    normal: Picture
-    guide_radiance: Picture | None
+    normal: Array
+    guide_radiance: Array | None
     """(H, W, 3)"""
-    guide_alpha: Picture | None
+    guide_alpha: Array | None
     """(H, W)"""
     bad_pixels: int
     has_noisy_guides: bool
@@ -65,13 +66,13 @@ class Inputs:
         Where they end before the low-resolution picture does, their edge is repeated.
         """
         guides = (self.albedo, self.normal, self.guide_radiance)
-        planes = [_planes(self._cut(x, tile)) for x in guides if x is not None]
+        planes = [to_planes(self._cut(x, tile)) for x in guides if x is not None]
         planes[0] = planes[0].clamp(0.0, 1.0)
         planes[1] = planes[1].clamp(-1.0, 1.0)
         planes[2:] = [transfer(x, exposure) for x in planes[2:]]
         return torch.cat(planes, dim=1)
 
-    def _cut(self, guide: Picture, tile: Tile) -> Picture:
+    def _cut(self, guide: Array, tile: Tile) -> Array:
         spans = (tile.rows, tile.columns)
         rows, columns = (
             span.output(self.scale, limit)
@@ -87,16 +88,11 @@ class Inputs:
         return np.pad(cut, (*missing, (0, 0)), "edge")
 
 
-def _low_tensor(low: Picture, tile: Tile, exposure: float) -> Tensor:
+def _low_tensor(low: Array, tile: Tile, exposure: float) -> Tensor:
     """(h, w, C) -> tensor of a tile, (1, 3, h, w), in the transfer domain."""
     rows, columns = tile.rows, tile.columns
     cut = low[rows.start : rows.stop, columns.start : columns.stop, :3]
-    return transfer(_planes(cut), exposure)
-
-
-def _planes(x: Picture) -> Tensor:
-    """(H, W, C) array -> (1, C, H, W) tensor."""
-    return torch.from_numpy(np.ascontiguousarray(x)).permute(2, 0, 1)[None]
+    return transfer(to_planes(cut), exposure)
 
 
 def check(
@@ -152,7 +148,7 @@ def check(
     )
 
 
-def _noisy(value: Any, low: Picture) -> tuple[Picture, int]:
+def _noisy(value: Any, low: Array) -> tuple[Array, int]:
     """Return the radiance before denoising, cleaned, and its bad pixels."""
     noisy = _array("noisy", value, (3,))
     if noisy.shape[:2] != low.shape[:2]:
@@ -163,7 +159,7 @@ def _noisy(value: Any, low: Picture) -> tuple[Picture, int]:
     return clean_radiance(noisy)
 
 
-def _low_alpha(cover: Picture, low: Picture, scale: int) -> Picture:
+def _low_alpha(cover: Array, low: Array, scale: int) -> Array:
     """Return what the guides' alpha (H, W, 1) is at low resolution, (h, w, 1)."""
     height, width = low.shape[:2]
     whole = pad_guide(cover, low, scale)
@@ -171,7 +167,7 @@ def _low_alpha(cover: Picture, low: Picture, scale: int) -> Picture:
     return np.asarray(blocks.mean(axis=(1, 3)))
 
 
-def _array(name: str, value: Any, channels: tuple[int, ...]) -> Picture:
+def _array(name: str, value: Any, channels: tuple[int, ...]) -> Array:
     array = np.asarray(value)
     if array.ndim != 3 or array.shape[-1] not in channels or not array.size:
         wanted = " or ".join(map(str, channels))
@@ -186,7 +182,7 @@ def _array(name: str, value: Any, channels: tuple[int, ...]) -> Picture:
         return array.astype(np.float32, copy=False)
 
 
-def _check_sizes(scale: int, low: Picture, guides: dict[str, Picture]) -> None:
+def _check_sizes(scale: int, low: Array, guides: dict[str, Array]) -> None:
     albedo = guides["albedo"]
     for name, guide in guides.items():
         if guide.shape[:2] != albedo.shape[:2]:
@@ -204,9 +200,9 @@ def _check_sizes(scale: int, low: Picture, guides: dict[str, Picture]) -> None:
         )
 
 
-def _fits(scale: int, low: Picture, guide: Picture) -> bool:
+def _fits(scale: int, low: Array, guide: Array) -> bool:
     return low.shape[:2] == tuple(-(-size // scale) for size in guide.shape[:2])
 
 
-def _size(x: Picture, scale: int = 1) -> str:
+def _size(x: Array, scale: int = 1) -> str:
     return f"{x.shape[1] * scale}x{x.shape[0] * scale}"

@@ -1,7 +1,7 @@
 """Errors between two pictures, as every table of the project reports them.
 
 All functions take scene-linear float arrays (height, width, 3), the picture first and
-the reference second. ``exposure`` is the scene's view exposure in stops; the display
+the reference second. `exposure` is the scene's view exposure in stops; the display
 transform is the plain sRGB curve, so that no figure depends on a tone mapper.
 """
 
@@ -15,9 +15,7 @@ import numpy as np
 from .errors import PictureError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float32]
+    from .arrays import Array
 
 RELMSE_EPSILON = 0.01  # the published tables of Monte Carlo denoising use this value
 TRIMMED_FRACTION = 0.001  # of pixels: a few fireflies rule the raw RelMSE
@@ -44,7 +42,7 @@ def psnr(picture: Array, reference: Array, exposure: float = 0.0) -> float:
 def relmse(picture: Array, reference: Array, trim: float = 0.0) -> float:
     """Mean of (x - r)^2 / (r^2 + 0.01) over pixels and channels, scene-linear.
 
-    ``trim`` is the fraction of the worst pixels left out (see TRIMMED_FRACTION).
+    `trim` is the fraction of the worst pixels left out (see TRIMMED_FRACTION).
     Raises PictureError when the shapes differ or a value is not finite.
     """
     _check(picture, reference)
@@ -57,7 +55,7 @@ def relmse(picture: Array, reference: Array, trim: float = 0.0) -> float:
 def flip(picture: Array, reference: Array, exposure: float = 0.0) -> float:
     """Mean LDR-FLIP (Andersson et al. 2020) of the display values, 0 is equal.
 
-    Raises PictureError for bad arrays, ImportError without ``flip-evaluator``.
+    Raises PictureError for bad arrays, ImportError without `flip-evaluator`.
     """
     import flip_evaluator
 
@@ -69,15 +67,14 @@ def flip(picture: Array, reference: Array, exposure: float = 0.0) -> float:
 def lpips(picture: Array, reference: Array, exposure: float = 0.0) -> float:
     """LPIPS (Zhang et al. 2018, AlexNet) of the display values, 0 is equal.
 
-    Raises PictureError for bad arrays, ImportError without ``lpips``.
+    Raises PictureError for bad arrays, ImportError without `lpips`.
     """
     import torch
 
+    from .layout import to_planes
+
     _check(picture, reference)
-    shown = [
-        torch.from_numpy(to_srgb(x, exposure) * 2 - 1).permute(2, 0, 1)[None]
-        for x in (picture, reference)
-    ]
+    shown = [to_planes(to_srgb(x, exposure) * 2 - 1) for x in (picture, reference)]
     with torch.inference_mode():
         return float(_lpips_network()(*shown))
 

@@ -31,7 +31,7 @@ class Progress:
         self.begin(1.0)
 
     def begin(self, total: float) -> None:
-        """Begin with work of ``total``, or begin anew; what was told stays told."""
+        """Begin with work of `total`, or begin anew; what was told stays told."""
         self._total = total
         self._done = 0.0
 
@@ -47,7 +47,7 @@ class Progress:
 
 @contextmanager
 def watched(network: XRDS, progress: Progress) -> Iterator[None]:
-    """Let every layer of ``network`` add the number of values it returns."""
+    """Let every layer of `network` add the number of values it returns."""
 
     def add(module: Any, inputs: Any, output: Tensor) -> None:
         progress.add(output.numel())

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from .arrays import Array
 
 # Of an overlap, this part at each end counts nothing: what is near a tile's edge has
 # not seen its surroundings. The blend happens in the rest.
@@ -34,15 +34,15 @@ class Span:
         return self.stop - self.start
 
     def moved(self, offset: int) -> Span:
-        """Return the span ``offset`` pixels further on."""
+        """Return the span `offset` pixels further on."""
         return replace(self, start=self.start + offset, stop=self.stop + offset)
 
     def output(self, scale: int, limit: int) -> slice:
-        """Return the full-resolution pixels it covers of a picture of ``limit``."""
+        """Return the full-resolution pixels it covers of a picture of `limit`."""
         return slice(self.start * scale, min(self.stop * scale, limit))
 
-    def weights(self, scale: int) -> NDArray[np.float32]:
-        """Return the blend weights of its ``size * scale`` full-resolution pixels.
+    def weights(self, scale: int) -> Array:
+        """Return the blend weights of its `size * scale` full-resolution pixels.
 
         Over all spans of an axis they add up to 1.
         """
@@ -56,7 +56,7 @@ class Span:
         return weights
 
 
-def _rise(length: int) -> NDArray[np.float32]:
+def _rise(length: int) -> Array:
     """Return a smooth step from 0 to 1."""
     x = (np.arange(length) + 0.5) / length
     x = np.clip((x - _BLIND) / (1.0 - 2.0 * _BLIND), 0.0, 1.0)
@@ -74,7 +74,7 @@ class Tile:
         """Return the tile that lies so many pixels further down and right."""
         return Tile(self.rows.moved(rows), self.columns.moved(columns))
 
-    def weights(self, scale: int) -> NDArray[np.float32]:
+    def weights(self, scale: int) -> Array:
         """Return blend weights (scale height, scale width)."""
         rows, columns = self.rows.weights(scale), self.columns.weights(scale)
         return rows[:, None] * columns
@@ -83,10 +83,10 @@ class Tile:
 def tiles(
     low_height: int, low_width: int, tile: tuple[int, int], overlap: int, multiple: int
 ) -> list[Tile]:
-    """Cover a picture with tiles of at most ``tile`` (height, width).
+    """Cover a picture with tiles of at most `tile` (height, width).
 
-    Every origin is a multiple of ``multiple``, so that attention windows lie in a
-    tile as they do in the whole picture; neighbours share at least ``overlap``.
+    Every origin is a multiple of `multiple`, so that attention windows lie in a
+    tile as they do in the whole picture; neighbours share at least `overlap`.
     """
     rows = _spans(low_height, tile[0], overlap, multiple)
     columns = _spans(low_width, tile[1], overlap, multiple)
@@ -115,7 +115,7 @@ def _spans(length: int, tile: int, overlap: int, multiple: int) -> list[Span]:
 def fit(
     low_height: int, low_width: int, pixels: float, overlap: int, multiple: int
 ) -> tuple[int, int]:
-    """Return the tile (height, width) for at most ``pixels`` low-resolution pixels.
+    """Return the tile (height, width) for at most `pixels` low-resolution pixels.
 
     The picture itself if it is small enough; never smaller than two overlaps, below
     which tiles cannot be blended.

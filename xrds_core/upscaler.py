@@ -20,6 +20,7 @@ from .front_end import EXPOSURE_RANGE, auto_exposure, inverse_transfer
 from .guide_filter import filter_guides
 from .idle import busy_area, write_base
 from .inputs import Inputs, check
+from .layout import to_picture
 from .network import XRDS
 from .progress import Callback, Progress, watched
 from .weights import load, load_guide_filter, load_preset
@@ -27,7 +28,7 @@ from .weights import load, load_guide_filter, load_preset
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from .front_end import Picture
+    from .arrays import Array
     from .idle import Area
 
 DEFAULT_MEMORY = 4 << 30
@@ -47,7 +48,7 @@ _TILE_BYTES = 100.0  # per output pixel beside the network: guides, result, weig
 class Upscaled:
     """The result of an upscale."""
 
-    radiance: Picture
+    radiance: Array
     """(H, W, 3), or (H, W, 4) premultiplied with alpha, scene-linear."""
     exposure: float
     """That was used: give it to the other frames or borders of the same picture."""
@@ -60,11 +61,11 @@ class Upscaler:
     """A network on a device, ready for any number of pictures.
 
     Args:
-        preset: ``paper``, ``balanced`` or ``fast``.
+        preset: `paper`, `balanced` or `fast`.
         scale: output pixels per low-resolution pixel along one axis.
-        guides: ``fast`` (albedo and normal) or ``full`` (and noisy radiance).
-        device: ``auto``, or what torch knows: ``cpu``, ``cuda``, ``cuda:1``, ``mps``.
-        precision: ``auto``, ``fp32`` or ``bf16``; only the layers of the network
+        guides: `fast` (albedo and normal) or `full` (and noisy radiance).
+        device: `auto`, or what torch knows: `cpu`, `cuda`, `cuda:1`, `mps`.
+        precision: `auto`, `fp32` or `bf16`; only the layers of the network
             ever run in bf16.
         weights: a folder of presets, a file, or a network, in place of the shipped;
             a filter of guides in the folder, too, takes the place of the shipped.
@@ -104,13 +105,13 @@ class Upscaler:
 
     def __call__(
         self,
-        radiance: Picture,
-        albedo: Picture,
-        normal: Picture,
+        radiance: Array,
+        albedo: Array,
+        normal: Array,
         *,
-        noisy: Picture | None = None,
-        guide_radiance: Picture | None = None,
-        guide_alpha: Picture | None = None,
+        noisy: Array | None = None,
+        guide_radiance: Array | None = None,
+        guide_alpha: Array | None = None,
         guide_samples: int | None = None,
         exposure: float | None = None,
         memory_limit: int | None = None,
@@ -126,12 +127,12 @@ class Upscaler:
             normal: (H, W, 3), in camera space.
             noisy: (h, w, 3), the radiance before it was denoised: tells how much of
                 the guides' texture is in the light. None where it never was, or lost.
-            guide_radiance: (H, W, 3), for ``full`` guides and only for them.
+            guide_radiance: (H, W, 3), for `full` guides and only for them.
             guide_alpha: (H, W), the alpha of the guides' render; in place of the
-                picture's own, too, where ``radiance`` has none.
+                picture's own, too, where `radiance` has none.
             guide_samples: per pixel of albedo and normal; the noise of a few of them
                 is filtered out first. None where they are many, or not known.
-            exposure: of a picture this is a part of; None finds it in ``radiance``.
+            exposure: of a picture this is a part of; None finds it in `radiance`.
             memory_limit: bytes to aim at, beside the arrays given and returned. The
                 smallest tiles are taken where it is too small even for them.
             tile: side of the tiles in low-resolution pixels, in place of a limit.
@@ -140,7 +141,7 @@ class Upscaler:
         Raises:
             PictureError: the arrays do not fit each other or this network.
             OutOfMemory: the device has no room even for the smallest tiles.
-            Cancelled: ``progress`` returned False.
+            Cancelled: `progress` returned False.
         """
         inputs = check(
             self.scale,
@@ -226,7 +227,7 @@ class Upscaler:
         exposure: float,
         plan: list[tiling.Tile],
         progress: Progress,
-    ) -> Picture:
+    ) -> Array:
         picture = np.zeros((*inputs.shape, inputs.low.shape[2]), np.float32)
         self._fill_idle(picture, inputs, area)
         progress.begin(self._work(plan))
@@ -240,8 +241,8 @@ class Upscaler:
         progress.tell(1.0)
         return picture
 
-    def _fill_idle(self, picture: Picture, inputs: Inputs, area: Area | None) -> None:
-        """Write the base outside of ``area``, which stays 0."""
+    def _fill_idle(self, picture: Array, inputs: Inputs, area: Area | None) -> None:
+        """Write the base outside of `area`, which stays 0."""
         if area is not None and _size(area) == inputs.low.shape[:2]:
             return
         write_base(picture[..., :3], inputs)
@@ -261,7 +262,7 @@ class Upscaler:
         return cells * (window * self.scale) ** 2 * self.cost.values
 
     def _add(
-        self, picture: Picture, inputs: Inputs, tile: tiling.Tile, exposure: float
+        self, picture: Array, inputs: Inputs, tile: tiling.Tile, exposure: float
     ) -> None:
         """Add what one tile has to say to the pixels it covers."""
         result = self._run(inputs, tile, exposure)
@@ -272,7 +273,7 @@ class Upscaler:
         share = tile.weights(self.scale)[:height, :width, None]
         target += result[:height, :width] * share
 
-    def _run(self, inputs: Inputs, tile: tiling.Tile, exposure: float) -> Picture:
+    def _run(self, inputs: Inputs, tile: tiling.Tile, exposure: float) -> Array:
         """Return the radiance of one tile, (scale height, scale width, 3)."""
         bf16 = self.precision == torch.bfloat16
         try:
@@ -294,8 +295,7 @@ class Upscaler:
                 f"{self.device} has too little memory for a tile of {size} pixels: end "
                 "other programs, or take a smaller preset or another device"
             ) from error
-        array: Picture = result[0].permute(1, 2, 0).cpu().numpy()
-        return array
+        return to_picture(result)
 
     def _guides(self, inputs: Inputs, tile: tiling.Tile, exposure: float) -> Tensor:
         """Return the guides of a tile, without the noise of few samples."""
@@ -342,25 +342,25 @@ def _exposure(exposure: float | None, inputs: Inputs) -> float:
 
 
 def upscale(
-    radiance: Picture,
-    albedo: Picture,
-    normal: Picture,
+    radiance: Array,
+    albedo: Array,
+    normal: Array,
     *,
     scale: int = 2,
     preset: str = "fast",
-    noisy: Picture | None = None,
-    guide_radiance: Picture | None = None,
-    alpha: Picture | None = None,
+    noisy: Array | None = None,
+    guide_radiance: Array | None = None,
+    alpha: Array | None = None,
     guide_samples: int | None = None,
     exposure: float | None = None,
     device: str = "auto",
     memory_limit: int | None = None,
     progress: Callback | None = None,
-) -> Picture:
+) -> Array:
     """Enlarge one picture with the shipped weights; see `Upscaler` for the arrays.
 
-    ``alpha`` (H, W) is that of the guides' render; the picture's own is the fourth
-    channel of ``radiance``. With ``guide_radiance`` the guides are ``full``. Returns
+    `alpha` (H, W) is that of the guides' render; the picture's own is the fourth
+    channel of `radiance`. With `guide_radiance` the guides are `full`. Returns
     (H, W, 3), with either alpha (H, W, 4). The last network used stays loaded.
 
     Raises WeightsError, UsageError, PictureError and Cancelled, as `Upscaler`.

@@ -1,7 +1,7 @@
 """Weights files: safetensors, so that reading one never runs code.
 
 A file holds the tensors of one `XRDS` in half precision and, in its metadata, the
-network's configuration as JSON under ``config`` beside whatever else was recorded
+network's configuration as JSON under `config` beside whatever else was recorded
 (preset, blender_series, training set, licence), all strings. The filter of guides of
 few samples has a file of its own, for it serves every network.
 """
@@ -37,7 +37,7 @@ def file_name(preset: str, scale: int, guides: str = "fast") -> str:
 
 
 def save(network: XRDS, path: str | Path, metadata: dict[str, str]) -> None:
-    """Write ``network`` and ``metadata`` to ``path``, all at once or not at all.
+    """Write `network` and `metadata` to `path`, all at once or not at all.
 
     Raises WeightsError if a weight does not fit half precision.
     """
@@ -47,7 +47,7 @@ def save(network: XRDS, path: str | Path, metadata: dict[str, str]) -> None:
 def save_guide_filter(
     guide_filter: GuideFilter, path: str | Path, metadata: dict[str, str]
 ) -> None:
-    """Write a filter and ``metadata``, as `save` does a network."""
+    """Write a filter and `metadata`, as `save` does a network."""
     _write(guide_filter, path, metadata)
 
 
@@ -78,19 +78,19 @@ def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:
 
 
 def guide_filter_record(directory: str | Path | None = None) -> dict[str, str]:
-    """Return {file, sha256} of the filter that ``directory``'s networks go with."""
+    """Return {file, sha256} of the filter that `directory`'s networks go with."""
     path = _guide_filter_file(directory)
     return {"file": path.name, "sha256": _digest(path)}
 
 
 def _guide_filter_file(directory: str | Path | None) -> Path:
-    """Return the file of ``directory``'s filter, or of the shipped one without."""
+    """Return the file of `directory`'s filter, or of the shipped one without."""
     own = None if directory is None else Path(directory) / FILE_NAME
     return own if own is not None and own.is_file() else GUIDE_FILTER
 
 
 def load_guide_filter(directory: str | Path | None = None) -> GuideFilter:
-    """Return the filter of ``directory``, or the shipped one if there is none in it.
+    """Return the filter of `directory`, or the shipped one if there is none in it.
 
     Raises WeightsError if the file is missing or damaged.
     """
@@ -120,7 +120,7 @@ def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
 def _described(
     path: Path, metadata: dict[str, str], tensors: int
 ) -> tuple[NetworkConfig, dict[str, torch.Size]]:
-    """Return the configuration in ``metadata`` and the shapes that follow from it."""
+    """Return the configuration in `metadata` and the shapes that follow from it."""
     if "config" not in metadata:
         raise WeightsError(f"{path} holds no XRDS network: its metadata has no config")
     try:
@@ -162,7 +162,7 @@ def _compare(
 def load_preset(
     preset: str, scale: int, guides: str = "fast", directory: str | Path | None = None
 ) -> tuple[XRDS, dict[str, str]]:
-    """Return (network, metadata) of a shipped preset, or of one in ``directory``.
+    """Return (network, metadata) of a shipped preset, or of one in `directory`.
 
     Raises WeightsError, naming what there is, if there is no such file.
     """

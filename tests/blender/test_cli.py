@@ -134,7 +134,7 @@ def test_errors_are_one_line(
 
 
 def started(code: str) -> subprocess.Popen[str]:
-    """Python running ``code``, to be heard while it runs."""
+    """Python running `code`, to be heard while it runs."""
     return subprocess.Popen(
         [sys.executable, "-c", textwrap.dedent(code)],
         stdout=subprocess.PIPE,

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
-from numpy.typing import NDArray
 
 from xrds_core import exr_library
+from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
 from xrds_core.exr import Names, read_beauty, read_channels, read_guides, write_picture
 
-Array = NDArray[np.float32]
 LAYOUTS = ("flat", "layered", "parts", "named parts")
 
 

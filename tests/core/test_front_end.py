@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 
 from xrds_core import front_end
+from xrds_core.arrays import Array
 from xrds_core.front_end import (
     area_mean,
     auto_exposure,
@@ -22,7 +22,6 @@ from xrds_core.front_end import (
     upsample_bilinear,
 )
 
-Array = NDArray[np.float32]
 Clean = Callable[[Array], tuple[Array, int]]
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 
+from xrds_core.arrays import Array
 from xrds_core.front_end import demodulated_base
 from xrds_core.idle import write_base
 from xrds_core.inputs import check
 from xrds_core.network import XRDS, preset_config
 from xrds_core.upscaler import Upscaler
 
-Array = NDArray[np.float32]
 SIDE, SCALE = 320, 2
 THING = slice(128, 160)  # low-resolution rows and columns that are not background
 

@@ -10,8 +10,8 @@ import torch
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
-from numpy.typing import NDArray
 
+from xrds_core.arrays import Array
 from xrds_core.front_end import (
     TRANSFER_GAIN,
     area_mean,
@@ -25,8 +25,6 @@ from xrds_core.front_end import (
     upsample_alpha,
 )
 from xrds_core.tiling import fit, tiles
-
-Array = NDArray[np.float32]
 
 settings.register_profile("laws", max_examples=30, deadline=None, derandomize=True)
 settings.load_profile("laws")

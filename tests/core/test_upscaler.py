@@ -7,16 +7,14 @@ import sys
 import numpy as np
 import pytest
 import torch
-from numpy.typing import NDArray
 from torch.nn import functional
 
 from xrds_core import upscaler, weights
+from xrds_core.arrays import Array
 from xrds_core.errors import Cancelled, PictureError, UsageError, WeightsError
 from xrds_core.front_end import transfer
 from xrds_core.network import XRDS, preset_config
 from xrds_core.upscaler import Upscaler, upscale
-
-Array = NDArray[np.float32]
 
 
 def network(scale: int = 2, guides: str = "fast", preset: str = "fast") -> XRDS:
@@ -60,7 +58,7 @@ def picture(height: int, width: int, scale: int = 2) -> tuple[Array, Array, Arra
 
 
 def range_error(found: Array, expected: Array, exposure: float) -> float:
-    """Largest difference in the transfer domain, of the range of ``expected``."""
+    """Largest difference in the transfer domain, of the range of `expected`."""
     t, reference = transfer(found, exposure), transfer(expected, exposure)
     return float(np.abs(t - reference).max() / np.ptp(reference))
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
 
 from .whole_file import png_size
+
+if TYPE_CHECKING:
+    from xrds_core.arrays import Array
 
 SUFFIXES = (".exr", ".png")
 
@@ -59,7 +62,7 @@ def check_output(pattern: str, frames: int) -> None:
         ) from error
 
 
-def save(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> None:
+def save(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
     """Write one frame, all at once or not at all; raises PictureError if it cannot.
 
     Args:
@@ -80,7 +83,7 @@ def save(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> Non
     exr.write_picture(path, channels)
 
 
-def _write_png(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> None:
+def _write_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
     if not path.parent.is_dir():  # Blender would make it anew, wherever that is by now
         raise PictureError(f"cannot write {path}: its folder is gone")
     try:
@@ -92,7 +95,7 @@ def _write_png(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) 
         raise PictureError(f"cannot write {path}: {error.strerror}") from error
 
 
-def _save_png(path: Path, radiance: np.ndarray, alpha: np.ndarray, scene: Any) -> None:
+def _save_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
     """Let Blender apply the scene's view transform and write the file."""
     import bpy
 

@@ -40,7 +40,7 @@ def working_space() -> str:
     return REC709 if told is None else told.working_space
 
 
-def to_rec709(space: str) -> NDArray[np.float32] | None:
+def to_rec709(space: str) -> Array | None:
     """The 3x3 matrix from a working space, or None where there is nothing to do.
 
     An unknown space is taken as it is.
@@ -51,7 +51,7 @@ def to_rec709(space: str) -> NDArray[np.float32] | None:
     return matrix.astype(np.float32)
 
 
-def converted(picture: Array, matrix: NDArray[np.float32]) -> Array:
+def converted(picture: Array, matrix: Array) -> Array:
     """The first three channels times a matrix; further ones, as alpha, as they are."""
     colour = picture[..., :3] @ matrix.T
     return np.concatenate([colour, picture[..., 3:]], -1)
