@@ -18,15 +18,17 @@ def choose_device(name: str = "auto") -> torch.device:
     """
     if name == "auto":
         kinds = (("cuda", torch.cuda), ("mps", torch.backends.mps))
-        found = [kind for kind, backend in kinds if backend.is_available()]
-        return torch.device(found[0] if found else "cpu")
+        present = [kind for kind, backend in kinds if backend.is_available()]
+        return torch.device(present[0] if present else "cpu")
     try:
         device = torch.device(name)
         torch.zeros(1, device=device)
     except (RuntimeError, AssertionError, NotImplementedError) as error:
         # torch's own text runs over many lines
         reason = str(error).partition("\n")[0]
-        raise UsageError(f"device {name!r} is not here ({reason}); use auto") from error
+        raise UsageError(
+            f"device {name!r} is not available ({reason}); use auto"
+        ) from error
     return device
 
 
@@ -40,7 +42,7 @@ def choose_precision(name: str, device: torch.device) -> torch.dtype:
         fast = device.type == "cuda" and torch.cuda.is_bf16_supported(False)
         return PRECISIONS["bf16" if fast else "fp32"]
     if name not in PRECISIONS:
-        raise UsageError(f"precision {name!r} is not among auto, fp32, bf16")
+        raise UsageError(f"precision {name!r} is unknown; use auto, fp32 or bf16")
     return PRECISIONS[name]
 
 
@@ -57,11 +59,11 @@ _OUT_OF_MEMORY = (
 
 
 def is_out_of_memory(error: BaseException) -> bool:
-    """Tell whether smaller tiles may help."""
+    """Whether smaller tiles may help."""
     if isinstance(error, (MemoryError, torch.OutOfMemoryError)):
         return True
-    told = str(error).lower()
-    return isinstance(error, RuntimeError) and any(x in told for x in _OUT_OF_MEMORY)
+    message = str(error).lower()
+    return isinstance(error, RuntimeError) and any(x in message for x in _OUT_OF_MEMORY)
 
 
 def free_memory(device: torch.device) -> float:
@@ -71,13 +73,13 @@ def free_memory(device: torch.device) -> float:
     """
     if device.type == "cuda":
         return torch.cuda.mem_get_info(device)[0]
-    found = [float("inf")]
+    limits = [float("inf")]
     try:
         lines = [x.split() for x in Path("/proc/meminfo").read_text().splitlines()]
-        found += [1024.0 * int(x[1]) for x in lines if x[0] == "MemAvailable:"]
+        limits += [1024.0 * int(x[1]) for x in lines if x[0] == "MemAvailable:"]
         group = Path("/sys/fs/cgroup")  # of a container
         most = float((group / "memory.max").read_text())  # ValueError for "max"
-        found.append(most - float((group / "memory.current").read_text()))
+        limits.append(most - float((group / "memory.current").read_text()))
     except (OSError, ValueError):
         pass
-    return max(0.0, min(found))
+    return max(0.0, min(limits))

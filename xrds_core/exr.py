@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from .exr_library import Part
 
 _COMPONENTS = ("RGB", "XYZ", "rgb", "xyz")
-_COMPOSITED = "Composite."  # Blender's layer of what its compositor made
+_COMPOSITED = "Composite."  # Blender's layer for the output of its compositor
 
 
 @dataclass(frozen=True)
@@ -65,15 +65,6 @@ class Guides:
     normal: Array
     radiance: Array | None
     alpha: Array | None
-
-
-def read_channels(path: str | Path) -> dict[str, Array]:
-    """Read every channel of all parts: full name, as `ViewLayer.Depth.Z`, to (H, W).
-
-    Raises PictureError if the file cannot be read.
-    """
-    file = _File(path)
-    return {name: file.plane(name) for name in file.channels}
 
 
 def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
@@ -150,20 +141,20 @@ class _File:
     def _prefix(self, wanted: str) -> str | None:
         """Return the full name of the one pass that is called so, or None."""
         prefixes = {name.rpartition(".")[0] for name in self.channels}
-        found = [
+        matches = [
             prefix
             for prefix in sorted(prefixes)
             if f".{prefix}".endswith(f".{wanted}") and self._components(prefix)
         ]
-        if wanted in found:
+        if wanted in matches:
             return wanted
-        found = [x for x in found if not x.startswith(_COMPOSITED)] or found
-        if len(found) > 1:
+        matches = [x for x in matches if not x.startswith(_COMPOSITED)] or matches
+        if len(matches) > 1:
             raise PictureError(
-                f"{self.path} holds {wanted!r} in several layers: {', '.join(found)}; "
-                "name it with its layer"
+                f"{self.path} holds {wanted!r} in several layers: "
+                f"{', '.join(matches)}; give one of these names"
             )
-        return found[0] if found else None
+        return matches[0] if matches else None
 
     def _components(self, prefix: str) -> list[str]:
         dotted = f"{prefix}." if prefix else ""
@@ -184,7 +175,7 @@ class _File:
         if pixels.dtype.kind not in "fu" or pixels.shape != size:
             raise PictureError(
                 f"channel {name!r} of {self.path} is deep or subsampled; "
-                "write flat, full channels"
+                "save it with flat channels of full resolution"
             )
         return _placed(pixels, part)
 

@@ -65,7 +65,7 @@ def write(path: str | Path, planes: Mapping[str, Pixels]) -> None:
         return
     with TemporaryDirectory() as folder:
         archive = Path(folder) / "parts.npz"
-        window = ((0, 0), (0, 0))  # that of the planes, which say it themselves
+        window = ((0, 0), (0, 0))  # not read: the planes have their own size
         _pack(archive, [Part("", window, window, dict(planes))])
         _apart("write", path, archive)
 
@@ -84,13 +84,15 @@ def _read(path: str | Path) -> list[Part]:
         for part in headers:
             _check_windows(path, part.header)
         # OpenEXR leaves out a part that it cannot read and says why on stdout
-        with redirect_stdout(StringIO()) as told:
+        with redirect_stdout(StringIO()) as output:
             parts = OpenEXR.File(str(path), separate_channels=True).parts
     except (RuntimeError, ValueError, TypeError, MemoryError) as error:
-        raise PictureError(f"{path} is not a whole OpenEXR file ({error})") from error
+        raise PictureError(
+            f"{path} is not a complete OpenEXR file ({error})"
+        ) from error
     if not parts or len(parts) != len(headers):
-        reason = told.getvalue().strip().rpartition(" - ")[2]
-        raise PictureError(f"{path} is not a whole OpenEXR file ({reason})")
+        reason = output.getvalue().strip().rpartition(" - ")[2]
+        raise PictureError(f"{path} is not a complete OpenEXR file ({reason})")
     return [
         Part(
             part.header.get("name", ""),
@@ -123,16 +125,16 @@ def _check_windows(path: str | Path, header: Any) -> None:
         sides = [b - a + 1 for a, b in zip(least, most, strict=True)]
         if not all(0 < side <= _LARGEST_SIDE for side in sides):
             raise PictureError(
-                f"{path} claims a {name} of {sides[0]}x{sides[1]} pixels: damaged"
+                f"{path} is damaged: its {name} is {sides[0]}x{sides[1]} pixels"
             )
 
 
 def _apart(task: str, path: str | Path, archive: Path) -> None:
     """Do a task in a process without the program's library."""
-    told = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
     command = [sys.executable, "-m", __name__, task, os.fspath(path), str(archive)]
     done = subprocess.run(
-        command, env=told, capture_output=True, text=True, check=False
+        command, env=environment, capture_output=True, text=True, check=False
     )
     if done.returncode:
         lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]

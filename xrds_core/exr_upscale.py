@@ -37,7 +37,7 @@ def upscale_file(
 
     Args:
         beauty: the low-resolution render, denoised, with alpha or without; the noisy
-            picture, where the file has one too, tells what the denoiser took away.
+            picture, where the file has one too, shows what the denoiser took away.
         guide_file: albedo and normal; for `full` guides also a noisy picture.
         output: gets R, G, B, scene-linear, and A where `beauty` has alpha.
         weights: a folder of presets, or a file, in place of the shipped ones.
@@ -80,7 +80,9 @@ def upscale_file(
 
 
 def _check_output(path: Path) -> None:
-    """Tell now, not after the work, that a file cannot be written."""
+    """Refuse a file that cannot be written now, not after the work."""
     folder = path.parent
     if not folder.is_dir() or not os.access(folder, os.W_OK) or path.is_dir():
-        raise PictureError(f"cannot write {path}: give a file in a folder that exists")
+        raise PictureError(
+            f"cannot write {path}: name a file in an existing, writable folder"
+        )

@@ -206,8 +206,8 @@ def regressed_base(
     gain = _gain(auto_exposure(radiance))
     guides = torch.cat((to_planes(albedo), to_planes(normal)), dim=1)
     low, before = to_planes(radiance * gain), to_planes(noisy * gain)
-    found = explain(low, before, guides, scale)
-    return to_picture(_modulated(found.low, found.factor, scale)) / gain
+    explained = explain(low, before, guides, scale)
+    return to_picture(_modulated(explained.low, explained.factor, scale)) / gain
 
 
 def _modulated(low: Tensor, modulator: Tensor, scale: int) -> Tensor:

@@ -122,6 +122,8 @@ def _extremes(x: Array, block: int) -> tuple[Array, Array]:
 
 def _span(busy: NDArray[np.bool_], block: int, margin: int) -> tuple[int, int]:
     """Return first and last pixel of the busy blocks with whole blocks around them."""
-    found = np.flatnonzero(busy)
+    indices = np.flatnonzero(busy)
     around = -(-margin // block)
-    return max(0, int(found[0]) - around) * block, int(found[-1] + 1 + around) * block
+    return max(0, int(indices[0]) - around) * block, int(
+        indices[-1] + 1 + around
+    ) * block

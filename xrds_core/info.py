@@ -134,11 +134,11 @@ def _preset_cost(preset: str, scale: int) -> dict[str, int]:
 
 def devices() -> list[str]:
     """The names that `--device` accepts here, the processor first."""
-    found = ["cpu"]
-    found += [f"cuda:{i}" for i in range(torch.cuda.device_count())]
+    names = ["cpu"]
+    names += [f"cuda:{i}" for i in range(torch.cuda.device_count())]
     if torch.backends.mps.is_available():
-        found.append("mps")
-    return found
+        names.append("mps")
+    return names
 
 
 def package_version() -> str:
@@ -173,33 +173,33 @@ def info(
     }
 
 
-def lines(told: dict[str, Any]) -> Iterator[str]:
-    """`info`'s answer for people to read."""
+def lines(result: dict[str, Any]) -> Iterator[str]:
+    """The result of `info` for people to read."""
     yield (
-        f"XRDS {told['version']}, torch {told['torch']}, "
-        f"Blender {told['blender'] or 'not found'}"
+        f"XRDS {result['version']}, torch {result['torch']}, "
+        f"Blender {result['blender'] or 'not found'}"
     )
-    yield f"devices: {', '.join(told['devices'])}"
+    yield f"devices: {', '.join(result['devices'])}"
     yield "the paper's network, x4, 1024 x 1024 output:"
     yield "  RDST  XDG  parameters    MACs  with attention   FLOPs"
-    for row in told["paper_table"]:
+    for row in result["paper_table"]:
         yield (
             f"  {row['rdst']:4}  {row['xdg']:3}  {row['parameters'] / 1e6:8.2f} M"
             f"  {row['macs'] / 1e9:6.2f} G  {row['macs_with_attention'] / 1e9:10.2f} G"
             f"  {row['flops'] / 1e12:4.2f} T"
         )
     yield "presets: parameters, MACs per output pixel"
-    for preset, scales in told["presets"].items():
+    for preset, scales in result["presets"].items():
         for scale, cost in scales.items():
             yield (
                 f"  {preset:9} x{scale}  {cost['parameters'] / 1e6:7.3f} M"
                 f"  {cost['macs_per_output_pixel']:8}"
             )
-    yield "weights:" if told["weights"] else "weights: none"
-    for record in told["weights"]:
+    yield "weights:" if result["weights"] else "weights: none"
+    for record in result["weights"]:
         yield (
             f"  {record['file']}  Blender {record['blender_series']}"
             f"  sha256 {record['sha256'][:16]}"
         )
-    record = told["guide_filter"]
+    record = result["guide_filter"]
     yield f"guide filter: {record['file']}  sha256 {record['sha256'][:16]}"

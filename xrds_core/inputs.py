@@ -48,7 +48,7 @@ class Inputs:
         return self.albedo.shape[0], self.albedo.shape[1]
 
     def is_black(self) -> bool:
-        """Tell whether there is no light at all in the picture."""
+        """Whether there is no light at all in the picture."""
         seen = (self.low[..., :3], self.guide_radiance)
         return not any(x is not None and x.any() for x in seen)
 
@@ -154,7 +154,7 @@ def _noisy(value: Any, low: Array) -> tuple[Array, int]:
     if noisy.shape[:2] != low.shape[:2]:
         raise PictureError(
             f"noisy is {_size(noisy)} pixels, but radiance is {_size(low)}: "
-            "give both of one render"
+            "give both from the same render"
         )
     return clean_radiance(noisy)
 
@@ -188,14 +188,14 @@ def _check_sizes(scale: int, low: Array, guides: dict[str, Array]) -> None:
         if guide.shape[:2] != albedo.shape[:2]:
             raise PictureError(
                 f"{name} is {_size(guide)} pixels, but albedo is {_size(albedo)}: "
-                "give guides of one render"
+                "give guides from the same render"
             )
     if not _fits(scale, low, albedo):
         other = [s for s in _SCALES if _fits(s, low, albedo)]
         raise PictureError(
-            f"the guides are {_size(albedo)} pixels, but a beauty of {_size(low)} at "
-            f"scale {scale} needs guides of {_size(low, scale)}, or less by fewer "
-            f"than {scale} pixels: render them at that size"
+            f"the guides are {_size(albedo)} pixels, but radiance of {_size(low)} at "
+            f"scale {scale} needs guides of {_size(low, scale)}, or fewer than {scale} "
+            "pixels less: render them at that size"
             + (f", or use scale {other[0]}" if other else "")
         )
 

@@ -186,15 +186,15 @@ class KernelTail(nn.Module):
         rims = [with_rim(source.low) for source in sources]
         pictures, trusts = [], []
         for row in areas(cells.shape[-2], cells.shape[-1], self.area_side):
-            found = []
+            parts = []
             for area in row:
                 predicted, sharp = self.look(area, cells, guides, sources)
                 kernels = self.kernels(area, predicted, guides, means)
                 picture = self.combine(area, kernels, sharp, rims, sources)
                 gain = torch.exp(math.log(GAIN_LIMIT) * torch.tanh(predicted[:, -2:-1]))
-                found.append((self.unfold(picture * gain), predicted[:, -1:].mean(2)))
-            pictures.append(torch.cat([picture for picture, _ in found], dim=3))
-            trusts.append(torch.cat([trust for _, trust in found], dim=3))
+                parts.append((self.unfold(picture * gain), predicted[:, -1:].mean(2)))
+            pictures.append(torch.cat([picture for picture, _ in parts], dim=3))
+            trusts.append(torch.cat([trust for _, trust in parts], dim=3))
         picture, trust = torch.cat(pictures, dim=2), torch.cat(trusts, dim=2)
         return torch.log1p(self.match(picture, trust, sources[0].low))
 

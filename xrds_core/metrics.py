@@ -108,6 +108,6 @@ def _check(picture: Array, reference: Array) -> None:
         bad = pixels.size - int(np.isfinite(pixels).sum())
         if bad:
             raise PictureError(
-                f"{bad} values of the {name} are NaN or infinite: clean it before "
-                "it is compared"
+                f"{bad} values of the {name} are NaN or infinite; "
+                "clean it before comparing"
             )

@@ -81,11 +81,15 @@ class NetworkConfig:
                 f"and of guide_stride {self.guide_stride}"
             )
         if self.guides not in GUIDE_CHANNELS:
-            raise ValueError(f"guides is {self.guides!r}, not in {[*GUIDE_CHANNELS]}")
+            raise ValueError(
+                f"guides is {self.guides!r}, not one of {[*GUIDE_CHANNELS]}"
+            )
         if self.block not in BLOCKS:
-            raise ValueError(f"block is {self.block!r}, not in {[*BLOCKS]}")
+            raise ValueError(f"block is {self.block!r}, not one of {[*BLOCKS]}")
         if self.channels % self.heads:
-            raise ValueError(f"{self.channels} channels, {self.heads} heads")
+            raise ValueError(
+                f"channels {self.channels} must be a multiple of heads {self.heads}"
+            )
 
     @property
     def guide_count(self) -> int:
@@ -135,7 +139,9 @@ def preset_config(preset: str, scale: int, guides: str = "fast") -> NetworkConfi
     if preset == "paper":
         return paper
     if preset not in SMALL_PRESETS:
-        raise ValueError(f"preset is {preset!r}; there are {', '.join(PRESETS)}")
+        raise ValueError(
+            f"preset is {preset!r}; it must be one of {', '.join(PRESETS)}"
+        )
     sizes = SMALL_PRESETS[preset]
     width, cell = sizes["channels"], max(scale, 4)
     grid = {"guide_channels": width, "cell": cell, "guide_stride": cell, "base": True}

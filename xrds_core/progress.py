@@ -1,4 +1,4 @@
-"""How far a computation has come, told to a callback that may cancel it."""
+"""How far a computation has come, for a callback that may cancel it."""
 
 from __future__ import annotations
 
@@ -19,29 +19,29 @@ if TYPE_CHECKING:
 Callback = Callable[[float], object]
 """Takes a fraction in [0, 1] that never falls; False as its result cancels."""
 
-_NEARLY = 0.999  # 1 is told once, when all is done
+_NEARLY = 0.999  # 1 is reported once, when all is done
 
 
 class Progress:
-    """Counts work and tells the fraction done; raises Cancelled."""
+    """Counts work and reports the fraction done; raises Cancelled."""
 
     def __init__(self, callback: Callback | None) -> None:
         self._callback = callback
-        self._told = 0.0
+        self._reported = 0.0
         self.begin(1.0)
 
     def begin(self, total: float) -> None:
-        """Begin with work of `total`, or begin anew; what was told stays told."""
+        """Begin with work of `total`, or begin anew; what was reported stays."""
         self._total = total
         self._done = 0.0
 
     def add(self, work: float) -> None:
         self._done += work
-        self.tell(min(self._done / self._total, _NEARLY))
+        self.report(min(self._done / self._total, _NEARLY))
 
-    def tell(self, fraction: float) -> None:
-        self._told = max(self._told, fraction)
-        if self._callback is not None and self._callback(self._told) is False:
+    def report(self, fraction: float) -> None:
+        self._reported = max(self._reported, fraction)
+        if self._callback is not None and self._callback(self._reported) is False:
             raise Cancelled
 
 

@@ -51,7 +51,7 @@ class Upscaled:
     radiance: Array
     """(H, W, 3), or (H, W, 4) premultiplied with alpha, scene-linear."""
     exposure: float
-    """That was used: give it to the other frames or borders of the same picture."""
+    """The factor used: pass it for other frames or borders of the same picture."""
     bad_pixels: int
     """Pixels of the inputs that held NaN, infinities or negative light."""
     tiles: int
@@ -157,10 +157,10 @@ class Upscaler:
         exposure = _exposure(exposure, inputs)
         area = self._area(inputs, skip_idle)
         plan = self._tiles(inputs, area, memory_limit, tile)
-        told = Progress(progress)
+        steps = Progress(progress)
         while True:
             try:
-                picture = self._picture(inputs, area, exposure, plan, told)
+                picture = self._picture(inputs, area, exposure, plan, steps)
                 return Upscaled(picture, exposure, inputs.bad_pixels, len(plan))
             except OutOfMemory:
                 smaller = self._smaller(inputs, area, plan)
@@ -171,10 +171,12 @@ class Upscaler:
     def _check_guides(self, inputs: Inputs) -> None:
         full = self.network.config.guides == "full"
         if full and inputs.guide_radiance is None:
-            raise PictureError("these weights want guide_radiance; or use fast guides")
+            raise PictureError(
+                "these weights need guide_radiance; pass it or use fast guides"
+            )
         if not full and inputs.guide_radiance is not None:
             raise PictureError(
-                "these weights take no guide_radiance; leave it out or use full guides"
+                "these weights take no guide_radiance; omit it or use full guides"
             )
 
     def _area(self, inputs: Inputs, skip_idle: bool) -> Area | None:
@@ -198,8 +200,10 @@ class Upscaler:
         else:
             pixels = side**2
         size = tiling.fit(height, width, pixels, overlap, multiple)
-        found = tiling.tiles(height, width, size, overlap, multiple)
-        return [tile.moved(area[0].start, area[1].start) for tile in found]
+        return [
+            tile.moved(area[0].start, area[1].start)
+            for tile in tiling.tiles(height, width, size, overlap, multiple)
+        ]
 
     def _smaller(
         self, inputs: Inputs, area: Area | None, plan: list[tiling.Tile]
@@ -231,14 +235,14 @@ class Upscaler:
         picture = np.zeros((*inputs.shape, inputs.low.shape[2]), np.float32)
         self._fill_idle(picture, inputs, area)
         progress.begin(self._work(plan))
-        progress.tell(0.0)
+        progress.report(0.0)
         if not inputs.is_black():
             with watched(self.network, progress):
                 for tile in plan:
                     self._add(picture, inputs, tile, exposure)
         if inputs.low.shape[2] == 4:
             finish(picture, inputs.low, inputs.guide_alpha, self.scale)
-        progress.tell(1.0)
+        progress.report(1.0)
         return picture
 
     def _fill_idle(self, picture: Array, inputs: Inputs, area: Area | None) -> None:
@@ -264,7 +268,7 @@ class Upscaler:
     def _add(
         self, picture: Array, inputs: Inputs, tile: tiling.Tile, exposure: float
     ) -> None:
-        """Add what one tile has to say to the pixels it covers."""
+        """Add one tile to the pixels it covers, with its blend weights."""
         result = self._run(inputs, tile, exposure)
         rows = tile.rows.output(self.scale, picture.shape[0])
         columns = tile.columns.output(self.scale, picture.shape[1])
@@ -292,8 +296,8 @@ class Upscaler:
                 raise
             size = f"{tile.columns.size}x{tile.rows.size}"
             raise OutOfMemory(
-                f"{self.device} has too little memory for a tile of {size} pixels: end "
-                "other programs, or take a smaller preset or another device"
+                f"{self.device} has too little memory for a tile of {size} pixels: "
+                "close other programs, or use a smaller preset or another device"
             ) from error
         return to_picture(result)
 
@@ -327,7 +331,7 @@ def _network(
     if config.scale != scale or (config.guides == "full") != (guides == "full"):
         raise WeightsError(
             f"these weights are for scale {config.scale} and {config.guides} guides, "
-            f"not for scale {scale} and {guides} guides; give others"
+            f"not for scale {scale} and {guides} guides; choose others"
         )
     return network
 
@@ -337,7 +341,7 @@ def _exposure(exposure: float | None, inputs: Inputs) -> float:
         return auto_exposure(inputs.low)
     least, most = EXPOSURE_RANGE
     if not least <= exposure <= most:
-        raise UsageError(f"exposure {exposure} is not within {least:g} and {most:g}")
+        raise UsageError(f"exposure {exposure} is outside {least:g} to {most:g}")
     return float(exposure)
 
 

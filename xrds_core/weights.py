@@ -90,7 +90,7 @@ def _guide_filter_file(directory: str | Path | None) -> Path:
 
 
 def load_guide_filter(directory: str | Path | None = None) -> GuideFilter:
-    """Return the filter of `directory`, or the shipped one if there is none in it.
+    """Return the filter in `directory`, or the shipped one if it has none.
 
     Raises WeightsError if the file is missing or damaged.
     """
@@ -112,7 +112,7 @@ def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
             tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118  # no mapping
     except (SafetensorError, OSError, ValueError) as error:
         raise WeightsError(
-            f"{path} is not a whole safetensors file ({error}); fetch it again"
+            f"{path} is not a complete safetensors file ({error}); download it again"
         ) from error
     return tensors, metadata
 
@@ -136,27 +136,29 @@ def _described(
             shapes = {k: v.shape for k, v in XRDS(config).state_dict().items()}
     except (ValueError, TypeError, AttributeError, ArithmeticError, RuntimeError) as e:
         raise WeightsError(
-            f"{path} describes no network that this version knows ({e})"
+            f"{path} describes a network that this version does not know ({e})"
         ) from e
     return config, shapes
 
 
 def _compare(
-    path: Path, expected: dict[str, torch.Size], found: dict[str, Tensor]
+    path: Path, expected: dict[str, torch.Size], tensors: dict[str, Tensor]
 ) -> None:
     """Raise WeightsError on the first tensor that is missing, foreign or damaged."""
-    for name in sorted(expected.keys() | found.keys()):
-        if name not in found:
-            raise WeightsError(f"{path} lacks the tensor {name} of its configuration")
+    for name in sorted(expected.keys() | tensors.keys()):
+        if name not in tensors:
+            raise WeightsError(f"{path} lacks the tensor {name} of its network")
         if name not in expected:
-            raise WeightsError(f"{path} holds a tensor {name} its network has not")
-        if found[name].shape != expected[name]:
+            raise WeightsError(f"{path} holds an unexpected tensor {name}")
+        if tensors[name].shape != expected[name]:
             raise WeightsError(
-                f"{name} in {path} is {tuple(found[name].shape)}, "
-                f"its configuration asks for {tuple(expected[name])}"
+                f"{name} in {path} has shape {tuple(tensors[name].shape)}, "
+                f"but its network has {tuple(expected[name])}"
             )
-        if not found[name].is_floating_point() or not found[name].isfinite().all():
-            raise WeightsError(f"{name} in {path} is not of finite floats")
+        if not tensors[name].is_floating_point() or not tensors[name].isfinite().all():
+            raise WeightsError(
+                f"{name} in {path} holds values that are not finite floats"
+            )
 
 
 def load_preset(
@@ -169,17 +171,17 @@ def load_preset(
     folder = Path(directory or DIRECTORY)
     path = folder / file_name(preset, scale, guides)
     if not path.is_file():
-        found = ", ".join(sorted(p.stem for p in _files(folder))) or "none"
+        known = ", ".join(sorted(p.stem for p in _files(folder))) or "none"
         raise WeightsError(
             f"no weights for preset {preset!r} at scale {scale} with {guides} guides "
-            f"in {folder}; there are: {found}"
+            f"in {folder}; it holds: {known}"
         )
     network, metadata = load(path)
     config = network.config
     if (config.scale, config.guides) != (scale, guides):
         raise WeightsError(
             f"{path} is for scale {config.scale} and {config.guides} guides, "
-            "unlike its name; fetch it again"
+            "unlike its name; download it again"
         )
     return network, metadata
 
@@ -193,8 +195,8 @@ def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
 
 
 def _files(folder: Path) -> list[Path]:
-    found = sorted(folder.glob("*_x*.safetensors"))
-    return [path for path in found if path.name.split("_")[0] in PRESETS]
+    paths = sorted(folder.glob("*_x*.safetensors"))
+    return [path for path in paths if path.name.split("_")[0] in PRESETS]
 
 
 def _record(path: Path) -> dict[str, Any]:

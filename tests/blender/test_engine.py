@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from channels import read_channels
 
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
-from xrds_core import exr
 from xrds_core.errors import UsageError, WeightsError
 
 BLENDER_5 = bpy.app.version >= (5, 0)
@@ -149,7 +149,7 @@ def multilayer(scene: Any, path: Path) -> dict[str, np.ndarray]:
     settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
     scene.render.filepath, scene.render.engine = str(path), "XRDS"
     bpy.ops.render.render(write_still=True)
-    return exr.read_channels(path)
+    return read_channels(path)
 
 
 def test_two_view_layers_with_their_passes(

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from channels import read_channels
 
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
-from xrds_core import exr
 
 BLENDER_5 = bpy.app.version >= (5, 0)
 
@@ -33,7 +33,7 @@ def channels(tmp_path: Path) -> Callable[..., dict[str, np.ndarray]]:
         path = tmp_path / f"{engine}.exr"
         scene.render.filepath, scene.render.engine = str(path), engine
         bpy.ops.render.render(write_still=True)
-        return exr.read_channels(path)
+        return read_channels(path)
 
     return read
 

@@ -95,7 +95,7 @@ def test_presets_keep_black_and_grey(preset: str, guides: str) -> None:
         ({"cell": 2}, "cell 2"),
         ({"guides": "depth"}, "'depth'"),
         ({"block": "resnet"}, "'resnet'"),
-        ({"heads": 3}, "3 heads"),
+        ({"heads": 3}, "multiple of heads 3"),
     ],
 )
 def test_wrong_configurations_say_what_is_wrong(change: dict, message: str) -> None:
