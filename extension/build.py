@@ -95,7 +95,7 @@ def _with_torch(options: argparse.Namespace, own: Path) -> None:
     for target in targets(options.platform, list(PYTHONS)):
         try:
             pins = resolve(target, wanted)
-            found = download(target, pins, options.cache / target.name)
+            wheels = download(target, pins, options.cache / target.name)
         except (NoCpuBuild, LookupError) as error:
             print(f"{target.name}: no zip with torch, {error}")
             continue
@@ -103,10 +103,10 @@ def _with_torch(options: argparse.Namespace, own: Path) -> None:
         lines = {"platforms": [target.platform], "blender_version_min": least}
         if end:
             lines["blender_version_max"] = end
-        _tell(build(options.out, target.name, [own, *found], lines))
+        _print_size(build(options.out, target.name, [own, *wheels], lines))
 
 
-def _tell(path: Path) -> None:
+def _print_size(path: Path) -> None:
     size = path.stat().st_size
     verdict = "" if size <= SIZE_LIMIT else f", above {SIZE_LIMIT / 1e6:.0f} MB"
     print(f"{path}  {size / 1e6:.1f} MB{verdict}", flush=True)
@@ -125,7 +125,7 @@ def main() -> None:
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         own = own_wheel(Path(folder))
-        _tell(build(options.out, WITHOUT_TORCH, [own]))
+        _print_size(build(options.out, WITHOUT_TORCH, [own]))
         if not options.without_torch:
             _with_torch(options, own)
 

@@ -46,7 +46,7 @@ class Target:
     def needs(self, requirement: Requirement) -> bool:
         """Whether a dependency applies to this target."""
         system, sys_platform, machine = self.system
-        told = {
+        environment = {
             "python_version": self.python,
             "python_full_version": f"{self.python}.0",
             "implementation_name": "cpython",
@@ -57,7 +57,7 @@ class Target:
             "os_name": "nt" if system == "Windows" else "posix",
             "extra": "",
         }
-        return requirement.marker is None or requirement.marker.evaluate(told)
+        return requirement.marker is None or requirement.marker.evaluate(environment)
 
     def options(self) -> list[str]:
         """Pip's options that ask for this target's wheels and nothing else."""
@@ -105,9 +105,9 @@ def resolve(target: Target, wanted: list[str]) -> list[str]:
             continue
         if name.startswith(GPU_PARTS):
             raise NoCpuBuild(f"torch for {target.name} wants {name}")
-        told = _look_up(target, requirement)
-        pins[name] = f"{name}=={told['version']}"
-        waiting += [Requirement(text) for text in told.get("requires_dist", ())]
+        metadata = _look_up(target, requirement)
+        pins[name] = f"{name}=={metadata['version']}"
+        waiting += [Requirement(text) for text in metadata.get("requires_dist", ())]
     return sorted(pins.values())
 
 
@@ -122,8 +122,8 @@ def _look_up(target: Target, requirement: Requirement) -> dict[str, Any]:
     """The metadata of the wheel that pip would take; nothing is fetched."""
     options = ["--dry-run", "--ignore-installed", "--target", "none", "--report", "-"]
     text = f"{requirement.name}{requirement.specifier}"
-    told = json.loads(_pip("install", *options, *target.options(), text))
-    metadata: dict[str, Any] = told["install"][0]["metadata"]
+    report = json.loads(_pip("install", *options, *target.options(), text))
+    metadata: dict[str, Any] = report["install"][0]["metadata"]
     return metadata
 
 

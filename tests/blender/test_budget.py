@@ -98,7 +98,7 @@ def test_a_budget_below_all_takes_the_fastest_and_says_so() -> None:
     assert picked.choice == replace(QUICK, samples=1)  # 7 s, and XRDS 9.25 s
     told = picked.decision(2.0)
     assert "\n" not in told.reason
-    assert told.reason.startswith("2 s is too little for this scene; the fastest")
+    assert told.reason.startswith("2 s is too short for this scene; the fastest")
 
 
 def test_of_choices_as_fast_as_the_fastest_the_better_is_taken() -> None:
@@ -121,7 +121,7 @@ def test_xrds_is_taken_where_the_denoiser_leaves_no_time() -> None:
     picked = choose(20.0, dear)
     assert picked.choice.scale > 1
     assert picked.rival is None
-    assert "the only kind" in picked.decision(20.0).reason
+    assert "the only method" in picked.decision(20.0).reason
 
 
 def test_networks_without_weights_are_not_chosen() -> None:

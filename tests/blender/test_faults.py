@@ -70,7 +70,8 @@ def test_cancelling_a_stage_writes_nothing(
         patch.setattr(
             session, "is_stopped", lambda _: stage in (progress.current() or "")
         )
-        patch.setattr(super_resolution, "_write", lambda *_: written.append(1))
+        enlargement = super_resolution._Enlargement
+        patch.setattr(enlargement, "write", lambda *_: written.append(1))
         with pytest.raises(Cancelled):
             render(life, 2, seed=1)
     assert not written
@@ -123,13 +124,13 @@ def test_a_frame_whose_folder_vanishes_is_kept_elsewhere(
 
     bpy.app.handlers.render_complete.append(vanish)
     try:
-        with pytest.raises(PictureError, match="the frame is kept as ") as error:
+        with pytest.raises(PictureError, match="the frame was saved as ") as error:
             render_file(blend, f"{folder}/#.{suffix}", RenderJob(), frames=(1, 2, 3))
     finally:
         bpy.app.handlers.render_complete.remove(vanish)
     assert not folder.exists()
     assert names(tmp_path / "elsewhere") == [f"1.{suffix}"]
-    kept = Path(str(error.value).rpartition("kept as ")[2])
+    kept = Path(str(error.value).rpartition("saved as ")[2])
     assert temporary in kept.parents
     assert kept.name == f"2.{suffix}"
     assert is_whole(kept, SIZE)
@@ -164,7 +165,7 @@ def test_too_little_memory_in_f12_shows_the_low_resolution_picture(
     life.render.engine = "XRDS"
     life.render.image_settings.file_format = "OPEN_EXR"
     life.render.filepath = str(tmp_path / "none.exr")
-    with pytest.raises(RuntimeError, match="the picture is the low-resolution one"):
+    with pytest.raises(RuntimeError, match="picture is the low-resolution render"):
         bpy.ops.render.render(write_still=True)
     assert not names(tmp_path)
     shown = tmp_path / "shown.exr"
@@ -181,7 +182,7 @@ def test_too_little_memory_in_f12_shows_the_low_resolution_picture(
 def test_too_little_memory_writes_the_low_resolution_file(
     blend: Path, too_large: None, tmp_path: Path
 ) -> None:
-    with pytest.raises(XRDSError, match=r"frame 1: .*memory.*, kept as .*1_low\.exr"):
+    with pytest.raises(XRDSError, match=r"frame 1: .*memory.*, saved as .*1_low\.exr"):
         render_file(blend, f"{tmp_path}/f/#.exr", RenderJob(), frames=(1, 2))
     assert names(tmp_path / "f") == ["1_low.exr"]
     assert exr.read_beauty(tmp_path / "f" / "1_low.exr").radiance.shape == (17, 23, 3)

@@ -78,8 +78,8 @@ def test_samples_add_up_to_the_limit(network: Any) -> None:
     pictures = [shot(scene, seed=1, guide_limit=6) for _ in range(4)]
     assert [told(p) for p in pictures] == [
         "kept 2 samples",
-        "added up to 4 samples",
-        "added up to 6 samples",
+        "gathered 4 samples",
+        "gathered 6 samples",
         "used 6 samples",
     ]
     # those of the cache decide whether their noise is filtered
@@ -95,7 +95,7 @@ def test_more_samples_asked_for_are_rendered_beside_those_kept() -> None:
     scene = traps.trap("texture", 48, 36)
     shot(scene)
     picture = render(scene, 2, samples=1, guide_samples=5)
-    assert told(picture) == "added up to 5 samples"
+    assert told(picture) == "gathered 5 samples"
 
 
 def test_the_result_holds_data_passes_of_kept_guides(written: Any) -> None:
@@ -112,17 +112,17 @@ def test_the_result_holds_data_passes_of_kept_guides(written: Any) -> None:
         depth.rect.foreach_get(pixels)
         seen.append(pixels)
 
-    from xrds_blender.frame import super_resolution as module
+    from xrds_blender.frame.super_resolution import _Enlargement
 
     scene.view_layers[0].use_pass_z = True
-    old = module._write
+    old = _Enlargement.write
     try:
-        module._write = lambda engine, *rest: (old(engine, *rest), look(engine))
+        _Enlargement.write = lambda part, *rest: (old(part, *rest), look(part.engine))
         written(scene)
         bpy.data.objects["Lamp"].data.energy *= 2
         written(scene)
     finally:
-        module._write = old
+        _Enlargement.write = old
     np.testing.assert_array_equal(seen[0], seen[1])
     assert seen[0].min() > 1.0
 
@@ -164,7 +164,7 @@ def test_a_folder_that_takes_no_file_costs_no_picture(tmp_path: Path) -> None:
     picture = shot(traps.trap("texture", 48, 36), guide_cache=tmp_path / "file")
     (decision,) = [d for d in picture.plan if d.decision == "guide cache"]
     assert decision.value == "kept 2 samples"
-    assert decision.reason.startswith("in memory alone")
+    assert decision.reason.startswith("in memory only")
 
 
 # --- the cache alone ------------------------------------------------------------------

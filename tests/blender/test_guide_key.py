@@ -11,8 +11,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from xrds_blender.scene.facts import scene_facts
 from xrds_blender.scene.guide_key import NotFollowed, guide_key
-from xrds_blender.scene.scene_facts import scene_facts
 from xrds_lab.studio import traps
 from xrds_lab.studio.builder import Builder
 from xrds_lab.studio.geometry import box

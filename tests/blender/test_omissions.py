@@ -11,7 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import run_job
-from xrds_blender.frame.frame_facts import find_facts
+from xrds_blender.frame.facts import find_facts
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import evaluate
 from xrds_blender.interface.registration import ensure_registered

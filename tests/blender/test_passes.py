@@ -271,7 +271,7 @@ def test_no_camera_is_one_clear_line(still_life: Build) -> None:
 
 
 def test_an_unknown_layer_is_named(still_life: Build) -> None:
-    with pytest.raises(SceneError, match="no layer 'Nowhere'; it has ViewLayer"):
+    with pytest.raises(SceneError, match="no view layer 'Nowhere'; it has ViewLayer"):
         run_job(still_life(), lambda passes: None, layer="Nowhere")
 
 
@@ -284,7 +284,7 @@ def test_an_unknown_blender_is_refused(
     places = dict(PipelineSettings._places)
     places["resolution_x"] = (places["resolution_y"][0] + 4, 0)
     monkeypatch.setattr(PipelineSettings, "_places", places)
-    with pytest.raises(SceneError, match="keeps it in a way XRDS does not know"):
+    with pytest.raises(SceneError, match="in a way that XRDS does not know"):
         run_job(scene, lambda passes: passes.width)
 
 

@@ -98,7 +98,7 @@ def test_too_little_time_renders_the_fastest(
     only(plain=40.0)
     picture = render(still_life(160, 96), time_budget=0.001)
     assert picture.job.samples == 1
-    assert "too little for this scene" in picture.plan[0].reason
+    assert "too short for this scene" in picture.plan[0].reason
 
 
 def test_quality_asks_for_no_more_than_it_needs(
@@ -143,7 +143,7 @@ def test_panel_setting_reaches_the_job(still_life: Callable[..., Any]) -> None:
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [
-        ({"time_budget": 0.0}, "not above 0"),
+        ({"time_budget": 0.0}, "must be above 0"),
         ({"time_budget": 5.0, "quality": 30.0}, "not both"),
         ({"denoiser": "BEST"}, "HIGH-ACCURATE"),
     ],

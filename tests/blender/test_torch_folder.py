@@ -44,7 +44,9 @@ def test_another_python_or_platform_is_refused(folder: Path) -> None:
 
 
 def test_an_empty_folder_tells_how_to_fill_it(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"holds no torch; fill it with pip install"):
+    with pytest.raises(
+        UsageError, match=r"holds no PyTorch; install it with pip install"
+    ):
         torch_folder.inspect(tmp_path)
 
 
@@ -74,7 +76,7 @@ def test_missing_torch_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(torch_folder, "loaded", lambda: None)
     monkeypatch.setattr(torch_folder, "_where", lambda name: None)
     assert not torch_folder.is_there()
-    with pytest.raises(UsageError, match="torch is not there"):
+    with pytest.raises(UsageError, match="torch is not installed"):
         torch_folder.available()
 
 
@@ -86,4 +88,4 @@ def test_preferences_show_what_is_used(folder: Path) -> None:
     assert line.startswith("PyTorch 2.")
     wrong = preferences.torch_status(folder / "nowhere")
     assert wrong[0][0] == "ERROR"
-    assert "holds no torch" in wrong[0][1]
+    assert "holds no PyTorch" in wrong[0][1]

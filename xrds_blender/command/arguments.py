@@ -1,6 +1,7 @@
-"""What the options of the commands take: text to values.
+"""Readers of the values that the commands' options take.
 
-Each raises ArgumentTypeError or ValueError for text that is none; argparse then tells.
+Each raises ArgumentTypeError or ValueError for text that it cannot read, of which
+argparse then makes a line of wrong usage.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ def positive(text: str) -> int:
     """A whole number above 0."""
     value = int(text)
     if value < 1:
-        raise argparse.ArgumentTypeError(f"{value} is below 1")
+        raise argparse.ArgumentTypeError(f"{value} must be at least 1")
     return value
 
 
@@ -22,36 +23,36 @@ def factor(text: str) -> float:
     """A number above 0."""
     value = float(text)
     if not 0.0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text} is no number above 0")
+        raise argparse.ArgumentTypeError(f"{text} must be a number above 0")
     return value
 
 
 def factors(text: str) -> tuple[float, ...]:
-    """Numbers above 0, as 0.5,2."""
+    """Numbers above 0, such as 0.5,2."""
     return tuple(factor(part) for part in text.split(","))
 
 
 def integers(text: str) -> tuple[int, ...]:
-    """Whole numbers, as 2,4."""
+    """Whole numbers, such as 2,4."""
     return tuple(int(part) for part in text.split(","))
 
 
 def words(text: str) -> tuple[str, ...]:
-    """Any words, as bmw27,house."""
+    """Any words, such as bmw27,house."""
     return tuple(text.split(","))
 
 
 def names(known: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
-    """Make the reader of names out of `known`, as fast,balanced."""
+    """Make the reader of names out of `known`, such as fast,balanced."""
 
     def read(text: str) -> tuple[str, ...]:
-        found = tuple(text.split(","))
-        for name in found:
+        chosen = tuple(text.split(","))
+        for name in chosen:
             if name not in known:
                 raise argparse.ArgumentTypeError(
-                    f"{name!r} is none of {', '.join(known)}"
+                    f"{name!r} is not one of {', '.join(known)}"
                 )
-        return found
+        return chosen
 
     return read
 
@@ -62,29 +63,31 @@ def frame(text: str) -> list[int]:
 
 
 def frames(text: str) -> list[int]:
-    """Frame numbers, as 1-24."""
+    """Frame numbers, such as 1-24."""
     match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
     if not match or int(match[1]) > int(match[2]):
-        raise argparse.ArgumentTypeError(f"{text!r} is no range as 1-24")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a range such as 1-24")
     return list(range(int(match[1]), int(match[2]) + 1))
 
 
 def size(text: str) -> tuple[int, int]:
-    """Width and height, as 1920x1080."""
+    """Width and height in pixels, such as 1920x1080."""
     match = re.fullmatch(r"(\d+)x(\d+)", text)
     if not match or "0" in match.groups():
-        raise argparse.ArgumentTypeError(f"{text!r} is no size as 1920x1080")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 1920x1080")
     return int(match[1]), int(match[2])
 
 
 def sizes(text: str) -> tuple[tuple[int, int], ...]:
-    """Sizes, as 960x540,1920x1080."""
+    """Sizes, such as 960x540,1920x1080."""
     return tuple(size(part) for part in text.split(","))
 
 
 def size_in_bytes(text: str) -> int:
-    """Bytes, as 500M or 4G."""
+    """Bytes, such as 500M or 4G."""
     match = re.fullmatch(r"(\d+)([KMG]?)", text.upper())
     if not match:
-        raise argparse.ArgumentTypeError(f"{text!r} is no amount as 500M or 4G")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not an amount such as 500M or 4G"
+        )
     return int(match[1]) << {"": 0, "K": 10, "M": 20, "G": 30}[match[2]]

@@ -38,14 +38,14 @@ def stdout_for_json() -> Iterator[Callable[[Any], None]]:
     flush_all()
     kept = os.dup(1)
     os.dup2(2, 1)
-    told: list[Any] = []
+    values: list[Any] = []
     try:
-        yield told.append
+        yield values.append
     finally:
         flush_all()
         os.dup2(kept, 1)
         os.close(kept)
-    for value in told:
+    for value in values:
         print(json.dumps(value, indent=1), flush=True)
 
 
@@ -76,16 +76,19 @@ def status_of(work: Callable[[], None]) -> int:
         line, status = str(error), FAILED
     except ModuleNotFoundError as error:
         # the extension leaves out torch and what only makes XRDS
-        line, status = f"this installation has no module {error.name}", FAILED
-    except BrokenPipeError:  # who read stdout has seen enough, as `head` has
+        line, status = f"the Python module {error.name} is not installed", FAILED
+    except BrokenPipeError:  # the reader of stdout has left, as `head` does
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return FAILED
     except MemoryError:
-        line = "out of memory; set a memory limit or a smaller picture"
+        line = "out of memory; set --memory-limit or render a smaller picture"
         status = FAILED
     except Exception as error:  # a fault of ours: show where, end as a command ends
         traceback.print_exc()
-        line, status = f"unexpected {type(error).__name__}, a fault of XRDS", FAILED
+        line, status = (
+            f"unexpected {type(error).__name__}: a bug in XRDS, please report it",
+            FAILED,
+        )
     else:
         return DONE
     print(f"xrds: {line}", file=sys.stderr, flush=True)

@@ -11,8 +11,15 @@ from .deferred import lines_of
 
 def add_info(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds info`."""
-    command = commands.add_parser("info", help="versions, devices, weights, costs")
-    command.add_argument("--weights", type=Path, help="folder of weights files")
+    command = commands.add_parser(
+        "info", help="show versions, devices, weights and costs"
+    )
+    command.add_argument(
+        "--weights",
+        type=Path,
+        metavar="DIR",
+        help="folder of weights files; default: the shipped ones",
+    )
     command.set_defaults(work=_info, lines=lines_of("xrds_core.info"))
     return command
 

@@ -71,23 +71,25 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     for add in (*added, *_laboratory()):
         command = add(commands)
         command.add_argument(
-            "--json", action="store_true", help="print JSON on stdout, all else beside"
+            "--json",
+            action="store_true",
+            help="print JSON on stdout and everything else on stderr",
         )
     asked = words[0] if words else ""
     if asked in LABORATORY and asked not in commands.choices:
         parser.error(
             f"{asked} belongs to the laboratory, which is not installed: "
-            "pip install ./xrds_lab from the source of XRDS"
+            "run pip install ./xrds_lab in a source tree of XRDS"
         )
     return parser
 
 
 def _laboratory() -> Iterator[AddCommand]:
     """The laboratory's commands that are installed, in the order of their names."""
-    found = {entry.name: entry for entry in entry_points(group=GROUP)}
+    installed = {entry.name: entry for entry in entry_points(group=GROUP)}
     for name in LABORATORY:
-        if name in found:
-            yield found[name].load()
+        if name in installed:
+            yield installed[name].load()
 
 
 if __name__ == "__main__":

@@ -5,13 +5,11 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..frame.job import RenderJob
+from ..frame.job import GUIDES, PRESETS, SCALES, RenderJob
 from ..planning.plan import SAVINGS
 from . import arguments
 
-PRESETS = ("fast", "balanced", "paper")
-GUIDES = ("fast", "full")
-DEVICE_HELP = "auto, cpu, cuda, cuda:1, mps"
+DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
 
 
 def add_job(command: argparse.ArgumentParser) -> None:
@@ -19,45 +17,77 @@ def add_job(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     add("scene", type=Path, metavar="SCENE.blend")
     size = command.add_mutually_exclusive_group()
-    size.add_argument("--scale", type=int, choices=(1, 2, 4, 8), default=2)
-    size.add_argument("--plain", action="store_true", help="Cycles as the file has it")
+    size.add_argument(
+        "--scale",
+        type=int,
+        choices=SCALES,
+        default=2,
+        help="enlargement along each side; 1 is plain Cycles (default: 2)",
+    )
+    size.add_argument("--plain", action="store_true", help="render with Cycles alone")
     size.add_argument(
         "--time-budget",
         type=arguments.factor,
         metavar="SECONDS",
-        help="of a frame; chooses scale, samples, guides, network and denoiser",
+        help="time for a frame; XRDS chooses the best settings that keep to it",
     )
     size.add_argument(
         "--quality",
         type=arguments.factor,
         metavar="DB",
-        help="expected PSNR; chooses the same for the least seconds",
+        help="expected PSNR; XRDS chooses the fastest settings that reach it",
     )
-    add("--samples", type=arguments.positive, help="of the low-resolution render")
-    add("--guide-samples", type=arguments.positive, default=4)
-    add("--guide-cache", type=Path, metavar="DIR", help="folder that keeps guides")
-    add("--guide-limit", type=int, default=0, help="samples that kept guides gather")
-    add("--keep-all", action="store_true", help="leave nothing out")
-    add("--resolution", type=arguments.size, metavar="WxH")
-    add("--seed", type=int)
+    add(
+        "--samples",
+        type=arguments.positive,
+        help="samples per pixel of the low-resolution render",
+    )
+    add(
+        "--guide-samples",
+        type=arguments.positive,
+        default=4,
+        help="samples per pixel of the guides (default: 4)",
+    )
+    add("--guide-cache", type=Path, metavar="DIR", help="folder to cache guides in")
+    add(
+        "--guide-limit",
+        type=int,
+        default=0,
+        help="samples up to which repeated renders improve the cached guides",
+    )
+    add("--keep-all", action="store_true", help="skip nothing that could be skipped")
+    add(
+        "--resolution",
+        type=arguments.size,
+        metavar="WxH",
+        help="size in pixels, in place of the file's",
+    )
+    add("--seed", type=int, help="seed of Cycles' noise, in place of the file's")
     add_network(command)
 
 
 def add_network(command: argparse.ArgumentParser) -> None:
     """Add what chooses a network and how it runs."""
     add = command.add_argument
-    add("--guides", choices=GUIDES, default="fast")
-    add("--preset", choices=PRESETS, default="fast")
     add(
-        "--exposure", type=arguments.factor, help="hold it for an animation or a border"
+        "--guides",
+        choices=GUIDES,
+        default="fast",
+        help="albedo and normal, or full: noisy radiance too (default: fast)",
+    )
+    add("--preset", choices=PRESETS, default="fast", help="the network (default: fast)")
+    add(
+        "--exposure",
+        type=arguments.factor,
+        help="fixed exposure factor, for animations and border renders",
     )
     add("--device", default="auto", help=DEVICE_HELP)
     add(
         "--memory-limit",
         type=arguments.size_in_bytes,
-        help="of the network, as 500M or 4G",
+        help="memory for the network, such as 500M or 4G",
     )
-    add("--weights", type=Path, help="weights file, or folder of such")
+    add("--weights", type=Path, help="weights file, or a folder of them")
 
 
 def job_of(options: argparse.Namespace) -> RenderJob:

@@ -46,8 +46,8 @@ def check_output(pattern: str, frames: int) -> None:
         raise UsageError(f"output {pattern!r} must end in .exr or .png")
     if frames > 1 and "#" not in path.name:
         raise UsageError(
-            f"output {pattern!r} would be written {frames} times; "
-            f"put #### for the frame number, as {path.stem}_####{path.suffix}"
+            f"all {frames} frames would be written to {pattern!r}; add #### for the "
+            f"frame number, such as {path.stem}_####{path.suffix}"
         )
     if path.is_dir():
         raise PictureError(f"output {path} is a folder; name a file")
@@ -85,7 +85,7 @@ def save(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
 
 def _write_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
     if not path.parent.is_dir():  # Blender would make it anew, wherever that is by now
-        raise PictureError(f"cannot write {path}: its folder is gone")
+        raise PictureError(f"cannot write {path}: its folder no longer exists")
     try:
         with replacing(path) as unfinished:
             _save_png(unfinished, radiance, alpha, scene)

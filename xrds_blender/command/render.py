@@ -14,16 +14,25 @@ from .options import add_job, job_of
 
 def add_render(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds render`."""
-    command = commands.add_parser("render", help="render a .blend file")
+    command = commands.add_parser("render", help="render frames of a .blend file")
     add = command.add_argument
     add_job(command)
-    add("-o", "--output", help=".exr or .png; # for frame numbers")
-    add("--explain", action="store_true", help="print the plan and render nothing")
-    add("--resume", action="store_true", help="skip frames that are there, complete")
+    add("-o", "--output", help="an .exr or .png file; #### stands for the frame number")
+    add("--explain", action="store_true", help="print the plan without rendering")
+    add("--resume", action="store_true", help="skip frames whose files are complete")
     which = command.add_mutually_exclusive_group()
-    which.add_argument("--frame", type=arguments.frame, dest="frames", metavar="F")
     which.add_argument(
-        "--frames", type=arguments.frames, help="first-last", metavar="A-B"
+        "--frame",
+        type=arguments.frame,
+        dest="frames",
+        metavar="N",
+        help="one frame (default: the file's current one)",
+    )
+    which.add_argument(
+        "--frames",
+        type=arguments.frames,
+        help="first and last frame, such as 1-24",
+        metavar="A-B",
     )
     command.set_defaults(work=_render, lines=_lines)
     return command
@@ -31,7 +40,7 @@ def add_render(commands: Any) -> argparse.ArgumentParser:
 
 def add_plan(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds plan`."""
-    command = commands.add_parser("plan", help="what a render would do and leave out")
+    command = commands.add_parser("plan", help="show what a render would do and skip")
     add_job(command)
     command.set_defaults(work=_plan, lines=_plan_lines)
     return command

@@ -45,8 +45,8 @@ def render_file(
     Raises:
         UsageError, SceneError, PictureError, WeightsError: before anything is
             rendered, if it could not succeed. Later: PictureError for a frame that
-            cannot be written, NetworkFailed; both tell where what was rendered is
-            kept, and the frames before are there.
+            cannot be written, NetworkFailed; both name the file that holds what was
+            rendered, and the frames before are complete.
     """
     picture_file.check_output(output, len(frames or [0]))
     scene = open_scene(path, resolution)
@@ -54,7 +54,7 @@ def render_file(
     numbers = list(frames or [scene.frame_current])
     if resume:
         sweep(Path(output).parent)
-    kept, told, last = [], [], None
+    kept, entries, last = [], [], None
     size = picture_size(scene.render)
     for number in numbers:
         # asked anew for each: another render may be writing the same frames
@@ -62,7 +62,7 @@ def render_file(
             kept.append(number)
             continue
         entry, last = _frame(scene, job, output, number)
-        told.append(entry)
+        entries.append(entry)
     job = (last and last.job) or job
     return {
         "output": output,
@@ -70,7 +70,7 @@ def render_file(
         "scale": 1 if job.is_plain else job.scale,
         "preset": None if job.is_plain else job.preset,
         "device": last.device if last else "",
-        "frames": told,
+        "frames": entries,
         "kept": kept,
         "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
     }
@@ -103,34 +103,34 @@ def _frame(
         picture_file.save(target, picture.radiance, picture.alpha, scene)
     except PictureError as error:
         place = _keep_elsewhere(target, picture.radiance, picture.alpha, scene)
-        raise PictureError(f"{error}; the frame is {place}") from error
+        raise PictureError(f"{error}; the frame was {place}") from error
     written = time.perf_counter() - start
     seconds = dict(picture.seconds)
     seconds["write"] += written
     seconds["total"] += written
-    told = {
+    entry = {
         "frame": number,
         "output": str(target),
         "seconds": seconds,
         "peak_memory": picture.peak_memory,
     }
-    return told, picture
+    return entry, picture
 
 
 def _keep(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
-    """Write what was rendered and tell where it is."""
+    """Write what was rendered; say where, to end an error's line."""
     try:
         picture_file.save(target, radiance, alpha, scene)
     except PictureError:
         return _keep_elsewhere(target, radiance, alpha, scene)
-    return f"kept as {target}"
+    return f"saved as {target}"
 
 
 def _keep_elsewhere(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
-    """Write into the machine's own folder what its place does not take."""
+    """Write into the temporary folder what cannot be written in place."""
     try:
         place = Path(tempfile.mkdtemp(prefix="xrds-")) / target.name
         picture_file.save(place, radiance, alpha, scene)
     except (OSError, PictureError):
-        return "lost: the folder for temporary files takes no file either"
-    return f"kept as {place}"
+        return "lost: the temporary folder cannot be written to either"
+    return f"saved as {place}"

@@ -6,23 +6,49 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from ..frame.job import SCALES
 from . import arguments
 from .options import add_network
 
 
 def add_upscale(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds upscale`."""
-    command = commands.add_parser("upscale", help="enlarge a render from EXR files")
+    command = commands.add_parser(
+        "upscale", help="enlarge a render that lies in EXR files"
+    )
     add = command.add_argument
-    add("beauty", type=Path, metavar="BEAUTY.exr", help="low-resolution picture")
-    add("guide_file", type=Path, metavar="GUIDES.exr", help="full-resolution passes")
-    add("-o", "--output", type=Path, required=True, metavar="OUT.exr")
-    add("--scale", type=int, choices=(1, 2, 4, 8), default=2)
+    add(
+        "beauty",
+        type=Path,
+        metavar="BEAUTY.exr",
+        help="low-resolution render",
+    )
+    add(
+        "guide_file",
+        type=Path,
+        metavar="GUIDES.exr",
+        help="full-resolution passes",
+    )
+    add(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="OUT.exr",
+        help="the enlarged picture",
+    )
+    add(
+        "--scale",
+        type=int,
+        choices=SCALES,
+        default=2,
+        help="size of the guides over that of the picture (default: 2)",
+    )
     add(
         "--guide-samples",
         type=arguments.positive,
         metavar="N",
-        help="per pixel of GUIDES.exr: the noise of few is filtered; many by default",
+        help="samples per pixel of GUIDES.exr; few are denoised first (default: many)",
     )
     add_network(command)
     command.set_defaults(work=_upscale, lines=_lines)

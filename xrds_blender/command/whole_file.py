@@ -13,9 +13,9 @@ _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 def is_whole(path: Path, size: tuple[int, int]) -> bool:
     """Whether `path`, .exr or .png, holds a whole picture of `size` (width, height)."""
-    found = png_size if path.suffix.lower() == ".png" else _exr_size
+    size_of = png_size if path.suffix.lower() == ".png" else _exr_size
     try:
-        return found(path) == size
+        return size_of(path) == size
     except (OSError, PictureError):
         return False
 

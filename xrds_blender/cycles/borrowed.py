@@ -143,6 +143,6 @@ def _unknown_layout(name: str) -> SceneError:
     import bpy
 
     return SceneError(
-        f"render setting {name!r}: Blender {bpy.app.version_string} keeps it in a way "
-        "XRDS does not know; render with Cycles, or with a supported Blender"
+        f"Blender {bpy.app.version_string} stores the render setting {name!r} in a way "
+        "that XRDS does not know; render with Cycles or use a supported Blender"
     )

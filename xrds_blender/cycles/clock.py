@@ -59,8 +59,8 @@ class StageClock:
         now = time.perf_counter()
         if self._syncing:
             self._sync += now - self._status
-        if found := _PEAK.search(line):
-            self.peak = max(self.peak, int(float(found[1]) * 2**20))
+        if match := _PEAK.search(line):
+            self.peak = max(self.peak, int(float(match[1]) * 2**20))
         status = line.rpartition("|")[2].strip()
         self._status = now
         self._syncing = not status.startswith(_RENDERING)

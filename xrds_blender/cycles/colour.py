@@ -36,8 +36,8 @@ def working_space() -> str:
     """The name of the open file's working space."""
     import bpy
 
-    told = getattr(bpy.data, "colorspace", None)
-    return REC709 if told is None else told.working_space
+    settings = getattr(bpy.data, "colorspace", None)
+    return REC709 if settings is None else settings.working_space
 
 
 def to_rec709(space: str) -> Array | None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..planning.forecast import low_size
 from .borrowed import Borrowed
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ class Frame:
 
     def low_size(self, scale: int) -> tuple[int, int]:
         """Width and height in low-resolution pixels, rounded up."""
-        return -(-self.width // scale), -(-self.height // scale)
+        return low_size(self.width, self.height, scale)
 
     def covered(self, scale: int) -> Frame:
         """The frame that the low-resolution pixels cover."""

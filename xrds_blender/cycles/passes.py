@@ -217,8 +217,8 @@ class CyclesPasses:
     def data_passes(self) -> dict[tuple[str, str], Array]:
         """All passes by (view, name) but the picture and its light, as they are now."""
         kept = [n for n in self.pass_names() if n != COMBINED and not is_light(n)]
-        found = {(view, n): self._read(n, view) for view in self.views for n in kept}
-        return {key: pixels for key, pixels in found.items() if pixels is not None}
+        passes = {(view, n): self._read(n, view) for view in self.views for n in kept}
+        return {key: pixels for key, pixels in passes.items() if pixels is not None}
 
     def put_back(self, passes: dict[tuple[str, str], Array]) -> None:
         """Write passes that `data_passes` gave into the result again."""

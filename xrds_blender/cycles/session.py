@@ -132,22 +132,22 @@ def read_pass(layer: Any, name: str, view: str, size: tuple[int, int]) -> Array 
 
     `size` is the width and height of the whole render result.
     """
-    found = layer.passes.find_by_name(name, view)
-    if found is None:
+    render_pass = layer.passes.find_by_name(name, view)
+    if render_pass is None:
         return None
     import numpy as np
 
     width, height = size
-    pixels = np.empty(width * height * found.channels, np.float32)
-    found.rect.foreach_get(pixels)
-    return pixels.reshape(height, width, found.channels)[::-1]
+    pixels = np.empty(width * height * render_pass.channels, np.float32)
+    render_pass.rect.foreach_get(pixels)
+    return pixels.reshape(height, width, render_pass.channels)[::-1]
 
 
 def write_pass(layer: Any, name: str, view: str, pixels: Array) -> None:
     """Replace the pixels (height, width, channels), row 0 on top, of a whole pass."""
     import numpy as np
 
-    found = layer.passes.find_by_name(name, view)
-    if found is not None:
+    render_pass = layer.passes.find_by_name(name, view)
+    if render_pass is not None:
         flipped = np.ascontiguousarray(pixels[::-1], dtype=np.float32)
-        found.rect.foreach_set(flipped.ravel())
+        render_pass.rect.foreach_set(flipped.ravel())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from .frame_facts import find_facts
+from .facts import find_facts
 from .job import RenderJob
 from .rendering import evaluate
 

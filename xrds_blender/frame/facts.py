@@ -8,7 +8,7 @@ from typing import Any
 from ..cycles import low_camera, session
 from ..cycles.size import frame_size
 from ..planning.facts import Facts, SceneFacts
-from ..scene.scene_facts import scene_facts
+from ..scene.facts import scene_facts
 from .job import RenderJob
 
 # Core-seconds of a million guide samples with nothing left out: docs/performance.md.
@@ -20,8 +20,8 @@ def find_facts(depsgraph: Any, job: RenderJob) -> Facts:
     return join_facts(depsgraph.scene_eval, job, scene_facts(depsgraph))
 
 
-def join_facts(scene: Any, job: RenderJob, found: SceneFacts) -> Facts:
-    """Facts of a frame whose scene was looked at before."""
+def join_facts(scene: Any, job: RenderJob, scene_facts: SceneFacts) -> Facts:
+    """The facts of a frame, with those of its scene at hand."""
     width, height = frame_size(scene.render)
     camera = scene.camera
     return Facts(
@@ -33,7 +33,7 @@ def join_facts(scene: Any, job: RenderJob, found: SceneFacts) -> Facts:
         has_denoiser=session.has_denoiser(),
         exact_camera=camera is None or low_camera.is_exact(camera.data),
         guide_samples=job.guide_samples,
-        scene=found,
+        scene=scene_facts,
         guide_seconds=_guide_seconds(scene, width * height * job.guide_samples),
     )
 

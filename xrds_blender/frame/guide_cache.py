@@ -83,10 +83,10 @@ class GuideCache:
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key].copy()
-        found = None if folder is None else _read(folder / f"{key}.npz")
-        if found is not None:
-            self._keep(key, found)
-            return found.copy()
+        stored = None if folder is None else _read(folder / f"{key}.npz")
+        if stored is not None:
+            self._keep(key, stored)
+            return stored.copy()
         return None
 
     def put(self, key: str, guides: CachedGuides, folder: Path | None = None) -> None:
@@ -148,7 +148,7 @@ def _make_room(folder: Path, limit: int) -> None:
             files.append((path.stat(), path))
     files.sort(key=lambda each: each[0].st_mtime_ns, reverse=True)
     total = 0
-    for told, path in files:
-        total += told.st_size
+    for status, path in files:
+        total += status.st_size
         if total > limit:
             path.unlink(missing_ok=True)

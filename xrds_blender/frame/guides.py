@@ -41,7 +41,7 @@ class GuideSource:
         self._passes, self._graph, self._job = passes, depsgraph, job
         self._chosen, self._facts = chosen, facts
         self._folder = None if job.guide_cache is None else Path(job.guide_cache)
-        self.decision = Decision(_NAME, "off", "as asked for")
+        self.decision = Decision(_NAME, "off", "as requested")
 
     def guides(self, low: dict[str, Beauty] | None = None) -> dict[str, Guides]:
         """Guides by view; the render result then holds their passes.
@@ -49,7 +49,7 @@ class GuideSource:
         `low` is the picture by view, which an empty scene's guides are made of.
         """
         if low is not None and not self._chosen.render_guides:
-            self.decision = Decision(_NAME, "off", "there is nothing to keep")
+            self.decision = Decision(_NAME, "off", "there are no guides to keep")
             return self._of_background(low)
         if self._job.guides == "full" or _NAME not in self._job.savings:
             return self._render(self._chosen.guide_samples)
@@ -57,7 +57,9 @@ class GuideSource:
         try:
             key = self._key()
         except NotFollowed as reason:
-            self.decision = Decision(_NAME, "not used", f"no key tells of {reason}")
+            self.decision = Decision(
+                _NAME, "not used", f"the cache cannot track {reason}"
+            )
             return self._render(self._chosen.guide_samples)
         kept = guide_cache.CACHE.get(key, self._folder)
         looked = time.perf_counter() - started
@@ -65,14 +67,14 @@ class GuideSource:
         if not missing:
             assert kept is not None
             self._passes.put_back(kept.passes)
-            self._tell_hit(kept.samples, looked)
+            self._report_hit(kept.samples, looked)
             return _guides(kept, {"sync": 0.0, "guides": looked})
         return self._add(key, kept, missing, looked)
 
     def _of_background(self, low: dict[str, Beauty]) -> dict[str, Guides]:
         """What Cycles writes where it sees nothing: its light as albedo, no normal."""
         scale, region = self._job.scale, self._passes.region
-        found = {}
+        guides = {}
         for view, beauty in low.items():
             rows, columns = beauty.offset
             rows, columns = (
@@ -86,9 +88,9 @@ class GuideSource:
             albedo, alpha = large(beauty.radiance), large(beauty.alpha)
             normal = np.zeros_like(albedo)
             seconds = {"sync": 0.0, "guides": 0.0}
-            found[view] = Guides(albedo, normal, alpha, None, None, None, seconds)
+            guides[view] = Guides(albedo, normal, alpha, None, None, None, seconds)
             self._passes.put_back({(view, ALBEDO): albedo, (view, NORMAL): normal})
-        return found
+        return guides
 
     def _key(self) -> str:
         names = sorted(self._passes.pass_names())
@@ -128,22 +130,24 @@ class GuideSource:
         seconds["guides"] += looked
         alphas = {view: guides.alpha for view, guides in rendered.items()}
         guides = CachedGuides(samples, self._passes.data_passes(), alphas)
-        reason = "nothing kept yet has this camera, geometry and materials"
+        reason = "no kept guides match this camera, geometry and materials"
         value = f"kept {samples} samples"
         if kept is not None:
             guides = kept.merged(guides)
             self._passes.put_back(guides.passes)
-            reason = f"{samples} samples more for the same view"
-            value = f"added up to {guides.samples} samples"
+            reason = f"{samples} more samples of the same view"
+            value = f"gathered {guides.samples} samples"
         try:
             guide_cache.CACHE.put(key, guides, self._folder)
         except OSError as error:  # the picture is worth more than the guides kept
-            reason = f"in memory alone: {self._folder} takes no file ({error.strerror})"
+            reason = (
+                f"in memory only: cannot write to {self._folder} ({error.strerror})"
+            )
         self.decision = Decision(_NAME, value, reason)
         return _guides(guides, seconds)
 
-    def _tell_hit(self, samples: int, looked: float) -> None:
-        reason = "camera, geometry, materials and textures are as they were"
+    def _report_hit(self, samples: int, looked: float) -> None:
+        reason = "camera, geometry, materials and textures are unchanged"
         expected = self._facts.guide_seconds
         saving = None if expected is None else max(0.0, expected - looked)
         self.decision = Decision(_NAME, f"used {samples} samples", reason, saving)

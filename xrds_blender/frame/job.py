@@ -14,7 +14,11 @@ from ..planning.plan import SAVINGS, Decision, Facts, Plan, decide, plain
 if TYPE_CHECKING:
     from xrds_core.arrays import Array
 
+ENGINE = "XRDS"
+"""Blender's name for the render engine."""
 SCALES = (1, 2, 4, 8)
+PRESETS = ("fast", "balanced", "paper")
+GUIDES = ("fast", "full")
 
 
 @dataclass(frozen=True)
@@ -59,16 +63,18 @@ class RenderJob:
         for name in ("samples", "guide_samples", "threads"):
             value = getattr(self, name)
             if value is not None and value < 1:
-                raise UsageError(f"{name} {value} is below 1")
+                raise UsageError(f"{name} is {value}; it must be at least 1")
         unknown = set(self.savings) - set(SAVINGS)
         if unknown:
             known = ", ".join(SAVINGS)
-            raise UsageError(f"no savings {sorted(unknown)}; there are {known}")
+            raise UsageError(
+                f"unknown savings {', '.join(sorted(unknown))}; choose from {known}"
+            )
         if self.denoiser is not None:
             # The class is frozen; a name is as good as the mode it names.
             object.__setattr__(self, "denoiser", _denoiser(self.denoiser))
         if self.time_budget is not None and not self.time_budget > 0:
-            raise UsageError(f"time budget {self.time_budget} s is not above 0")
+            raise UsageError(f"time budget {self.time_budget} s must be above 0")
         if self.time_budget is not None and self.quality is not None:
             raise UsageError("give a time budget or a quality, not both")
 
@@ -85,7 +91,9 @@ class RenderJob:
     def plan(self, facts: Facts | None = None) -> Plan:
         """What is decided for this job; plain ones rest on no facts."""
         if self.is_plain:
-            reason = "asked for" if self.plain else "scale 1 leaves nothing to enlarge"
+            reason = (
+                "as requested" if self.plain else "scale 1 leaves nothing to enlarge"
+            )
             return plain(reason)
         assert facts is not None
         return decide(facts, self.savings)
@@ -100,7 +108,7 @@ def _denoiser(name: str) -> Denoiser:
 
 
 class NetworkFailed(XRDSError):
-    """The network gave no picture; what Cycles rendered for it is kept.
+    """The network failed; what Cycles rendered for it is kept.
 
     `radiance` (h, w, 3), premultiplied, and `alpha` (h, w): low resolution, as
     `Picture.low_resolution`.

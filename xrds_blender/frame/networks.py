@@ -31,8 +31,8 @@ def load_upscaler(job: RenderJob) -> Upscaler:
 def _load(
     preset: str, scale: int, guides: str, device: str, weights: str | None
 ) -> Upscaler:
-    made: type[Upscaler] = torch_folder.load("upscaler").Upscaler
-    return made(preset, scale, guides, device, weights=weights)
+    upscaler_class: type[Upscaler] = torch_folder.load("upscaler").Upscaler
+    return upscaler_class(preset, scale, guides, device, weights=weights)
 
 
 def known_networks(job: RenderJob) -> list[Network]:

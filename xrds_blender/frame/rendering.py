@@ -12,10 +12,9 @@ from xrds_core.errors import Cancelled, SceneError, XRDSError
 
 from ..cycles.borrowed import Borrowed
 from ..cycles.passes import CyclesPasses
-from .job import Picture, RenderJob
+from .job import ENGINE, Picture, RenderJob
 from .layer import render_layer
 
-ENGINE = "XRDS"
 T = TypeVar("T")
 
 
@@ -96,7 +95,7 @@ def _run(scene: Any, work: Callable[[Any, Any], T], layer: str | None) -> T:
 
     global _task
     if _task is not None:
-        raise SceneError("a render is running already; wait for its end")
+        raise SceneError("a render is already running; wait until it has finished")
     if not hasattr(bpy.types.Scene, "xrds"):
         raise SceneError("the engine is not registered; call xrds_blender.register()")
     name = _layer_name(scene, layer)
@@ -115,7 +114,7 @@ def _run(scene: Any, work: Callable[[Any, Any], T], layer: str | None) -> T:
     if task.error is not None:
         raise task.error
     if not task.results:
-        raise XRDSError(f"scene {scene.name!r} was not rendered; see Blender's log")
+        raise XRDSError(f"scene {scene.name!r} was not rendered; see Blender's console")
     return task.results[0]  # type: ignore[no-any-return]
 
 
@@ -126,8 +125,8 @@ def _layer_name(scene: Any, wanted: str | None) -> str:
     if wanted is not None and wanted not in scene.view_layers:
         known = ", ".join(layer.name for layer in scene.view_layers)
         raise SceneError(
-            f"scene {scene.name!r} has no layer {wanted!r}; it has {known}"
+            f"scene {scene.name!r} has no view layer {wanted!r}; it has {known}"
         )
     if wanted is None and not names:
-        raise SceneError(f"scene {scene.name!r} renders no view layer; switch one on")
+        raise SceneError(f"scene {scene.name!r} uses no view layer; switch one on")
     return wanted or names[0]

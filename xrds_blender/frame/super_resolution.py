@@ -16,7 +16,7 @@ from ..cycles.pass_names import COMBINED
 from ..cycles.passes import Beauty, CyclesPasses, Guides
 from ..planning import plan
 from . import progress
-from .frame_facts import find_facts
+from .facts import find_facts
 from .guides import GuideSource
 from .job import NetworkFailed, Picture, RenderJob
 from .memory import peak_memory
@@ -55,14 +55,15 @@ def render_enlarged(
     Raises Cancelled when the user stops it, and NetworkFailed with the low-resolution
     picture in the result, enlarged.
     """
-    layer = depsgraph.view_layer_eval.name
     inputs = render_inputs(engine, depsgraph, job)
+    layer = depsgraph.view_layer_eval.name
+    enlargement = _Enlargement(engine, layer, job, upscaler, inputs)
     seconds = _seconds(inputs)
     with _Timed(seconds, "network"):
-        pictures = _run_network(engine, layer, job, upscaler, inputs)
+        pictures = enlargement.pictures()
     session.stop_if_cancelled(engine)
     with _Timed(seconds, "write"):
-        _write(engine, layer, job.scale, pictures, inputs.beauties)
+        enlargement.write(pictures)
     beauty, guides = inputs.first
     picture = next(iter(pictures.values()))
     return Picture(
@@ -89,8 +90,9 @@ def render_inputs(engine: Any, depsgraph: Any, job: RenderJob) -> Inputs:
         if not chosen.motion_blur:
             passes.hold_still()
         source = GuideSource(passes, depsgraph, job, chosen, facts)
-        order = _guides_first if job.guides == "full" else _light_first
-        beauties, guides, exposure = order(engine, job, chosen, passes, source)
+        renders = _Renders(engine, job, chosen, passes, source)
+        render = renders.guides_first if job.guides == "full" else renders.light_first
+        beauties, guides, exposure = render()
     first = passes.views[0]
     syncs = sorted(each.seconds["sync"] for each in (beauties[first], guides[first]))
     decisions = (*chosen.decisions, source.decision)
@@ -102,46 +104,41 @@ def render_inputs(engine: Any, depsgraph: Any, job: RenderJob) -> Inputs:
 _Rendered = tuple[dict[str, Beauty], dict[str, Guides], float | None]
 
 
-def _light_first(
-    engine: Any,
-    job: RenderJob,
-    chosen: plan.Plan,
-    passes: CyclesPasses,
-    source: GuideSource,
-) -> _Rendered:
-    progress.begin(engine, progress.LOW, 1)
-    beauties, exposure = _light(job, chosen, passes)
-    progress.begin(engine, progress.GUIDES, 2)
-    return beauties, source.guides(beauties), exposure
+@dataclass(frozen=True)
+class _Renders:
+    """Both Cycles renders of one layer, in either order."""
 
+    engine: Any
+    job: RenderJob
+    chosen: plan.Plan
+    passes: CyclesPasses
+    source: GuideSource
 
-def _guides_first(
-    engine: Any,
-    job: RenderJob,
-    chosen: plan.Plan,
-    passes: CyclesPasses,
-    source: GuideSource,
-) -> _Rendered:
-    """Fewer samples first: noise that matters, and one sync all the same."""
-    progress.begin(engine, progress.GUIDES, 1)
-    guides, data = source.guides(), passes.data_passes()
-    progress.begin(engine, progress.LOW, 2)
-    beauties, exposure = _light(job, chosen, passes)
-    passes.put_back(data)
-    return beauties, guides, exposure
+    def light_first(self) -> _Rendered:
+        progress.begin(self.engine, progress.LOW, 1)
+        beauties, exposure = self.light()
+        progress.begin(self.engine, progress.GUIDES, 2)
+        return beauties, self.source.guides(beauties), exposure
 
+    def guides_first(self) -> _Rendered:
+        """Fewer samples first: noise that matters, and one sync all the same."""
+        progress.begin(self.engine, progress.GUIDES, 1)
+        guides, data = self.source.guides(), self.passes.data_passes()
+        progress.begin(self.engine, progress.LOW, 2)
+        beauties, exposure = self.light()
+        self.passes.put_back(data)
+        return beauties, guides, exposure
 
-def _light(
-    job: RenderJob, chosen: plan.Plan, passes: CyclesPasses
-) -> tuple[dict[str, Beauty], float | None]:
-    beauties = passes.beauties(
-        job.scale,
-        job.samples,
-        denoise=chosen.denoise,
-        seed=job.seed,
-        denoiser=job.denoiser,
-    )
-    return beauties, job.exposure or passes.border_exposure()
+    def light(self) -> tuple[dict[str, Beauty], float | None]:
+        """The low-resolution pictures by view, and the exposure if it is known."""
+        beauties = self.passes.beauties(
+            self.job.scale,
+            self.job.samples,
+            denoise=self.chosen.denoise,
+            seed=self.job.seed,
+            denoiser=self.job.denoiser,
+        )
+        return beauties, self.job.exposure or self.passes.border_exposure()
 
 
 def _seconds(inputs: Inputs) -> dict[str, float]:
@@ -166,100 +163,96 @@ class _Timed:
         self._seconds[self._stage] = time.perf_counter() - self._start
 
 
-def _run_network(
-    engine: Any, layer: str, job: RenderJob, upscaler: Upscaler, inputs: Inputs
-) -> dict[str, Array]:
-    """Pictures by view, (H, W, 4); NetworkFailed leaves enlarged ones in the result."""
-    progress.begin(engine, progress.NETWORK, 3)
-    try:
-        return {
-            view: _upscale(engine, upscaler, job, inputs, view)
-            for view in inputs.beauties
-        }
-    except (OutOfMemory, RuntimeError, MemoryError) as error:  # as torch raises them
-        bilinear = _bilinear_pictures(job.scale, inputs)
-        _write(engine, layer, job.scale, bilinear, inputs.beauties)
-        reason = str(error).partition("\n")[0] or "out of memory"
-        low, _ = inputs.first
-        raise NetworkFailed(
-            f"the network failed ({reason}); the picture is the low-resolution one",
-            low.radiance,
-            low.alpha,
-        ) from error
+@dataclass(frozen=True)
+class _Enlargement:
+    """The network's part of a render, from what Cycles rendered of one layer."""
 
+    engine: Any
+    layer: str
+    job: RenderJob
+    upscaler: Upscaler
+    inputs: Inputs
 
-def _upscale(
-    engine: Any, upscaler: Upscaler, job: RenderJob, inputs: Inputs, view: str
-) -> Array:
-    """The region's radiance and alpha, (H, W, 4)."""
-    beauty, guides = inputs.beauties[view], inputs.guides[view]
-    rows, columns = beauty.offset
-    matrix = to_rec709(working_space())
+    def pictures(self) -> dict[str, Array]:
+        """By view, (H, W, 4); NetworkFailed leaves enlarged ones in the result."""
+        progress.begin(self.engine, progress.NETWORK, 3)
+        try:
+            return {view: self.upscaled(view) for view in self.inputs.beauties}
+        except (OutOfMemory, RuntimeError, MemoryError) as error:  # as torch raises
+            self.write(self.bilinear_pictures())
+            reason = str(error).partition("\n")[0] or "out of memory"
+            low, _ = self.inputs.first
+            raise NetworkFailed(
+                f"the network failed ({reason}); the picture is the low-resolution "
+                "render",
+                low.radiance,
+                low.alpha,
+            ) from error
 
-    def placed(guide: Array | None) -> Array | None:
-        """Guides start where the first low-resolution pixel does."""
-        if guide is None:
-            return None
-        margin = ((rows, 0), (columns, 0), *[(0, 0)] * (guide.ndim - 2))
-        return np.pad(guide, margin, mode="edge")
+    def upscaled(self, view: str) -> Array:
+        """The region's radiance and alpha, (H, W, 4)."""
+        beauty, guides = self.inputs.beauties[view], self.inputs.guides[view]
+        rows, columns = beauty.offset
+        matrix = to_rec709(working_space())
 
-    def seen(colour: Array | None) -> Array | None:
-        """In the network's colour space."""
-        if matrix is None or colour is None:
-            return colour
-        return converted(colour, matrix)
+        def placed(guide: Array | None) -> Array | None:
+            """Guides start where the first low-resolution pixel does."""
+            if guide is None:
+                return None
+            margin = ((rows, 0), (columns, 0), *[(0, 0)] * (guide.ndim - 2))
+            return np.pad(guide, margin, mode="edge")
 
-    def report(done: float) -> bool:
-        engine.update_stats("XRDS", f"Network {done:.0%}")
-        engine.update_progress(done)
-        return not session.is_stopped(engine)
+        def seen(colour: Array | None) -> Array | None:
+            """In the network's colour space."""
+            if matrix is None or colour is None:
+                return colour
+            return converted(colour, matrix)
 
-    upscaled: Upscaled = upscaler(
-        seen(np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1)),
-        placed(seen(guides.albedo)),
-        placed(guides.normal),
-        noisy=seen(beauty.noisy),
-        guide_radiance=placed(seen(guides.radiance)),
-        guide_alpha=placed(guides.alpha),
-        guide_samples=guides.samples,
-        exposure=inputs.exposure,
-        memory_limit=job.memory_limit,
-        progress=report,
-        skip_idle=inputs.skip_idle,
-    )
-    region = upscaled.radiance[rows:, columns:]
-    return region if matrix is None else converted(region, np.linalg.inv(matrix))
-
-
-def _write(
-    engine: Any,
-    layer_name: str,
-    scale: int,
-    pictures: dict[str, Array],
-    beauties: dict[str, Beauty],
-) -> None:
-    """Put the pictures and the enlarged light passes into the engine's result."""
-    result = engine.get_result()
-    layer = result.layers[layer_name]
-    for view, picture in pictures.items():
-        session.write_pass(layer, COMBINED, view, picture)
-        for name, low in beauties[view].others.items():
-            large = _bilinear(low, scale, beauties[view].offset, picture.shape)
-            session.write_pass(layer, name, view, large)
-    engine.update_result(result)
-
-
-def _bilinear_pictures(scale: int, inputs: Inputs) -> dict[str, Array]:
-    """By view, the region's radiance and alpha without a network, (H, W, 4)."""
-    return {
-        view: _bilinear(
-            np.dstack((low.radiance, low.alpha)),
-            scale,
-            low.offset,
-            inputs.guides[view].alpha.shape,
+        upscaled: Upscaled = self.upscaler(
+            seen(np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1)),
+            placed(seen(guides.albedo)),
+            placed(guides.normal),
+            noisy=seen(beauty.noisy),
+            guide_radiance=placed(seen(guides.radiance)),
+            guide_alpha=placed(guides.alpha),
+            guide_samples=guides.samples,
+            exposure=self.inputs.exposure,
+            memory_limit=self.job.memory_limit,
+            progress=self.report,
+            skip_idle=self.inputs.skip_idle,
         )
-        for view, low in inputs.beauties.items()
-    }
+        region = upscaled.radiance[rows:, columns:]
+        return region if matrix is None else converted(region, np.linalg.inv(matrix))
+
+    def report(self, done: float) -> bool:
+        """Show the fraction done; False once the user has stopped the render."""
+        self.engine.update_stats("XRDS", f"Network {done:.0%}")
+        self.engine.update_progress(done)
+        return not session.is_stopped(self.engine)
+
+    def bilinear_pictures(self) -> dict[str, Array]:
+        """By view, the region's radiance and alpha without a network, (H, W, 4)."""
+        return {
+            view: _bilinear(
+                np.dstack((low.radiance, low.alpha)),
+                self.job.scale,
+                low.offset,
+                self.inputs.guides[view].alpha.shape,
+            )
+            for view, low in self.inputs.beauties.items()
+        }
+
+    def write(self, pictures: dict[str, Array]) -> None:
+        """Put the pictures and the enlarged light passes into the engine's result."""
+        result = self.engine.get_result()
+        layer = result.layers[self.layer]
+        for view, picture in pictures.items():
+            session.write_pass(layer, COMBINED, view, picture)
+            beauty, scale = self.inputs.beauties[view], self.job.scale
+            for name, low in beauty.others.items():
+                large = _bilinear(low, scale, beauty.offset, picture.shape)
+                session.write_pass(layer, name, view, large)
+        self.engine.update_result(result)
 
 
 def _bilinear(

@@ -35,20 +35,22 @@ def inspect(folder: Path) -> Torch:
     """
     package = folder / "torch"
     if not (package / "version.py").is_file():
-        raise UsageError(f"{folder} holds no torch; fill it with {install(folder)}")
-    fitting = f"_C{EXTENSION_SUFFIXES[0]}"
-    found = sorted(path.name for path in package.glob("_C.*") if _is_binary(path))
-    if fitting not in found:
         raise UsageError(
-            f"torch in {folder} is built as {', '.join(found) or 'nothing'}, this "
-            f"Blender needs {fitting}; fill a folder with {install(folder)}"
+            f"{folder} holds no PyTorch; install it with {install(folder)}"
         )
-    told = _constants(package / "version.py")
+    fitting = f"_C{EXTENSION_SUFFIXES[0]}"
+    builds = sorted(path.name for path in package.glob("_C.*") if _is_binary(path))
+    if fitting not in builds:
+        raise UsageError(
+            f"PyTorch in {folder} is built for {', '.join(builds) or 'nothing'}, but "
+            f"this Blender needs {fitting}; install one with {install(folder)}"
+        )
+    constants = _constants(package / "version.py")
     build = "CPU"
     for key, name in (("cuda", "CUDA"), ("hip", "ROCm"), ("xpu", "XPU")):
-        if told.get(key):
-            build = f"{name} {told[key]}"
-    return Torch(str(told.get("__version__", "of unknown version")), build, folder)
+        if constants.get(key):
+            build = f"{name} {constants[key]}"
+    return Torch(str(constants.get("__version__", "of unknown version")), build, folder)
 
 
 def _is_binary(path: Path) -> bool:
@@ -57,7 +59,7 @@ def _is_binary(path: Path) -> bool:
 
 def _constants(path: Path) -> dict[str, object]:
     """The constants that a module of plain assignments sets, without running it."""
-    told = {}
+    constants = {}
     for node in ast.parse(path.read_text("utf-8")).body:
         if isinstance(node, ast.AnnAssign):
             targets, value = [node.target], node.value
@@ -66,8 +68,8 @@ def _constants(path: Path) -> dict[str, object]:
         else:
             continue
         if isinstance(value, ast.Constant):
-            told |= {t.id: value.value for t in targets if isinstance(t, ast.Name)}
-    return told
+            constants |= {t.id: value.value for t in targets if isinstance(t, ast.Name)}
+    return constants
 
 
 def install(folder: Path) -> str:
@@ -115,8 +117,8 @@ def available() -> Torch:
     for name in NEEDED:
         if _where(name) is None:
             raise UsageError(
-                f"{name} is not there: XRDS can only render plain. Install the "
-                "extension with PyTorch, or choose a folder that holds it"
+                f"{name} is not installed, so XRDS renders plain only; install the "
+                "extension that includes PyTorch, or choose a folder that holds it"
             )
     assert folder is not None
     return inspect(folder)
@@ -129,10 +131,10 @@ def is_there() -> bool:
 
 def _where(name: str) -> Path | None:
     """The folder that a package would be imported from; nothing is imported."""
-    found = PathFinder.find_spec(name)
-    if found is None or not found.origin:
+    spec = PathFinder.find_spec(name)
+    if spec is None or not spec.origin:
         return None
-    return Path(found.origin).parents[1]
+    return Path(spec.origin).parents[1]
 
 
 def load(module: str) -> Any:
@@ -143,8 +145,8 @@ def load(module: str) -> Any:
     try:
         return importlib.import_module(f"xrds_core.{module}")
     except Exception as error:  # OSError, AttributeError: a broken one raises all
-        told = " ".join(str(error).split()) or type(error).__name__
+        reason = " ".join(str(error).split()) or type(error).__name__
         raise XRDSError(
-            f"XRDS needs PyTorch, which does not load here ({told}): the add-on's "
-            "preferences tell where from; or render plain"
+            f"XRDS needs PyTorch, which cannot be loaded ({reason}); check the PyTorch "
+            "folder in the add-on's preferences, or render plain"
         ) from error

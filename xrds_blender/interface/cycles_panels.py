@@ -7,25 +7,25 @@ from typing import Any
 
 import bpy
 
-from .operators import ENGINE
+from ..frame.job import ENGINE
 
 
 def cycles_classes(base: Any = None) -> Iterator[Any]:
     """All registered panels and menus that name Cycles."""
     for root in (base,) if base else (bpy.types.Panel, bpy.types.Menu):
-        for found in root.__subclasses__():
-            if "CYCLES" in getattr(found, "COMPAT_ENGINES", ()):
-                yield found
-            yield from cycles_classes(found)
+        for panel in root.__subclasses__():
+            if "CYCLES" in getattr(panel, "COMPAT_ENGINES", ()):
+                yield panel
+            yield from cycles_classes(panel)
 
 
 def register() -> None:
     """Show them under XRDS."""
-    for found in cycles_classes():
-        found.COMPAT_ENGINES.add(ENGINE)
+    for panel in cycles_classes():
+        panel.COMPAT_ENGINES.add(ENGINE)
 
 
 def unregister() -> None:
     """Take that back."""
-    for found in cycles_classes():
-        found.COMPAT_ENGINES.discard(ENGINE)
+    for panel in cycles_classes():
+        panel.COMPAT_ENGINES.discard(ENGINE)

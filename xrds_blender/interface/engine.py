@@ -8,13 +8,14 @@ from typing import Any
 import bpy
 
 from ..cycles import session
+from ..frame.job import ENGINE
 from . import write_lock
 
 
 class XRDSRender(bpy.types.RenderEngine):
     """Cycles at low resolution, enlarged under full-resolution guides."""
 
-    bl_idname = "XRDS"
+    bl_idname = ENGINE
     bl_label = "XRDS"
     bl_use_preview = True
     bl_use_eevee_viewport = True

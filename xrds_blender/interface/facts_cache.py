@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..frame.frame_facts import join_facts
+from ..frame.facts import join_facts
 from ..frame.job import RenderJob
 from ..planning.facts import Facts, SceneFacts
-from ..scene.scene_facts import scene_facts
+from ..scene.facts import scene_facts
 
 
-class Glance:
-    """Looks at a scene anew only after a change."""
+class FactsCache:
+    """Reads a scene again only after a change."""
 
     def __init__(self) -> None:
         self._known: dict[str, SceneFacts] = {}

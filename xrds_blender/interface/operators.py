@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import bpy
 
-ENGINE = "XRDS"
+from ..frame.job import ENGINE
+
 LOOK_AGAIN = 0.25  # seconds between two looks at a running render job
 
 

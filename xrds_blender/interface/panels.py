@@ -11,13 +11,13 @@ from bpy.app.handlers import persistent
 
 from ..cycles import session
 from ..frame import progress, torch_folder
+from ..frame.job import ENGINE
 from ..planning import forecast
 from . import cycles_panels, presets, status_bar, support, translations
-from .operators import ENGINE
 from .translations import CONTEXT
 
 if TYPE_CHECKING:
-    from .glance import Glance
+    from .facts_cache import FactsCache
 
 CHARACTER = 6.5  # pixels that a letter takes on the average, at an interface scale of 1
 STAGE_NAMES = {
@@ -156,11 +156,11 @@ def _row(layout: Any, name: str, value: str) -> None:
 
 def _paragraph(layout: Any, icon: str, text: str, width: float) -> None:
     """Lines as long as the panel is wide: a label alone would be cut off."""
-    told = bpy.app.translations.pgettext_iface(text)
+    translated = bpy.app.translations.pgettext_iface(text)
     letters = max(int((width - 60) / CHARACTER), 20)
     column = layout.column(align=True)
     column.scale_y = 0.8
-    for line in textwrap.wrap(told, letters):
+    for line in textwrap.wrap(translated, letters):
         column.label(text=line, icon=icon, translate=False)
         icon = "BLANK1"
 
@@ -169,24 +169,24 @@ def remarks(scene: bpy.types.Scene) -> list[tuple[str, str]]:
     """Icon and sentence of all that is missing or otherwise than under Cycles."""
     if scene.xrds.plain:
         return [("INFO", "Plain: one full-resolution Cycles render, no network")]
-    told = []
+    lines = []
     if not torch_folder.is_there():
-        told.append(("ERROR", "PyTorch is missing: see the add-on's preferences"))
+        lines.append(("ERROR", "PyTorch is missing: see the add-on's preferences"))
     if not session.has_denoiser():
         sentence = (
             "This Blender has no denoiser: the network gets the noisy picture. "
-            "Take more samples"
+            "Use more samples"
         )
-        told.append(("INFO", sentence))
-    return told + [("INFO", sentence) for sentence in support.notes(scene)]
+        lines.append(("INFO", sentence))
+    return lines + [("INFO", sentence) for sentence in support.notes(scene)]
 
 
 @lru_cache(maxsize=1)
-def _glance() -> Glance:
+def _facts_cache() -> FactsCache:
     """Made when a panel is first drawn: Blender starts faster without its modules."""
-    from .glance import Glance
+    from .facts_cache import FactsCache
 
-    return Glance()
+    return FactsCache()
 
 
 def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
@@ -199,7 +199,7 @@ def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
         return [("Settings", "chosen when rendering")]
     if job.is_plain:
         return []
-    facts = _glance().facts(scene, bpy.context.view_layer, job)
+    facts = _facts_cache().facts(scene, bpy.context.view_layer, job)
     chosen = job.plan(facts)
     width, height = forecast.low_size(facts.width, facts.height, job.scale)
     light, guide = forecast.rays(scene.cycles.samples, chosen.guide_samples, job.scale)
@@ -207,14 +207,14 @@ def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
     bytes_taken = forecast.memory(
         facts.width, facts.height, job.preset, job.scale, limit
     )
-    told = [
+    rows = [
         ("Small Render", f"{width} × {height}, {scene.cycles.samples} spp"),
         ("Guides", f"{facts.width} × {facts.height}, {chosen.guide_samples} spp"),
         ("Rays per Pixel", f"{light:.3g} + {guide:.3g}"),
         ("Memory", f"≤ {_amount(bytes_taken)}"),
     ]
     decisions = [d for d in chosen.decisions if d.decision != "low frame"]
-    return told + [(d.decision.capitalize(), d.value) for d in decisions]
+    return rows + [(d.decision.capitalize(), d.value) for d in decisions]
 
 
 def _amount(size: float) -> str:
@@ -233,8 +233,8 @@ CLASSES = (
 
 @persistent
 def _forget(*_: object) -> None:
-    if _glance.cache_info().currsize:
-        _glance().forget()
+    if _facts_cache.cache_info().currsize:
+        _facts_cache().forget()
 
 
 def _changes() -> tuple[Any, ...]:

@@ -16,9 +16,14 @@ from .self_test import XRDS_OT_self_test
 
 # Numbers stay with their devices: a preference holds the number.
 _DEVICES = [
-    ("auto", "Automatic", "A graphics card if PyTorch finds one", 0),
-    ("cpu", "Processor", "The processor, whatever else there is", 1),
-    ("mps", "Metal", "The graphics part of an Apple chip", 2),
+    (
+        "auto",
+        "Automatic",
+        "A graphics card if PyTorch finds one",
+        0,
+    ),
+    ("cpu", "Processor", "Always the processor", 1),
+    ("mps", "Metal", "The GPU of an Apple chip", 2),
 ]
 _MOST_CARDS = 16
 _cards: list[tuple[str, str, str, int]] = []
@@ -57,7 +62,7 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
     )
     threads: bpy.props.IntProperty(
         name="Threads",
-        description="Threads of the network on the processor; 0 takes all cores",
+        description="Processor threads for the network; 0 uses all cores",
         default=0,
         min=0,
         max=1024,
@@ -78,7 +83,7 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
     torch: bpy.props.StringProperty(
         name="PyTorch Folder",
         description="Folder with a PyTorch of your own, for a graphics card or a "
-        "pipeline; empty takes the one that came with XRDS",
+        "pipeline; leave empty for the one that came with XRDS",
         subtype="DIR_PATH",
         default="",
         update=_apply_torch,
@@ -113,7 +118,7 @@ def torch_status(folder: Path | None = None) -> list[tuple[str, str]]:
     )
     loaded = torch_folder.loaded()
     if folder is not None and loaded is not None and loaded != folder:
-        lines.append(("ERROR", "Another PyTorch is in use; restart Blender to change"))
+        lines.append(("ERROR", "Another PyTorch is in use; restart Blender to switch"))
     return lines
 
 

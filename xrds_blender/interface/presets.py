@@ -45,13 +45,13 @@ CLASSES = (XRDS_PT_presets, XRDS_OT_preset_add)
 
 def register() -> None:
     """Register the menu and the presets that come with XRDS."""
-    for found in CLASSES:
-        bpy.utils.register_class(found)
+    for item in CLASSES:
+        bpy.utils.register_class(item)
     bpy.utils.register_preset_path(str(SHIPPED))
 
 
 def unregister() -> None:
     """Take them back."""
     bpy.utils.unregister_preset_path(str(SHIPPED))
-    for found in reversed(CLASSES):
-        bpy.utils.unregister_class(found)
+    for item in reversed(CLASSES):
+        bpy.utils.unregister_class(item)

@@ -17,13 +17,13 @@ _SCALES = [
     ("8", "8×", "One pixel in 64 is path traced"),
 ]
 _PRESETS = [
-    ("fast", "Fast", "Quickest network"),
-    ("balanced", "Balanced", "Larger network, better at gloss and fine detail"),
-    ("paper", "Paper", "The network of the paper; far slower"),
+    ("fast", "Fast", "The fastest network"),
+    ("balanced", "Balanced", "A larger network, better at gloss and fine detail"),
+    ("paper", "Paper", "The network from the paper; far slower"),
 ]
 _GUIDES = [
     ("fast", "Fast", "Albedo and normal, rendered without diffuse light"),
-    ("full", "Full", "Also a noisy picture of full size; dearer, sharper light"),
+    ("full", "Full", "Also a noisy full-size picture; slower, but sharper light"),
 ]
 
 
@@ -46,7 +46,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Quality",
         translation_context=CONTEXT,
         items=_PRESETS,
-        description="Which network enlarges",
+        description="The network that enlarges the picture",
     )
     guides: EnumProperty(
         name="Guides",
@@ -65,7 +65,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
     use_exposure: BoolProperty(
         name="Fixed Exposure",
         translation_context=CONTEXT,
-        description="Hold the network's exposure, for animations and border renders",
+        description="Fix the network's exposure, for animations and border renders",
     )
     exposure: FloatProperty(
         name="Exposure",
@@ -94,7 +94,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         min=0.1,
         soft_max=3600.0,
         subtype="TIME_ABSOLUTE",
-        description="Seconds that a frame may take; least error expected within them",
+        description="Seconds that a frame may take; least expected error wins",
     )
 
 

@@ -87,18 +87,18 @@ def _lines(picture: Any) -> list[str]:
 @contextmanager
 def _scene() -> Iterator[Any]:
     """A checkered ball over a floor, under a lamp; gone on exit."""
-    made: list[tuple[Any, Any]] = []
+    items: list[tuple[Any, Any]] = []
 
     def new(kind: str, *words: Any) -> Any:
         collection = getattr(bpy.data, kind)
         item = collection.new("XRDS Test", *words)
-        made.append((collection, item))
+        items.append((collection, item))
         return item
 
     try:
         yield _build(new)
     finally:
-        for collection, item in reversed(made):
+        for collection, item in reversed(items):
             collection.remove(item)
 
 

@@ -57,7 +57,7 @@ _NOTES: tuple[tuple[Callable[[Any], bool], str], ...] = (
     ),
     (
         _has_time_limit,
-        "The time limit holds for the small render; guides and network come on top",
+        "The time limit covers the small render only; guides and network add to it",
     ),
     (
         _is_panorama,

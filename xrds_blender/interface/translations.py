@@ -28,8 +28,6 @@ _WORDS = {
     "Guide Samples": ("Samples darin", "ガイドサンプル数"),
     "Full": ("Voll", "フル"),
     "Advanced": ("Erweitert", "詳細設定"),
-    "Device": ("Gerät", "デバイス"),
-    "Automatic": ("Automatisch", "自動"),
     "Fixed Exposure": ("Feste Belichtung", "露出を固定"),
     "Last Render": ("Letztes Bild", "前回のレンダー"),
     "Scene": ("Szene", "シーン"),
@@ -41,11 +39,11 @@ _WORDS = {
 
 def register() -> None:
     """Make the words known to Blender."""
-    told = {
-        language: {(CONTEXT, word): texts[index] for word, texts in _WORDS.items()}
+    texts = {
+        language: {(CONTEXT, word): words[index] for word, words in _WORDS.items()}
         for index, language in enumerate(_LANGUAGES)
     }
-    bpy.app.translations.register(__name__, told)
+    bpy.app.translations.register(__name__, texts)
 
 
 def unregister() -> None:

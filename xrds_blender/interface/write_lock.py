@@ -17,6 +17,8 @@ from typing import Any
 
 import bpy
 
+from ..frame.job import ENGINE
+
 _PATIENT = 5.0  # seconds; far longer than any drawing takes
 _usual: float | None = None
 
@@ -24,7 +26,7 @@ _usual: float | None = None
 @bpy.app.handlers.persistent
 def _begin(scene: Any, *_: Any) -> None:
     global _usual
-    if scene is not None and scene.render.engine == "XRDS" and _usual is None:
+    if scene is not None and scene.render.engine == ENGINE and _usual is None:
         _usual = sys.getswitchinterval()
         sys.setswitchinterval(_PATIENT)
 

@@ -222,11 +222,11 @@ class Picked:
         name, unit = ("time budget", "s") if in_seconds else ("quality", "dB")
         reason = f"{self.psnr:.1f} dB expected in {self.seconds:.1f} s"
         if not self.fits and in_seconds:
-            reason = f"{goal:g} s is too little for this scene; the fastest: {reason}"
+            reason = f"{goal:g} s is too short for this scene; the fastest: {reason}"
         elif not self.fits:
             reason = f"{goal:g} dB is beyond what was measured; the best: {reason}"
         elif self.rival is None:
-            reason += f", the only kind for {goal:g} {unit}"
+            reason += f", the only method for {goal:g} {unit}"
         else:
             other = self.rival
             reason += (
@@ -256,13 +256,13 @@ def reach(
     psnr: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
 ) -> Picked:
     """The fastest choice of at least `psnr` dB; the best there is where none has it."""
-    found = []
+    picks = []
     for family, curve in errors.families(networks):
         samples = _least_samples(curve, psnr)
-        found.append(_picked(family, samples, costs, curve))
-    enough = [p for p in found if p.psnr >= psnr]
+        picks.append(_picked(family, samples, costs, curve))
+    enough = [p for p in picks if p.psnr >= psnr]
     if not enough:
-        best = max(found, key=_merit)
+        best = max(picks, key=_merit)
         return Picked(best.choice, best.seconds, best.psnr, None, fits=False)
     best = min(enough, key=lambda p: p.seconds)
     rivals = [p for p in enough if _kind(p.choice) != _kind(best.choice)]
@@ -280,12 +280,12 @@ def _fitting(
 
 
 def _fastest(costs: Costs, errors: ErrorModel, networks: Sequence[Network]) -> Picked:
-    found = [
+    picks = [
         _picked(family, curve.samples[0], costs, curve)
         for family, curve in errors.families(networks)
     ]
-    least = min(p.seconds for p in found)
-    best = max((p for p in found if p.seconds <= least * ALIKE), key=_merit)
+    least = min(p.seconds for p in picks)
+    best = max((p for p in picks if p.seconds <= least * ALIKE), key=_merit)
     return Picked(best.choice, best.seconds, best.psnr, None, fits=False)
 
 

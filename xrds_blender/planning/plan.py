@@ -11,6 +11,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from .facts import Facts, SceneFacts
+from .forecast import low_size
 
 __all__ = [
     "SAVINGS",
@@ -75,7 +76,7 @@ class GuideRender:
 
 @dataclass(frozen=True)
 class Plan:
-    """What was decided: the choices, and what to tell of them."""
+    """What was decided: the choices, and the reasons that are shown."""
 
     render_guides: bool
     guides: GuideRender
@@ -88,8 +89,8 @@ class Plan:
 
 def plain(reason: str) -> Plan:
     """The plan where Cycles renders alone, as the file has it."""
-    told = (Decision("method", "plain", reason),)
-    return Plan(False, GuideRender(), 0, True, True, False, told)
+    decisions = (Decision("method", "plain", reason),)
+    return Plan(False, GuideRender(), 0, True, True, False, decisions)
 
 
 def savings_but(*names: str) -> tuple[str, ...]:
@@ -109,9 +110,9 @@ def decide(facts: Facts, savings: Collection[str] = SAVINGS) -> Plan:
     lights, of_lights = _lights(facts, "guide lights" in savings)
     blurred, of_blur = _motion_blur(facts, "motion blur" in savings)
     idle, of_network = _idle("network" in savings)
-    told = (of_denoiser, of_guides)
+    decisions = (of_denoiser, of_guides)
     if rendered:
-        told += (of_samples, of_bounces, of_lights)
+        decisions += (of_samples, of_bounces, of_lights)
     return Plan(
         render_guides=rendered,
         guides=replace(lights, bounces=bounces),
@@ -119,7 +120,7 @@ def decide(facts: Facts, savings: Collection[str] = SAVINGS) -> Plan:
         denoise=denoise,
         motion_blur=blurred,
         skip_idle=idle,
-        decisions=(*told, *of_blur, of_network, _low_frame(facts)),
+        decisions=(*decisions, *of_blur, of_network, _low_frame(facts)),
     )
 
 
@@ -153,7 +154,7 @@ def _render_guides(facts: Facts, allowed: bool) -> tuple[bool, Decision]:
     seen = scene.surfaces or scene.volumes or scene.world == "varies"
     seen = seen or bool(scene.passes)  # they come with the guides
     if facts.guides == "full":
-        reason = "albedo, normal and radiance are asked for"
+        reason = "albedo, normal and radiance are requested"
         return True, Decision(name, "rendered", reason)
     if seen or not allowed:
         reason = "albedo and normal carry what the low resolution cannot"
@@ -166,14 +167,14 @@ def _samples(facts: Facts, allowed: bool) -> tuple[int, Decision]:
     asked, name = facts.guide_samples, "guide samples"
     masks = any(each.startswith("cryptomatte") for each in facts.scene.passes)
     if masks and asked < CRYPTOMATTE_SAMPLES:
-        reason = f"Cryptomatte is on: its masks need more than the {asked} asked for"
-        told = Decision(name, str(CRYPTOMATTE_SAMPLES), reason)
-        return CRYPTOMATTE_SAMPLES, told
+        reason = f"Cryptomatte is on: its masks need more than the {asked} requested"
+        decision = Decision(name, str(CRYPTOMATTE_SAMPLES), reason)
+        return CRYPTOMATTE_SAMPLES, decision
     fine = _fine_detail(facts.scene)
     if facts.guides == "full":
-        return asked, Decision(name, str(asked), "full guides hold light, so noise")
+        return asked, Decision(name, str(asked), "full guides hold light, and so noise")
     if fine or masks or not allowed or asked <= CRISP_SAMPLES:
-        reason = f"as asked for; the scene has {fine}" if fine else "as asked for"
+        reason = f"as requested; the scene has {fine}" if fine else "as requested"
         return asked, Decision(name, str(asked), reason)
     saving = _part(facts, 1 - CRISP_SAMPLES / asked)
     reason = "even colours on sharp surfaces: only edges need samples"
@@ -182,7 +183,7 @@ def _samples(facts: Facts, allowed: bool) -> tuple[int, Decision]:
 
 def _fine_detail(scene: SceneFacts) -> str:
     """What makes albedo and normal vary within a pixel, or noisy; empty if nothing."""
-    found = {
+    causes = {
         "textures": scene.textures or scene.world == "varies",
         "bump": scene.bump,
         "displacement": scene.displacement,
@@ -193,7 +194,7 @@ def _fine_detail(scene: SceneFacts) -> str:
         "depth of field": scene.depth_of_field,
         "motion blur": scene.motion_blur and scene.moving,
     }
-    return ", ".join(name for name, there in found.items() if there)
+    return ", ".join(name for name, present in causes.items() if present)
 
 
 def _bounces(facts: Facts, allowed: bool) -> tuple[int, Decision]:
@@ -206,7 +207,7 @@ def _bounces(facts: Facts, allowed: bool) -> tuple[int, Decision]:
         bounces = guide_bounces(facts.max_bounces)
         reason = "albedo and normal follow mirrors and glass, never diffuse light"
         return bounces, Decision(name, f"{bounces}, none diffuse", reason)
-    reason = "no mirror, glass, alpha or volume: the first surface tells all"
+    reason = "no mirror, glass, alpha or volume: the first surface decides"
     return 0, Decision(name, "0", reason, _part(facts, BOUNCE_SHARE))
 
 
@@ -221,7 +222,7 @@ def _lights(facts: Facts, allowed: bool) -> tuple[GuideRender, Decision]:
     if lamps:
         reason = "lamps stay, without shadows: mirrors, glass or volumes may show them"
         return dark, Decision(name, "lamps alone", reason, saving)
-    reason = "light does not change albedo or normal; what shines is seen all the same"
+    reason = "light does not change albedo or normal; what shines stays visible"
     return dark, Decision(name, "none sampled", reason, saving)
 
 
@@ -230,27 +231,27 @@ def _motion_blur(facts: Facts, allowed: bool) -> tuple[bool, tuple[Decision, ...
     if not scene.motion_blur:
         return False, ()
     if scene.moving or not allowed:
-        told = ", ".join(scene.moving) or "not looked for"
-        return True, (Decision(name, "on", f"moving: {told}"),)
-    return False, (Decision(name, "skipped", "asked for, but nothing moves"),)
+        moving = ", ".join(scene.moving) or "not examined"
+        return True, (Decision(name, "on", f"moving: {moving}"),)
+    return False, (Decision(name, "skipped", "requested, but nothing moves"),)
 
 
 def _idle(allowed: bool) -> tuple[bool, Decision]:
     name = "network"
     if not allowed:
-        return False, Decision(name, "whole picture", "as asked for")
-    reason = "where nothing is seen but an even background the base is the picture"
+        return False, Decision(name, "whole picture", "as requested")
+    reason = "an even background needs no network: the base is the picture"
     return True, Decision(name, "without empty parts", reason)
 
 
 def _low_frame(facts: Facts) -> Decision:
-    width, height = -(-facts.width // facts.scale), -(-facts.height // facts.scale)
+    width, height = low_size(facts.width, facts.height, facts.scale)
     size = f"{width}x{height}"
     if not facts.exact_camera:
         reason = "a panorama cannot be widened: resampled by normalised coordinates"
         return Decision("low frame", size, reason)
     covered = f"{width * facts.scale}x{height * facts.scale}"
-    reason = f"covers {covered} of the {facts.width}x{facts.height} frame's pixels"
+    reason = f"covers {covered} pixels of a {facts.width}x{facts.height} frame"
     return Decision("low frame", size, reason)
 
 

@@ -116,10 +116,10 @@ _FIXED = {
 
 def of_tree(tree: Any) -> Closures:
     """What the nodes that reach the tree's output can do."""
-    found = Closures()
+    closures = Closures()
     for node in reachable(tree):
-        found |= of_node(node)
-    return found
+        closures |= of_node(node)
+    return closures
 
 
 def reachable(tree: Any) -> Iterator[Any]:

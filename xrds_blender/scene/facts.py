@@ -41,13 +41,13 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
     scene, ids = depsgraph.scene_eval, list(depsgraph.ids)
     objects = [item for item in ids if isinstance(item, bpy.types.Object)]
     materials = [item for item in ids if isinstance(item, bpy.types.Material)]
-    found = {item.name: of_material(item) for item in materials}
+    by_material = {item.name: of_material(item) for item in materials}
     solid = [item for item in objects if item.type in _SURFACES]
     surface = Closures(scatters=bool(solid))  # what has no material is white
-    for closures in found.values():
+    for closures in by_material.values():
         surface |= closures
-    if solid and found and not _bare(solid):
-        surface = _together(found.values())
+    if solid and by_material and not _bare(solid):
+        surface = _together(by_material.values())
     kind, air = _world(scene.world)
     lamps = [item for item in objects if item.type == "LIGHT"]
     return SceneFacts(
@@ -56,7 +56,9 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
         smooth=surface.smooth,
         transparent=surface.transparent,
         volumes=surface.volume or air.volume or any(o.type == "VOLUME" for o in solid),
-        emitters=tuple(sorted(name for name, each in found.items() if each.emits)),
+        emitters=tuple(
+            sorted(name for name, each in by_material.items() if each.emits)
+        ),
         lamps=len(lamps),
         seen_lamps=sum(_is_seen(lamp, surface.smooth) for lamp in lamps),
         world=kind,
@@ -103,9 +105,9 @@ def requested_passes(layer: Any) -> tuple[str, ...]:
     return tuple(n for n in names if n not in {"combined", "cryptomatte_accurate"})
 
 
-def _together(found: Iterable[Closures]) -> Closures:
+def _together(all_closures: Iterable[Closures]) -> Closures:
     merged = Closures()
-    for closures in found:
+    for closures in all_closures:
         merged |= closures
     return merged
 
@@ -121,10 +123,10 @@ def _world(world: Any) -> tuple[str, Closures]:
         return "none", Closures()
     if not _uses_nodes(world):
         return ("constant" if any(world.color) else "none"), Closures()
-    found = of_tree(world.node_tree)
-    if found.varies or any(n.type == "LIGHT_PATH" for n in reachable(world.node_tree)):
-        return "varies", found
-    return ("constant" if found.emits else "none"), found
+    light = of_tree(world.node_tree)
+    if light.varies or any(n.type == "LIGHT_PATH" for n in reachable(world.node_tree)):
+        return "varies", light
+    return ("constant" if light.emits else "none"), light
 
 
 def _is_seen(item: Any, smooth: bool) -> bool:
@@ -181,8 +183,10 @@ def _moving(ids: list[Any], objects: list[Any]) -> Iterator[str]:
 
 
 def _is_animated(owner: Any) -> bool:
-    told = getattr(owner, "animation_data", None)
-    return bool(told and (told.action or told.drivers or told.nla_tracks))
+    animation = getattr(owner, "animation_data", None)
+    return bool(
+        animation and (animation.action or animation.drivers or animation.nla_tracks)
+    )
 
 
 def _is_timed(tree: Any) -> bool:

@@ -100,8 +100,8 @@ class _SceneHash:
         return self._hash.hexdigest()
 
     def _ordered(self, ids: Iterable[Any]) -> list[Any]:
-        found = [(type(item).__name__, item.name_full, item) for item in ids]
-        return [item for *_, item in sorted(found, key=lambda each: each[:2])]
+        named = [(type(item).__name__, item.name_full, item) for item in ids]
+        return [item for *_, item in sorted(named, key=lambda each: each[:2])]
 
     def _add(self, *values: Any) -> None:
         for value in values:

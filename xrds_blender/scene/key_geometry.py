@@ -55,8 +55,8 @@ def _attributes(data: Any, only: str) -> Iterator[tuple[str, np.ndarray]]:
         if attribute.data_type not in _ATTRIBUTES:
             raise TypeError(f"attribute {attribute.name} is {attribute.data_type}")
         name, count, number = _ATTRIBUTES[attribute.data_type]
-        told = f"{attribute.name} {attribute.domain} {attribute.data_type}"
-        yield told, _array(attribute.data, name, count, number)
+        label = f"{attribute.name} {attribute.domain} {attribute.data_type}"
+        yield label, _array(attribute.data, name, count, number)
 
 
 def _array(items: Any, name: str, count: int, number: Any) -> np.ndarray:

@@ -18,7 +18,7 @@ def image_digest(image: Any) -> tuple[Any, ...]:
         packed = [each.packed_file for each in image.packed_files]
         return "packed", *(_hash(each.data) for each in packed if each)
     if image.source == "GENERATED":
-        return ("generated",)  # its settings tell it
+        return ("generated",)  # its settings, hashed elsewhere, decide
     return file_digest(image.filepath, image.library)
 
 
@@ -34,10 +34,10 @@ def file_digest(path: str, library: Any = None) -> tuple[Any, ...]:
 
 def _stat(file: Path) -> tuple[str, int, int]:
     try:
-        told = file.stat()
+        status = file.stat()
     except OSError:
         return str(file), -1, -1
-    return str(file), told.st_size, told.st_mtime_ns
+    return str(file), status.st_size, status.st_mtime_ns
 
 
 def _pixels(image: Any) -> str:

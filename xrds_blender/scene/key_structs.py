@@ -54,21 +54,21 @@ class StructHash:
         """Every value of a struct and of the structs inside, but for those named."""
         if struct is None:
             return
-        told = []
+        values = []
         for name, kind in self._properties(struct):
             if name in left_out or (prefixes and name.startswith(prefixes)):
                 continue
             value = getattr(struct, name)
             if kind == "VALUE":
-                told.append((name, value))
+                values.append((name, value))
             elif kind == "ARRAY":
-                told.append((name, tuple(_flat(value))))
+                values.append((name, tuple(_flat(value))))
             elif kind == "SET":
-                told.append((name, sorted(value)))
+                values.append((name, sorted(value)))
             elif value is not None:
-                told.append((name, kind))
+                values.append((name, kind))
                 self._nested(kind, value)
-        self._add_values(type(struct).__name__, told)
+        self._add_values(type(struct).__name__, values)
 
     def custom(self, struct: Any) -> None:
         """Custom properties, which shaders can read as attributes."""
