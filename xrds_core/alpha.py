@@ -6,16 +6,12 @@ ones (H, W, ...) with H <= scale h, W <= scale w.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from torch.nn import functional
 
+from .arrays import Array
 from .front_end import upsample_alpha, upsample_bilinear
 from .layout import to_picture, to_planes
-
-if TYPE_CHECKING:
-    from .arrays import Array
 
 _BAND = 64  # low-resolution rows at a time bound the memory of what is in between
 

@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import secrets
 import time
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
+from typing import Any
 
 _SUFFIX = ".unfinished"
 _DEAD = 3600.0  # seconds without a byte written, after which nobody is writing any more

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import weakref
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -13,11 +14,7 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
 from .kernels import KernelTail
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from .network import XRDS
+from .network import XRDS
 
 _SMALL_AREA = 4  # cells
 

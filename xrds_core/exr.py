@@ -9,17 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from . import exr_library
+from .arrays import Array
 from .atomic import replacing
 from .errors import PictureError
-
-if TYPE_CHECKING:
-    from .arrays import Array
-    from .exr_library import Part
+from .exr_library import Part
 
 _COMPONENTS = ("RGB", "XYZ", "rgb", "xyz")
 _COMPOSITED = "Composite."  # Blender's layer for the output of its compositor

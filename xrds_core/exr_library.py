@@ -13,23 +13,21 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Mapping
 from contextlib import redirect_stdout
 from dataclasses import asdict, dataclass
 from functools import cache
 from io import StringIO
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .errors import PictureError
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    Pixels = np.ndarray[Any, Any]
-    Window = tuple[tuple[int, int], tuple[int, int]]
+Pixels = np.ndarray[Any, Any]
+Window = tuple[tuple[int, int], tuple[int, int]]
 
 _LARGEST_SIDE = 1 << 16  # pixels; more is a damaged header
 

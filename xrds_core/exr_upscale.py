@@ -5,16 +5,14 @@ from __future__ import annotations
 import os
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from .errors import PictureError
 from .exr import CYCLES, Names, read_beauty, read_guides, write_picture
+from .progress import Callback
 from .upscaler import Upscaler
-
-if TYPE_CHECKING:
-    from .progress import Callback
 
 
 def upscale_file(

@@ -5,19 +5,16 @@ Arrays are those of `Inputs`; areas are low-resolution rows and columns.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .arrays import Array
 from .front_end import demodulated_base, pad_guide
+from .inputs import Inputs
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from .arrays import Array
-    from .inputs import Inputs
-
-    Area = tuple[slice, slice]
+Area = tuple[slice, slice]
 
 # Of its largest value, what a constant may vary by: OIDN leaves about so much.
 _EVEN = 2e-3

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import torch
+from torch import Tensor
 
+from .arrays import Array
 from .errors import PictureError, UsageError
 from .front_end import clean_radiance, fill_holes, pad_guide, transfer
 from .guide_filter import FEW_SAMPLES
 from .layout import to_planes
-
-if TYPE_CHECKING:
-    from torch import Tensor
-
-    from .arrays import Array
-    from .tiling import Tile
+from .tiling import Tile
 
 _SCALES = (1, 2, 4, 8, 16)  # to propose in a message
 

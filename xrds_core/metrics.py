@@ -8,14 +8,12 @@ transform is the plain sRGB curve, so that no figure depends on a tone mapper.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from .arrays import Array
 from .errors import PictureError
-
-if TYPE_CHECKING:
-    from .arrays import Array
 
 RELMSE_EPSILON = 0.01  # the published tables of Monte Carlo denoising use this value
 TRIMMED_FRACTION = 0.001  # of pixels: a few fireflies rule the raw RelMSE

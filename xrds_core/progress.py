@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from torch import Tensor
 
 from .cost import leaves
 from .errors import Cancelled
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from torch import Tensor
-
-    from .network import XRDS
+from .network import XRDS
 
 Callback = Callable[[float], object]
 """Takes a fraction in [0, 1] that never falls; False as its result cancels."""

@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from .arrays import Array
+from .arrays import Array
 
 # Of an overlap, this part at each end counts nothing: what is near a tile's edge has
 # not seen its surroundings. The blend happens in the rest.

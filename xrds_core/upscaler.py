@@ -6,30 +6,25 @@ import math
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
+from torch import Tensor
 
 from . import tiling
 from .alpha import finish
+from .arrays import Array
 from .cost import Cost, measure
 from .devices import choose_device, choose_precision, free_memory, is_out_of_memory
 from .errors import OutOfMemory, PictureError, UsageError, WeightsError
 from .front_end import EXPOSURE_RANGE, auto_exposure, inverse_transfer
 from .guide_filter import filter_guides
-from .idle import busy_area, write_base
+from .idle import Area, busy_area, write_base
 from .inputs import Inputs, check
 from .layout import to_picture
 from .network import XRDS
 from .progress import Callback, Progress, watched
 from .weights import load, load_guide_filter, load_preset
-
-if TYPE_CHECKING:
-    from torch import Tensor
-
-    from .arrays import Array
-    from .idle import Area
 
 DEFAULT_MEMORY = 4 << 30
 """Bytes that an upscale takes on the CPU at most where no limit is given."""

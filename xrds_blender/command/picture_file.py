@@ -6,17 +6,15 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
 
 from .whole_file import png_size
-
-if TYPE_CHECKING:
-    from xrds_core.arrays import Array
 
 SUFFIXES = (".exr", ".png")
 

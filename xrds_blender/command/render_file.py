@@ -7,20 +7,17 @@ import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from xrds_core.atomic import sweep
 from xrds_core.errors import PictureError, XRDSError
 
 from ..cycles.size import picture_size
-from ..frame.job import NetworkFailed
+from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.networks import known_networks, load_upscaler
 from . import picture_file
 from .scene_file import open_scene
 from .whole_file import is_whole
-
-if TYPE_CHECKING:
-    from ..frame.job import Picture, RenderJob
 
 
 def render_file(

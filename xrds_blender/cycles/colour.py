@@ -5,14 +5,10 @@ Blender keeps the working space per file from 5.0 on; before, it is linear Rec.7
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from xrds_core.arrays import Array
+from xrds_core.arrays import Array
 
 REC709 = "Linear Rec.709"
 # Chromaticities (x, y) of red, green, blue and white: ITU-R BT.709 and BT.2020, and

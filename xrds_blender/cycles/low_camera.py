@@ -8,17 +8,15 @@ the evaluated camera are changed accordingly; the top left corner stays.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+
+from xrds_core.arrays import Array
 
 from ..planning.forecast import low_size
 from .borrowed import Borrowed
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from xrds_core.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,11 @@ from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import dataclass, field
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+
+from xrds_core.arrays import Array
 
 from ..planning.denoiser import Denoiser
 from ..planning.plan import GuideRender
@@ -25,9 +27,6 @@ from .low_camera import Frame, LowGrid, Region, is_exact, widen
 from .pass_names import ALBEDO, COMBINED, DEPTH, GUIDE_PASSES, NOISY, NORMAL, is_light
 from .settings import set_box_filter, set_denoising, set_sampling
 from .size import border_start, frame_size
-
-if TYPE_CHECKING:
-    from xrds_core.arrays import Array
 
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8

@@ -10,16 +10,13 @@ from collections import OrderedDict
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from xrds_core.arrays import Array
 from xrds_core.atomic import replacing, sweep
 
 from ..cycles.pass_names import ALBEDO, NORMAL
-
-if TYPE_CHECKING:
-    from xrds_core.arrays import Array
 
 MEMORY_LIMIT = 1 << 30  # bytes
 FOLDER_LIMIT = 8 << 30

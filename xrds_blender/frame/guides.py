@@ -5,24 +5,20 @@ from __future__ import annotations
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from xrds_core.arrays import Array
+
 from ..cycles.pass_names import ALBEDO, NORMAL, is_lasting
-from ..cycles.passes import Beauty, Guides
-from ..planning.plan import Decision
+from ..cycles.passes import Beauty, CyclesPasses, Guides
+from ..planning.facts import Facts
+from ..planning.plan import Decision, Plan
 from ..scene.guide_key import NotFollowed, guide_key
 from . import guide_cache
 from .guide_cache import CachedGuides
-
-if TYPE_CHECKING:
-    from xrds_core.arrays import Array
-
-    from ..cycles.passes import CyclesPasses
-    from ..planning.facts import Facts
-    from ..planning.plan import Plan
-    from .job import RenderJob
+from .job import RenderJob
 
 _NAME = "guide cache"
 

@@ -8,21 +8,17 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from ..cycles.passes import CyclesPasses
 from ..cycles.session import has_denoiser
 from ..planning import budget
+from ..planning.budget import Costs, Network, Picked
 from ..planning.denoiser import DEFAULT_DENOISER
+from ..planning.plan import Decision
+from .job import RenderJob
 from .networks import known_networks, load_upscaler
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from ..cycles.passes import CyclesPasses
-    from ..planning.budget import Costs, Network, Picked
-    from ..planning.plan import Decision
-    from .job import RenderJob
 
 PROBE_PIXELS = 130_000  # of the largest probe
 NETWORK_SIDE = 256  # of the output that a network is tried on, in pixels

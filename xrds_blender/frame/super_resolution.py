@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from xrds_core.arrays import Array
 from xrds_core.errors import OutOfMemory
 
 from ..cycles import session
@@ -23,7 +24,6 @@ from .memory import peak_memory
 
 if TYPE_CHECKING:
     from xrds_core import Upscaled, Upscaler
-    from xrds_core.arrays import Array
 
 
 @dataclass(frozen=True)
