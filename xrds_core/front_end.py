@@ -18,6 +18,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from .arrays import Array
+from .errors import UsageError
 from .layout import to_picture, to_planes
 from .regression import ALBEDO_EPSILON, explain
 
@@ -128,6 +129,19 @@ def auto_exposure(radiance: Array) -> float:
     seen = lit[(lit >= bright / _FARTHEST_BIN) & (lit <= bright * _FARTHEST_BIN)]
     exposure = EXPOSURE_KEY / math.exp(float(np.log(seen).mean()))
     return min(max(exposure, EXPOSURE_RANGE[0]), EXPOSURE_RANGE[1])
+
+
+def choose_exposure(exposure: float | None, radiance: Array) -> float:
+    """Return the exposure e that was asked for, or else the one of `radiance`.
+
+    Raises UsageError for an exposure that float32 arithmetic cannot bear.
+    """
+    if exposure is None:
+        return auto_exposure(radiance)
+    least, most = EXPOSURE_RANGE
+    if not least <= exposure <= most:
+        raise UsageError(f"exposure {exposure} is outside {least:g} to {most:g}")
+    return float(exposure)
 
 
 def _bin_means(x: NDArray[np.float64], axis: int) -> NDArray[np.float64]:

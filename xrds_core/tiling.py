@@ -91,6 +91,11 @@ def tiles(
     return [Tile(row, column) for row in rows for column in columns]
 
 
+def largest(plan: list[Tile]) -> int:
+    """Return the low-resolution pixels of the largest tile; 0 without tiles."""
+    return max((tile.rows.size * tile.columns.size for tile in plan), default=0)
+
+
 def _spans(length: int, tile: int, overlap: int, multiple: int) -> list[Span]:
     overlap = _up(overlap, multiple)
     tile = max(tile // multiple * multiple, 2 * overlap, multiple)  # ramps stay apart

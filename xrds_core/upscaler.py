@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -16,15 +16,15 @@ from .alpha import finish
 from .arrays import Array
 from .cost import Cost, measure
 from .devices import choose_device, choose_precision, free_memory, is_out_of_memory
-from .errors import OutOfMemory, PictureError, UsageError, WeightsError
-from .front_end import EXPOSURE_RANGE, auto_exposure, inverse_transfer
+from .errors import OutOfMemory, PictureError
+from .front_end import choose_exposure, inverse_transfer
 from .guide_filter import filter_guides
 from .idle import Area, busy_area, write_base
 from .inputs import Inputs, check
 from .layout import to_picture
 from .network import XRDS
 from .progress import Callback, Progress, watched
-from .weights import load, load_guide_filter, load_preset
+from .weights import choose_network, load_guide_filter
 
 DEFAULT_MEMORY = 4 << 30
 """Bytes that an upscale takes on the CPU at most where no limit is given."""
@@ -81,22 +81,19 @@ class Upscaler:
     ) -> None:
         self.device = choose_device(device)
         self.precision = choose_precision(precision, self.device)
-        self.network = _network(preset, scale, guides, weights).to(self.device)
+        self.network = choose_network(preset, scale, guides, weights).to(self.device)
         folder = None if isinstance(weights, XRDS) else weights
         self.guide_filter = load_guide_filter(folder).to(self.device)
-        self._cost: Cost | None = None
 
     @property
     def scale(self) -> int:
         """Output pixels per low-resolution pixel along one axis."""
         return self.network.config.scale
 
-    @property
+    @cached_property
     def cost(self) -> Cost:
         """What the network costs per output pixel."""
-        if self._cost is None:
-            self._cost = measure(self.network)
-        return self._cost
+        return measure(self.network)
 
     def __call__(
         self,
@@ -149,16 +146,16 @@ class Upscaler:
             guide_samples,
         )
         self._check_guides(inputs)
-        exposure = _exposure(exposure, inputs)
+        exposure = choose_exposure(exposure, inputs.low)
         area = self._area(inputs, skip_idle)
-        plan = self._tiles(inputs, area, memory_limit, tile)
+        plan = self._tiles(area, memory_limit, tile)
         steps = Progress(progress)
         while True:
             try:
                 picture = self._picture(inputs, area, exposure, plan, steps)
                 return Upscaled(picture, exposure, inputs.bad_pixels, len(plan))
             except OutOfMemory:
-                smaller = self._smaller(inputs, area, plan)
+                smaller = self._smaller(area, plan)
                 if smaller is None:
                     raise
                 plan = smaller
@@ -183,7 +180,7 @@ class Upscaler:
         return slice(0, height), slice(0, width)
 
     def _tiles(
-        self, inputs: Inputs, area: Area | None, limit: int | None, side: int | None
+        self, area: Area | None, limit: int | None, side: int | None
     ) -> list[tiling.Tile]:
         if area is None:
             return []
@@ -201,12 +198,12 @@ class Upscaler:
         ]
 
     def _smaller(
-        self, inputs: Inputs, area: Area | None, plan: list[tiling.Tile]
+        self, area: Area | None, plan: list[tiling.Tile]
     ) -> list[tiling.Tile] | None:
         """Return tiles of half the size, None where there are no smaller ones."""
-        largest = _largest(plan)
-        smaller = self._tiles(inputs, area, None, math.isqrt(largest // 2))
-        return smaller if _largest(smaller) < largest else None
+        largest = tiling.largest(plan)
+        smaller = self._tiles(area, None, math.isqrt(largest // 2))
+        return smaller if tiling.largest(smaller) < largest else None
 
     def _memory(self, limit: int | None) -> float:
         if limit is not None:
@@ -304,40 +301,8 @@ class Upscaler:
         return filter_guides(self.guide_filter, guides)
 
 
-def _largest(plan: list[tiling.Tile]) -> int:
-    """Return the low-resolution pixels of the largest tile."""
-    return max((tile.rows.size * tile.columns.size for tile in plan), default=0)
-
-
 def _size(area: Area) -> tuple[int, ...]:
     return tuple(span.stop - span.start for span in area)
-
-
-def _network(
-    preset: str, scale: int, guides: str, weights: str | Path | XRDS | None
-) -> XRDS:
-    if isinstance(weights, XRDS):
-        network = weights.eval()
-    elif weights is None or Path(weights).is_dir():
-        network, _ = load_preset(preset, scale, guides, weights)
-    else:
-        network, _ = load(weights)
-    config = network.config
-    if config.scale != scale or (config.guides == "full") != (guides == "full"):
-        raise WeightsError(
-            f"these weights are for scale {config.scale} and {config.guides} guides, "
-            f"not for scale {scale} and {guides} guides; choose others"
-        )
-    return network
-
-
-def _exposure(exposure: float | None, inputs: Inputs) -> float:
-    if exposure is None:
-        return auto_exposure(inputs.low)
-    least, most = EXPOSURE_RANGE
-    if not least <= exposure <= most:
-        raise UsageError(f"exposure {exposure} is outside {least:g} to {most:g}")
-    return float(exposure)
 
 
 def upscale(

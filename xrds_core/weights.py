@@ -186,6 +186,29 @@ def load_preset(
     return network, metadata
 
 
+def choose_network(
+    preset: str, scale: int, guides: str, weights: str | Path | XRDS | None
+) -> XRDS:
+    """Return the network that `weights` names: a folder, a file, or the network itself.
+
+    None means the shipped ones. Raises WeightsError if there is none such, or if it is
+    for another scale or other guides.
+    """
+    if isinstance(weights, XRDS):
+        network = weights.eval()
+    elif weights is None or Path(weights).is_dir():
+        network, _ = load_preset(preset, scale, guides, weights)
+    else:
+        network, _ = load(weights)
+    config = network.config
+    if config.scale != scale or (config.guides == "full") != (guides == "full"):
+        raise WeightsError(
+            f"these weights are for scale {config.scale} and {config.guides} guides, "
+            f"not for scale {scale} and {guides} guides; choose others"
+        )
+    return network
+
+
 def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
     """Return records {preset, scale, guides, file, sha256, blender_series}.
 

@@ -1,7 +1,7 @@
 """The Cycles renders inside one `RenderEngine.render()`: beauty and guides.
 
 Arrays are float32 (height, width, channels), scene-linear, row 0 on top; Blender's
-rows are turned in `cycles_session` alone. The user's scene is never touched: samples,
+rows are turned in `session` alone. The user's scene is never touched: samples,
 bounces and camera are set on the evaluated scene, sizes on the pipeline's own copy
 of the render settings, and all of it is given back.
 """
@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 from types import TracebackType
 from typing import Any
 
@@ -25,45 +24,12 @@ from .borrowed import Borrowed, PipelineSettings
 from .guide_settings import guide_settings
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
 from .pass_names import ALBEDO, COMBINED, DEPTH, GUIDE_PASSES, NOISY, NORMAL, is_light
+from .rendered import Beauty, Guides
 from .settings import set_box_filter, set_denoising, set_sampling
 from .size import border_start, frame_size
 
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
-
-
-@dataclass(frozen=True)
-class Beauty:
-    """The low-resolution radiance (h, w, 3), premultiplied, and alpha (h, w).
-
-    `offset` (dy, dx): where the region starts inside the coverage, in full-resolution
-    pixels. `seconds`: sync, beauty, denoise. `noisy` is None without denoising.
-    """
-
-    radiance: Array
-    alpha: Array
-    noisy: Array | None
-    offset: tuple[int, int]
-    seconds: dict[str, float] = field(default_factory=dict)
-    others: dict[str, Array] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Guides:
-    """Full-resolution albedo and normal (H, W, 3), alpha and depth (H, W).
-
-    Albedo is as Cycles writes it, not clamped; normals are in camera space.
-    `radiance` (H, W, 3) is there for full guides only. `samples` are per pixel, None
-    for guides without noise. `seconds`: sync, guides.
-    """
-
-    albedo: Array
-    normal: Array
-    alpha: Array
-    depth: Array | None
-    radiance: Array | None
-    samples: int | None
-    seconds: dict[str, float] = field(default_factory=dict)
 
 
 class CyclesPasses:
@@ -229,40 +195,34 @@ class CyclesPasses:
         samples: int,
         *,
         full: bool = False,
-        denoise: bool = False,
         seed: int | None = None,
     ) -> Guides:
         """Render albedo and normal at full size with the file's own filter.
 
         Only mirror and glass bounces are followed, which is all that albedo and normal
-        need; `full` keeps every bounce and gives the radiance too, denoised if asked.
+        need; `full` keeps every bounce and gives the noisy radiance too.
         Beauty and full guides in order of rising samples share one sync of the scene.
         """
-        return self.guides_by_view(samples, full=full, denoise=denoise, seed=seed)[
-            self.views[0]
-        ]
+        return self.guides_by_view(samples, full=full, seed=seed)[self.views[0]]
 
     def guides_by_view(
         self,
         samples: int,
         *,
         full: bool = False,
-        denoise: bool = False,
         seed: int | None = None,
         how: GuideRender | None = None,
     ) -> dict[str, Guides]:
         """As `guides`, for every view by name; `how` tells what may be left out."""
-        denoise = denoise and full and session.has_denoiser()
         how = how or GuideRender(shadows=False)
         settings = nullcontext() if full else guide_settings(self._depsgraph, how)
         with Borrowed() as borrowed, settings:
             set_sampling(borrowed, self._scene, samples, seed)
-            set_denoising(borrowed, self._scene, self._layer_eval, denoise)
+            set_denoising(borrowed, self._scene, self._layer_eval, False)
             clock = self._run((self.width, self.height), self.region, exact=full)
         seconds = {"sync": clock.sync, "guides": clock.render}
         return {
-            view: self._read_guides(view, full, denoise, samples, seconds)
-            for view in self.views
+            view: self._read_guides(view, full, samples, seconds) for view in self.views
         }
 
     def probe_guides(self, scale: int, samples: int) -> dict[str, float]:
@@ -368,7 +328,6 @@ class CyclesPasses:
         self,
         view: str,
         full: bool,
-        denoised: bool,
         samples: int,
         seconds: dict[str, float],
     ) -> Guides:
@@ -376,7 +335,7 @@ class CyclesPasses:
         assert albedo is not None
         assert normal is not None
         depth = self._read(DEPTH, view)
-        radiance = self._radiance(view, denoised)
+        radiance = self._radiance(view, False)
         return Guides(
             albedo,
             normal,

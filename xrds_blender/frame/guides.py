@@ -12,7 +12,8 @@ import numpy as np
 from xrds_core.arrays import Array
 
 from ..cycles.pass_names import ALBEDO, NORMAL, is_lasting
-from ..cycles.passes import Beauty, CyclesPasses, Guides
+from ..cycles.passes import CyclesPasses
+from ..cycles.rendered import Beauty, Guides
 from ..planning.facts import Facts
 from ..planning.plan import Decision, Plan
 from ..scene.guide_key import NotFollowed, guide_key

@@ -14,7 +14,8 @@ from xrds_core.errors import OutOfMemory
 from ..cycles import session
 from ..cycles.colour import converted, to_rec709, working_space
 from ..cycles.pass_names import COMBINED
-from ..cycles.passes import Beauty, CyclesPasses, Guides
+from ..cycles.passes import CyclesPasses
+from ..cycles.rendered import Beauty, Guides
 from ..planning import plan
 from . import progress
 from .facts import find_facts

@@ -1,0 +1,44 @@
+"""What one Cycles render leaves: the low-resolution picture, or the guides.
+
+Arrays are float32, scene-linear, row 0 on top. Seconds are by stage.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from xrds_core.arrays import Array
+
+
+@dataclass(frozen=True)
+class Beauty:
+    """The low-resolution radiance (h, w, 3), premultiplied, and alpha (h, w).
+
+    `offset` (dy, dx): where the region starts inside the coverage, in full-resolution
+    pixels. `seconds`: sync, beauty, denoise. `noisy` is None without denoising.
+    """
+
+    radiance: Array
+    alpha: Array
+    noisy: Array | None
+    offset: tuple[int, int]
+    seconds: dict[str, float] = field(default_factory=dict)
+    others: dict[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Guides:
+    """Full-resolution albedo and normal (H, W, 3), alpha and depth (H, W).
+
+    Albedo is as Cycles writes it, not clamped; normals are in camera space.
+    `radiance` (H, W, 3) is there for full guides only. `samples` are per pixel, None
+    for guides without noise. `seconds`: sync, guides.
+    """
+
+    albedo: Array
+    normal: Array
+    alpha: Array
+    depth: Array | None
+    radiance: Array | None
+    samples: int | None
+    seconds: dict[str, float] = field(default_factory=dict)
