@@ -96,9 +96,9 @@ def test_a_budget_below_all_takes_the_fastest_and_says_so() -> None:
     picked = choose(2.0)
     assert not picked.fits
     assert picked.choice == replace(QUICK, samples=1)  # 7 s, and XRDS 9.25 s
-    told = picked.decision(2.0)
-    assert "\n" not in told.reason
-    assert told.reason.startswith("2 s is too short for this scene; the fastest")
+    decision = picked.decision(2.0)
+    assert "\n" not in decision.reason
+    assert decision.reason.startswith("2 s is too short for this scene; the fastest")
 
 
 def test_of_choices_as_fast_as_the_fastest_the_better_is_taken() -> None:
@@ -111,9 +111,11 @@ def test_of_choices_as_fast_as_the_fastest_the_better_is_taken() -> None:
 def test_plain_is_taken_where_it_is_better_and_xrds_named_beside() -> None:
     picked = choose(300.0)
     assert picked.choice.scale == 1
-    told = picked.decision(300.0)
-    assert told.value == f"plain, {picked.choice.samples} samples, OIDN HIGH-ACCURATE"
-    assert "best XRDS for 300 s: fast x2" in told.reason
+    decision = picked.decision(300.0)
+    assert (
+        decision.value == f"plain, {picked.choice.samples} samples, OIDN HIGH-ACCURATE"
+    )
+    assert "best XRDS for 300 s: fast x2" in decision.reason
 
 
 def test_xrds_is_taken_where_the_denoiser_leaves_no_time() -> None:

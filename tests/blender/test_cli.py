@@ -78,17 +78,22 @@ def test_help_is_0(capfd: pytest.CaptureFixture[str]) -> None:
 
 
 def test_render_options() -> None:
-    told = parse(
+    options = parse(
         "render a.blend -o f_####.png --frames=-2-3 --resolution 640x360 "
         "--scale 4 --samples 9 --memory-limit 2G --exposure 0.5 --seed 7 --resume"
     )
-    assert told.scene == Path("a.blend")
-    assert told.frames == [-2, -1, 0, 1, 2, 3]
-    assert told.resolution == (640, 360)
-    assert told.memory_limit == 2 << 30
-    assert told.resume
-    assert (told.scale, told.samples, told.exposure, told.seed) == (4, 9, 0.5, 7)
-    assert (told.guides, told.preset, told.plain, told.json) == (
+    assert options.scene == Path("a.blend")
+    assert options.frames == [-2, -1, 0, 1, 2, 3]
+    assert options.resolution == (640, 360)
+    assert options.memory_limit == 2 << 30
+    assert options.resume
+    assert (options.scale, options.samples, options.exposure, options.seed) == (
+        4,
+        9,
+        0.5,
+        7,
+    )
+    assert (options.guides, options.preset, options.plain, options.json) == (
         "fast",
         "fast",
         False,
@@ -97,14 +102,14 @@ def test_render_options() -> None:
 
 
 def test_evaluate_lists() -> None:
-    told = parse(
+    options = parse(
         "evaluate a b --windows w --references r "
         "--scale 2,4 --preset fast,balanced --guides fast,full"
     )
-    assert told.scenes == [Path("a"), Path("b")]
-    assert told.scale == (2, 4)
-    assert told.preset == ("fast", "balanced")
-    assert told.guides == ("fast", "full")
+    assert options.scenes == [Path("a"), Path("b")]
+    assert options.scale == (2, 4)
+    assert options.preset == ("fast", "balanced")
+    assert options.guides == ("fast", "full")
 
 
 @pytest.mark.parametrize(
@@ -166,11 +171,11 @@ def test_json_has_stdout_to_itself() -> None:
         """
         import ctypes, os
         from xrds_blender.command import console
-        with console.stdout_for_json() as tell:
+        with console.stdout_for_json() as write:
             print("Fra:1 from Python")
             ctypes.CDLL(None).puts(b"Fra:1 from C")
             os.write(1, b"Fra:1 from the kernel\\n")
-            tell({"answer": 42})
+            write({"answer": 42})
         """
     )
     assert json.loads(done.stdout) == {"answer": 42}
@@ -192,9 +197,9 @@ def test_no_json_when_the_work_fails(tmp_path: Path) -> None:
 @pytest.mark.timeout(300)
 def test_info_json_fields() -> None:
     done = run(MAIN, "info", "--json")
-    told = json.loads(done.stdout)
+    result = json.loads(done.stdout)
     assert done.returncode == 0, done.stderr
-    assert set(told) >= {
+    assert set(result) >= {
         "version",
         "torch",
         "blender",
@@ -203,9 +208,12 @@ def test_info_json_fields() -> None:
         "presets",
         "weights",
     }
-    assert told["devices"][0] == "cpu"
-    assert told["paper_table"][0]["parameters"] == 9357857
-    assert set(told["presets"]["fast"]["2"]) == {"parameters", "macs_per_output_pixel"}
+    assert result["devices"][0] == "cpu"
+    assert result["paper_table"][0]["parameters"] == 9357857
+    assert set(result["presets"]["fast"]["2"]) == {
+        "parameters",
+        "macs_per_output_pixel",
+    }
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send")

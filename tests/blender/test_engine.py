@@ -63,9 +63,9 @@ def test_a_border_agrees_with_the_whole(
         assert part.sum() == part[rows, columns].sum()
         part = part[rows, columns]
     assert np.abs(part - whole[rows, columns]).mean() < 0.05
-    told = [call["exposure"] for call in (network[0].calls + network[1].calls)]
-    assert told[0] is None  # the whole picture tells its own
-    assert told[1] == pytest.approx(auto_exposure(life, whole), rel=0.2)
+    exposures = [call["exposure"] for call in (network[0].calls + network[1].calls)]
+    assert exposures[0] is None  # the whole picture tells its own
+    assert exposures[1] == pytest.approx(auto_exposure(life, whole), rel=0.2)
 
 
 def auto_exposure(scene: Any, picture: np.ndarray) -> float:
@@ -312,11 +312,11 @@ def test_a_clean_render_prints_frames_and_no_warning(
     written(life, "CYCLES")
     plain = "".join(capfd.readouterr())
     written(life)
-    told = "".join(capfd.readouterr())
+    printed = "".join(capfd.readouterr())
     # Blender 5 as a module prints no frame lines of its own.
-    assert ("Fra:" in told) == ("Fra:" in plain)
+    assert ("Fra:" in printed) == ("Fra:" in plain)
     for word in ("Warning", "Error:", "Exception:", "Traceback"):
-        assert word not in told
+        assert word not in printed
 
 
 @pytest.mark.skipif(not BLENDER_5, reason="one working space before Blender 5")

@@ -103,8 +103,8 @@ def test_a_full_disk_leaves_the_old_frame(life: Any, tmp_path: Path, name: str) 
     target.write_bytes(b"old")
     radiance = np.random.default_rng(0).random((33, 45, 3), np.float32)
     for size in (0, 100, 2000):
-        told = pytest.raises(PictureError, match=f"cannot write .*{name}")
-        with told, full_disk(size):
+        refused = pytest.raises(PictureError, match=f"cannot write .*{name}")
+        with refused, full_disk(size):
             picture_file.save(target, radiance, radiance[..., 0], life)
         assert target.read_bytes() == b"old"
         assert names(tmp_path) == [name]
@@ -208,8 +208,8 @@ def no_torch(
         monkeypatch.delitem(sys.modules, "torch")
         monkeypatch.setattr(sys, "meta_path", [_Broken(), *sys.meta_path])
     else:
-        found = None if request.param == "missing" else ModuleType("torch")
-        monkeypatch.setitem(sys.modules, "torch", found)
+        module = None if request.param == "missing" else ModuleType("torch")
+        monkeypatch.setitem(sys.modules, "torch", module)
     networks._load.cache_clear()
     yield
     networks._load.cache_clear()
@@ -242,9 +242,9 @@ def test_a_blender_without_denoiser_renders_and_says_so(
     life.cycles.use_denoising = True
     monkeypatch.setattr(session, "has_denoiser", lambda: False)
     picture = render(life, 2, seed=1)
-    (told,) = [each for each in picture.plan if each.decision == "denoise"]
-    assert told.value == "skipped"
-    assert "built without OpenImageDenoise" in told.reason
+    (decision,) = [each for each in picture.plan if each.decision == "denoise"]
+    assert decision.value == "skipped"
+    assert "built without OpenImageDenoise" in decision.reason
     assert picture.low_resolution.std() > 0.01
     assert written(life)[..., :3].mean() > 0.05
 
@@ -289,9 +289,9 @@ def test_a_killed_animation_resumes_at_the_first_missing_frame(
     first = (folder / "1.exr").read_bytes()
     (folder / "3.exr").write_bytes(first[: len(first) // 2])  # as another program would
     job = RenderJob(plain=True, samples=1)
-    told = render_file(blend, output, job, frames=(1, 2, 3, 4), resume=True)
-    assert told["kept"] == [1]
-    assert [each["frame"] for each in told["frames"]] == [2, 3, 4]
+    result = render_file(blend, output, job, frames=(1, 2, 3, 4), resume=True)
+    assert result["kept"] == [1]
+    assert [each["frame"] for each in result["frames"]] == [2, 3, 4]
     assert (folder / "1.exr").read_bytes() == first
     pictures = [exr.read_beauty(folder / f"{i}.exr").radiance for i in (1, 2, 3, 4)]
     assert all(np.abs(a - b).max() > 0.01 for a, b in pairwise(pictures))
@@ -317,12 +317,12 @@ def test_what_another_render_has_finished_meanwhile_is_left(
     bpy.app.handlers.render_complete.append(finish)
     job = RenderJob(plain=True, samples=1)
     try:
-        told = render_file(
+        result = render_file(
             blend, f"{folder}/#.exr", job, frames=range(1, 4), resume=True
         )
     finally:
         bpy.app.handlers.render_complete.remove(finish)
-    assert told["kept"] == [3]
+    assert result["kept"] == [3]
     assert names(folder) == ["1.exr", "2.exr", "3.exr"]
 
 
@@ -333,10 +333,12 @@ def test_a_border_resumes_too(blend: Path, tmp_path: Path) -> None:
     edges.border_min_y, edges.border_max_y = 0.2, 0.93
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     job = RenderJob(plain=True, samples=1)
-    told = [render_file(blend, f"{tmp_path}/f.png", job, resume=True) for _ in range(2)]
-    assert told[0]["kept"] == []
-    assert told[1]["kept"] == [1]
-    assert told[0]["resolution"] == told[1]["resolution"] == [23, 24]
+    results = [
+        render_file(blend, f"{tmp_path}/f.png", job, resume=True) for _ in range(2)
+    ]
+    assert results[0]["kept"] == []
+    assert results[1]["kept"] == [1]
+    assert results[0]["resolution"] == results[1]["resolution"] == [23, 24]
 
 
 def test_two_renders_into_one_folder(blend: Path, tmp_path: Path) -> None:
@@ -348,7 +350,7 @@ def test_two_renders_into_one_folder(blend: Path, tmp_path: Path) -> None:
         for _ in range(2)
     ]
     for child in children:
-        told, _ = child.communicate(timeout=110)
-        assert child.returncode == 0, told
+        output, _ = child.communicate(timeout=110)
+        assert child.returncode == 0, output
     assert names(folder) == ["1.exr", "2.exr"]
     assert all(is_whole(path, SIZE) for path in folder.iterdir())

@@ -122,14 +122,14 @@ def test_data_passes_are_those_of_a_full_size_render(
     layer.use_pass_normal = True
     bpy.data.objects["Red"].pass_index = 7
     bpy.data.materials["mirror"].pass_index = 3
-    found = channels(life, "XRDS")
+    passes = channels(life, "XRDS")
     life.cycles.samples = life.xrds.guide_samples
     expected = channels(life, "CYCLES")
     names = data_names(expected)
     assert len(names) >= 13  # 1 depth, 3 position, 4 vector, 2 indices, 3 normal
     for name in names:
-        np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
-    indices = [found[n] for n in names if "IndexOB" in n or "Object Index" in n]
+        np.testing.assert_array_equal(passes[name], expected[name], err_msg=name)
+    indices = [passes[n] for n in names if "IndexOB" in n or "Object Index" in n]
     assert set(np.unique(indices)) == {0.0, 7.0}
 
 
@@ -137,23 +137,23 @@ def test_cryptomatte_is_full_size_and_takes_sixteen_samples(
     life: Any, network: Any, channels: Any, settings_of_passes: list[dict[str, Any]]
 ) -> None:
     life.view_layers[0].use_pass_cryptomatte_object = True
-    found = channels(life, "XRDS")
+    passes = channels(life, "XRDS")
     assert settings_of_passes[1]["samples"] == 16
     life.cycles.samples = 16
     expected = channels(life, "CYCLES")
     names = [name for name in expected if "Crypto" in name]
     assert len(names) >= 12
     for name in names:
-        np.testing.assert_array_equal(found[name], expected[name], err_msg=name)
+        np.testing.assert_array_equal(passes[name], expected[name], err_msg=name)
 
 
 def test_the_plan_says_why_cryptomatte_costs_samples(life: Any, network: Any) -> None:
-    told = {d.decision: d for d in render(life, 2).plan}
-    assert int(told["guide samples"].value) < 16
+    plan = {d.decision: d for d in render(life, 2).plan}
+    assert int(plan["guide samples"].value) < 16
     life.view_layers[0].use_pass_cryptomatte_material = True
-    told = {d.decision: d for d in render(life, 2).plan}
-    assert told["guide samples"].value == "16"
-    assert "Cryptomatte" in told["guide samples"].reason
+    plan = {d.decision: d for d in render(life, 2).plan}
+    assert plan["guide samples"].value == "16"
+    assert "Cryptomatte" in plan["guide samples"].reason
 
 
 def test_an_aov_is_that_of_the_full_size_render(
@@ -165,14 +165,14 @@ def test_an_aov_is_that_of_the_full_size_render(
     if BLENDER_5 or hasattr(output, "aov_name"):
         output.aov_name = "mask"
     output.inputs["Color"].default_value = (1.0, 0.5, 0.25, 1.0)
-    found = channels(life, "XRDS")
+    passes = channels(life, "XRDS")
     life.cycles.samples = life.xrds.guide_samples
     expected = channels(life, "CYCLES")
     names = [name for name in expected if ".mask." in name]
     assert len(names) == 4
     for name in names:
-        np.testing.assert_allclose(found[name], expected[name], atol=1e-6)
-    assert max(found[name].max() for name in names) > 0.9
+        np.testing.assert_allclose(passes[name], expected[name], atol=1e-6)
+    assert max(passes[name].max() for name in names) > 0.9
 
 
 def test_light_passes_add_up_to_the_small_picture(
@@ -182,13 +182,13 @@ def test_light_passes_add_up_to_the_small_picture(
     layer = life.view_layers[0]
     layer.use_pass_diffuse_direct = layer.use_pass_diffuse_indirect = True
     life.cycles.samples = 16
-    found = channels(life, "XRDS")
+    passes = channels(life, "XRDS")
     expected = channels(life, "CYCLES")
     names = [n for n in expected if "Diff" in n and ("Ind" in n)]
     assert len(names) == 3
     for name in names:
-        assert found[name].shape == (33, 45)
-        assert found[name].mean() == pytest.approx(expected[name].mean(), rel=0.25)
+        assert passes[name].shape == (33, 45)
+        assert passes[name].mean() == pytest.approx(expected[name].mean(), rel=0.25)
 
 
 def test_stereo_enlarges_both_views(life: Any, network: Any, tmp_path: Path) -> None:

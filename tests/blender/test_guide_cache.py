@@ -29,7 +29,7 @@ def shot(scene: Any, **choices: Any) -> Picture:
     return render(scene, 2, samples=1, guide_samples=2, **choices)
 
 
-def told(picture: Picture) -> str:
+def cache_use(picture: Picture) -> str:
     return next(d.value for d in picture.plan if d.decision == "guide cache")
 
 
@@ -38,7 +38,7 @@ def test_a_relit_scene_uses_the_guides_of_before() -> None:
     first = shot(scene)
     bpy.data.objects["Lamp"].data.energy *= 3
     second = shot(scene)
-    assert (told(first), told(second)) == ("kept 2 samples", "used 2 samples")
+    assert (cache_use(first), cache_use(second)) == ("kept 2 samples", "used 2 samples")
     np.testing.assert_array_equal(second.albedo, first.albedo)
     np.testing.assert_array_equal(second.normal, first.normal)
     assert second.radiance.mean() > 2 * first.radiance.mean()
@@ -51,7 +51,7 @@ def test_a_lamp_that_is_seen_makes_them_anew(name: str) -> None:
     first = shot(scene)
     bpy.data.objects["Lamp"].data.energy /= 40
     second = shot(scene)
-    assert told(second) == "kept 2 samples"
+    assert cache_use(second) == "kept 2 samples"
     assert np.abs(second.albedo.clip(0, 1) - first.albedo.clip(0, 1)).max() > 0.1
 
 
@@ -62,7 +62,7 @@ def test_what_moves_makes_them_anew_and_back_again_does_not() -> None:
     for x in (-1.2, 0.5, -1.2):
         red.location.x = x
         pictures.append(shot(scene, seed=1))
-    assert [told(p) for p in pictures] == [
+    assert [cache_use(p) for p in pictures] == [
         "kept 2 samples",
         "kept 2 samples",
         "used 2 samples",
@@ -76,7 +76,7 @@ def test_what_moves_makes_them_anew_and_back_again_does_not() -> None:
 def test_samples_add_up_to_the_limit(network: Any) -> None:
     scene = traps.trap("texture", 48, 36)
     pictures = [shot(scene, seed=1, guide_limit=6) for _ in range(4)]
-    assert [told(p) for p in pictures] == [
+    assert [cache_use(p) for p in pictures] == [
         "kept 2 samples",
         "gathered 4 samples",
         "gathered 6 samples",
@@ -95,7 +95,7 @@ def test_more_samples_asked_for_are_rendered_beside_those_kept() -> None:
     scene = traps.trap("texture", 48, 36)
     shot(scene)
     picture = render(scene, 2, samples=1, guide_samples=5)
-    assert told(picture) == "gathered 5 samples"
+    assert cache_use(picture) == "gathered 5 samples"
 
 
 def test_the_result_holds_data_passes_of_kept_guides(written: Any) -> None:
@@ -130,7 +130,7 @@ def test_the_result_holds_data_passes_of_kept_guides(written: Any) -> None:
 def test_a_pass_that_holds_light_is_never_kept() -> None:
     scene = traps.trap("texture", 48, 36)
     scene.view_layers[0].use_pass_emit = True
-    assert [told(shot(scene)) for _ in range(2)] == ["not used"] * 2
+    assert [cache_use(shot(scene)) for _ in range(2)] == ["not used"] * 2
 
 
 def test_a_picture_may_be_changed_by_its_owner() -> None:
@@ -143,7 +143,7 @@ def test_a_picture_may_be_changed_by_its_owner() -> None:
 def test_without_the_cache_every_time_is_rendered() -> None:
     scene = traps.trap("texture", 48, 36)
     others = savings_but("guide cache")
-    assert [told(shot(scene, savings=others)) for _ in range(2)] == ["off"] * 2
+    assert [cache_use(shot(scene, savings=others)) for _ in range(2)] == ["off"] * 2
 
 
 def test_a_folder_serves_another_process(tmp_path: Path) -> None:
@@ -151,12 +151,12 @@ def test_a_folder_serves_another_process(tmp_path: Path) -> None:
     first = shot(scene, guide_cache=tmp_path)
     guide_cache.CACHE.clear()
     second = shot(scene, guide_cache=tmp_path)
-    assert told(second) == "used 2 samples"
+    assert cache_use(second) == "used 2 samples"
     np.testing.assert_array_equal(second.albedo, first.albedo)
     (file,) = tmp_path.glob("*.npz")
     file.write_bytes(file.read_bytes()[:1000])  # as a full disk leaves it
     guide_cache.CACHE.clear()
-    assert told(shot(scene, guide_cache=tmp_path)) == "kept 2 samples"
+    assert cache_use(shot(scene, guide_cache=tmp_path)) == "kept 2 samples"
 
 
 def test_a_folder_that_takes_no_file_costs_no_picture(tmp_path: Path) -> None:

@@ -37,8 +37,8 @@ def small(name: str) -> Any:
 
 def guides(passes: Any, how: plan.GuideRender, seed: int = 1) -> np.ndarray:
     """Albedo as a network takes it, and normal: (H, W, 6)."""
-    found = passes.guides_by_view(SAMPLES, seed=seed, how=how)[""]
-    return np.concatenate([found.albedo.clip(0, 1), found.normal], -1)
+    rendered = passes.guides_by_view(SAMPLES, seed=seed, how=how)[""]
+    return np.concatenate([rendered.albedo.clip(0, 1), rendered.normal], -1)
 
 
 def distance(one: np.ndarray, other: np.ndarray) -> float:

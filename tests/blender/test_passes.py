@@ -36,7 +36,7 @@ def test_a_frame_in_tiles_is_denoised_after_its_last_sample(
     """As Cycles 4.5 tells it; only what comes before the first sample is sync."""
     now = 0.0
     monkeypatch.setattr(clock.time, "perf_counter", lambda: now)
-    told = (
+    lines = (
         "house, ViewLayer | Updating Scene BVH",
         "house, ViewLayer | Sample 0/1",
         "house, ViewLayer | Rendered 3/4 Tiles, Sample 1/1",
@@ -46,7 +46,7 @@ def test_a_frame_in_tiles_is_denoised_after_its_last_sample(
         "house | ViewLayer | Finishing",
     )
     with clock.StageClock() as heard:
-        for line in told:
+        for line in lines:
             now += 1.0
             heard._hear(f"Fra:1 Mem:45.07M (Peak 319.10M) | {line}")
         now += 1.0
@@ -234,9 +234,9 @@ def test_stereo_renders_both_views(still_life: Build) -> None:
 
     views, beauties, guides = run_job(scene, job)
     assert views == ["left", "right"]
-    for told in (beauties, guides):
-        left, right = (told[view] for view in views)
-        kind = "radiance" if told is beauties else "normal"
+    for by_view in (beauties, guides):
+        left, right = (by_view[view] for view in views)
+        kind = "radiance" if by_view is beauties else "normal"
         assert np.abs(getattr(left, kind) - getattr(right, kind)).mean() > 0.01
 
 
@@ -265,9 +265,9 @@ def test_a_cancelled_pass_raises(
 def test_no_camera_is_one_clear_line(still_life: Build) -> None:
     scene = still_life()
     scene.camera = None
-    with pytest.raises(SceneError, match="'Scene' has no camera; add one") as told:
+    with pytest.raises(SceneError, match="'Scene' has no camera; add one") as error:
         run_job(scene, lambda passes: None)
-    assert "\n" not in str(told.value)
+    assert "\n" not in str(error.value)
 
 
 def test_an_unknown_layer_is_named(still_life: Build) -> None:
@@ -305,11 +305,11 @@ def test_a_session_ends_only_when_samples_fall(
     counts: tuple[int, ...],
     sessions: int,
 ) -> None:
-    cycles, made = session.functions(), []
+    cycles, created = session.functions(), []
     create = cycles.create
 
     def counting(*arguments: Any, **options: Any) -> None:
-        made.append(1)
+        created.append(1)
         create(*arguments, **options)
 
     monkeypatch.setattr(cycles, "create", counting)
@@ -320,4 +320,4 @@ def test_a_session_ends_only_when_samples_fall(
             passes.guides(1)
 
     run_job(still_life(), job)
-    assert len(made) == sessions
+    assert len(created) == sessions

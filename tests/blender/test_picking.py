@@ -68,11 +68,11 @@ def test_plan_tells_what_was_chosen_and_why(
 ) -> None:
     only(xrds=40.0, plain=20.0)
     picture = render(still_life(160, 96), time_budget=500.0)
-    told = picture.plan[0]
-    assert told.decision == "time budget"
-    assert told.value.startswith("fast x4")
-    assert "dB expected in" in told.reason
-    assert "best plain for 500 s" in told.reason
+    decision = picture.plan[0]
+    assert decision.decision == "time budget"
+    assert decision.value.startswith("fast x4")
+    assert "dB expected in" in decision.reason
+    assert "best plain for 500 s" in decision.reason
     assert not picture.job.is_picked
     assert (picture.job.scale, picture.job.guide_samples) == (4, 1)
     assert picture.radiance.shape == (96, 160, 3)
@@ -141,13 +141,13 @@ def test_panel_setting_reaches_the_job(still_life: Callable[..., Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("wrong", "told"),
+    ("wrong", "message"),
     [
         ({"time_budget": 0.0}, "must be above 0"),
         ({"time_budget": 5.0, "quality": 30.0}, "not both"),
         ({"denoiser": "BEST"}, "HIGH-ACCURATE"),
     ],
 )
-def test_wrong_wishes_are_refused(wrong: dict[str, Any], told: str) -> None:
-    with pytest.raises(UsageError, match=told):
+def test_wrong_wishes_are_refused(wrong: dict[str, Any], message: str) -> None:
+    with pytest.raises(UsageError, match=message):
         RenderJob(**wrong)

@@ -28,8 +28,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_folder_tells_version_and_build(folder: Path) -> None:
-    found = torch_folder.inspect(folder)
-    assert found == torch_folder.Torch("2.9.1+cu128", "CUDA 12.8", folder)
+    torch = torch_folder.inspect(folder)
+    assert torch == torch_folder.Torch("2.9.1+cu128", "CUDA 12.8", folder)
     (folder / "torch" / "version.py").write_text("__version__ = '2.13.0'\ncuda = None")
     assert torch_folder.inspect(folder).build == "CPU"
 

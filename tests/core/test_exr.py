@@ -80,9 +80,9 @@ def test_a_process_of_its_own_reads_what_this_one_would(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_passes(path, PASSES, "parts")
-    found = exr_library.read(path)
+    parts = exr_library.read(path)
     monkeypatch.setattr(exr_library, "_is_shadowed", lambda: False)
-    for part, expected in zip(found, exr_library.read(path), strict=True):
+    for part, expected in zip(parts, exr_library.read(path), strict=True):
         assert replace(part, channels={}) == replace(expected, channels={})
         assert part.channels.keys() == expected.channels.keys()
         for name, pixels in part.channels.items():

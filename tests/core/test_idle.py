@@ -71,11 +71,11 @@ def test_bands_of_the_base_meet() -> None:
     rng = np.random.default_rng(3)
     low = rng.random((150, 7, 3), np.float32)
     albedo, normal = rng.random((2, 299, 13, 3), np.float32)
-    found = np.empty_like(albedo)
-    write_base(found, check(SCALE, low, albedo, normal))
+    base = np.empty_like(albedo)
+    write_base(base, check(SCALE, low, albedo, normal))
     padded = np.pad(albedo, ((0, 1), (0, 1), (0, 0)), "edge")
     expected = demodulated_base(low, padded, SCALE)[:299, :13]
-    np.testing.assert_allclose(found, expected, rtol=1e-6)
+    np.testing.assert_allclose(base, expected, rtol=1e-6)
 
 
 def test_what_fills_the_picture_is_all_computed(fast: Upscaler) -> None:
@@ -91,9 +91,9 @@ def test_what_fills_the_picture_is_all_computed(fast: Upscaler) -> None:
 def test_an_even_picture_needs_no_network(fast: Upscaler) -> None:
     low = np.full((64, 64, 3), 0.4, np.float32)
     albedo = np.full((128, 128, 3), 0.5, np.float32)
-    told = fast(low, albedo, np.full_like(albedo, 0.6))
-    assert told.tiles == 0
-    np.testing.assert_allclose(told.radiance, 0.4, rtol=1e-5)
+    result = fast(low, albedo, np.full_like(albedo, 0.6))
+    assert result.tiles == 0
+    np.testing.assert_allclose(result.radiance, 0.4, rtol=1e-5)
 
 
 @pytest.mark.parametrize("wrong", ["no normals", "bright sky", "light on nothing"])

@@ -20,15 +20,15 @@ from xrds_core.upscaler import Upscaler, upscale
 def network(scale: int = 2, guides: str = "fast", preset: str = "fast") -> XRDS:
     """A network that does something with all it sees, though it was never trained."""
     torch.manual_seed(3)
-    made = XRDS(preset_config(preset, scale, guides))
+    net = XRDS(preset_config(preset, scale, guides))
     if preset != "paper":
-        torch.nn.init.normal_(made.tail.predict.weight, std=0.1)
-    return made
+        torch.nn.init.normal_(net.tail.predict.weight, std=0.1)
+    return net
 
 
 def make(scale: int = 2, guides: str = "fast", preset: str = "fast") -> Upscaler:
-    made = network(scale, guides, preset)
-    return Upscaler(preset, scale, guides, device="cpu", weights=made)
+    net = network(scale, guides, preset)
+    return Upscaler(preset, scale, guides, device="cpu", weights=net)
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +57,9 @@ def picture(height: int, width: int, scale: int = 2) -> tuple[Array, Array, Arra
     return radiance, albedo, normal
 
 
-def range_error(found: Array, expected: Array, exposure: float) -> float:
+def range_error(result: Array, expected: Array, exposure: float) -> float:
     """Largest difference in the transfer domain, of the range of `expected`."""
-    t, reference = transfer(found, exposure), transfer(expected, exposure)
+    t, reference = transfer(result, exposure), transfer(expected, exposure)
     return float(np.abs(t - reference).max() / np.ptp(reference))
 
 
@@ -292,9 +292,9 @@ def test_the_callers_arrays_are_left_alone(fast: Upscaler) -> None:
 
 def test_half_the_digits_are_near_all_of_them() -> None:
     inputs = picture(24, 24)
-    made = network()
+    net = network()
     expected, result = (
-        Upscaler(precision=precision, device="cpu", weights=made)(*inputs)
+        Upscaler(precision=precision, device="cpu", weights=net)(*inputs)
         for precision in ("fp32", "bf16")
     )
     assert not np.array_equal(result.radiance, expected.radiance)
@@ -306,10 +306,10 @@ def test_half_the_digits_are_near_all_of_them() -> None:
 
 @pytest.mark.parametrize("scale", [2, 4])
 def test_tiles_are_the_whole(scale: int) -> None:
-    made = make(scale)
+    upscaler = make(scale)
     inputs = picture(200 // scale * 2, 144 // scale * 2, scale)
-    whole = made(*inputs)
-    tiled = made(*inputs, tile=128 * 2 // scale)
+    whole = upscaler(*inputs)
+    tiled = upscaler(*inputs, tile=128 * 2 // scale)
     assert whole.tiles == 1
     assert tiled.tiles > 1
     assert range_error(tiled.radiance, whole.radiance, whole.exposure) < 1e-3
@@ -334,13 +334,13 @@ def status(key):
     lines = open("/proc/self/status").read().splitlines()
     return 1024 * int(next(x for x in lines if x.startswith(key)).split()[1])
 
-made = Upscaler(device="cpu", weights=XRDS(preset_config("fast", 2)))
+upscaler = Upscaler(device="cpu", weights=XRDS(preset_config("fast", 2)))
 noise = np.random.default_rng(0).random
 low, high = noise((320, 320, 3), np.float32), noise((640, 640, 3), np.float32)
-made(low[:8, :8], high[:16, :16], high[:16, :16])  # what is loaded once
+upscaler(low[:8, :8], high[:16, :16], high[:16, :16])  # what is loaded once
 open("/proc/self/clear_refs", "w").write("5")
 before = status("VmRSS")
-result = made(low, high, high, memory_limit=int(sys.argv[1])).radiance
+result = upscaler(low, high, high, memory_limit=int(sys.argv[1])).radiance
 print(status("VmHWM") - before - result.nbytes)
 """
 
@@ -381,8 +381,8 @@ def test_the_cost_per_pixel_is_that_of_larger_pictures(fast: Upscaler) -> None:
     assert 36 < fast.cost.bytes < 2000
 
 
-def upscaler_leaves(made: Upscaler) -> list[torch.nn.Module]:
-    return [m for m in made.network.modules() if not list(m.children())]
+def upscaler_leaves(upscaler: Upscaler) -> list[torch.nn.Module]:
+    return [m for m in upscaler.network.modules() if not list(m.children())]
 
 
 # --- progress -------------------------------------------------------------------------
@@ -390,34 +390,34 @@ def upscaler_leaves(made: Upscaler) -> list[torch.nn.Module]:
 
 @pytest.mark.parametrize("tile", [None, 1])
 def test_progress_rises_to_exactly_one(fast: Upscaler, tile: int | None) -> None:
-    told: list[float] = []
-    fast(*picture(180, 60), tile=tile, progress=told.append)
-    assert len(told) > 20
-    assert told[0] == 0.0
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-    assert told[-2] > 0.9
-    assert all(0.0 <= x <= 1.0 for x in told)
+    fractions: list[float] = []
+    fast(*picture(180, 60), tile=tile, progress=fractions.append)
+    assert len(fractions) > 20
+    assert fractions[0] == 0.0
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
+    assert fractions[-2] > 0.9
+    assert all(0.0 <= x <= 1.0 for x in fractions)
 
 
 def test_progress_of_a_black_picture(fast: Upscaler) -> None:
-    told: list[float] = []
-    fast(*(0.0 * x for x in picture(4, 4)), progress=told.append)
-    assert told == [0.0, 1.0]
+    fractions: list[float] = []
+    fast(*(0.0 * x for x in picture(4, 4)), progress=fractions.append)
+    assert fractions == [0.0, 1.0]
 
 
 @pytest.mark.parametrize("limit", [0.0, 0.1, 0.5, 1.0])
 def test_cancel(fast: Upscaler, limit: float) -> None:
-    told: list[float] = []
+    fractions: list[float] = []
 
     def stop(fraction: float) -> bool:
-        told.append(fraction)
+        fractions.append(fraction)
         return fraction < limit
 
     with pytest.raises(Cancelled):
         fast(*picture(16, 16), progress=stop)
-    assert told[-1] >= limit
-    assert all(x < limit for x in told[:-1])
+    assert fractions[-1] >= limit
+    assert all(x < limit for x in fractions[:-1])
     assert fast(*picture(4, 4)).radiance.any(), "unusable after a cancel"
     assert not any(m._forward_hooks for m in fast.network.modules())
 
@@ -494,12 +494,12 @@ def test_upscale_uses_shipped_presets(
     weights.save(network(4), f"{tmp_path}/fast_x4.safetensors", {})
     inputs = picture(6, 5, 4)
     upscaler._upscaler.cache_clear()
-    told: list[float] = []
-    result = upscale(*inputs, scale=4, exposure=0.5, progress=told.append)
+    fractions: list[float] = []
+    result = upscale(*inputs, scale=4, exposure=0.5, progress=fractions.append)
     again = upscale(*inputs, scale=4, exposure=0.5)
     assert result.shape == (24, 20, 3)
     np.testing.assert_array_equal(result, again)
-    assert told[-1] == 1.0
+    assert fractions[-1] == 1.0
     assert upscaler._upscaler.cache_info().hits == 1
     with pytest.raises(WeightsError, match="it holds: fast_x4"):
         upscale(*inputs, scale=4, guide_radiance=inputs[1])
