@@ -7,7 +7,6 @@ to the render pipeline's own copy of the render settings.
 from __future__ import annotations
 
 import ctypes
-from types import TracebackType
 from typing import Any
 
 from xrds_core.errors import SceneError
@@ -22,12 +21,7 @@ class Borrowed:
     def __enter__(self) -> Borrowed:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.give_back()
 
     def set(self, owner: Any, **values: Any) -> None:

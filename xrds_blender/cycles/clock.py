@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 import time
-from types import TracebackType
 from typing import Any
 
 # What Cycles says once the scene is there; a frame in tiles is read back and denoised
@@ -39,12 +38,7 @@ class StageClock:
             bpy.app.handlers.render_stats.append(self._hear)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         import bpy
 
         self._end = time.perf_counter()

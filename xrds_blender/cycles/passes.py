@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import nullcontext
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -84,12 +83,7 @@ class CyclesPasses:
                 )
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         try:
             if error is not None or not self._keeps_session:
                 session.free(self._engine)
@@ -120,11 +114,7 @@ class CyclesPasses:
         denoiser in this Blender the picture stays noisy.
         """
         return self.beauties(
-            scale,
-            samples,
-            denoise=denoise,
-            seed=seed,
-            denoiser=denoiser,
+            scale, samples, denoise=denoise, seed=seed, denoiser=denoiser
         )[self.views[0]]
 
     def beauties(
