@@ -117,9 +117,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     add = parser.add_argument
     add("--out", type=Path, default=ROOT / "dist")
-    add("--cache", type=Path, default=ROOT / "build" / "wheels", help="of downloads")
-    add("--without-torch", action="store_true", help="only the small zip")
-    add("--torch", default="2.13.0", help="its version")
+    add(
+        "--cache",
+        type=Path,
+        default=ROOT / "build" / "wheels",
+        help="folder for downloaded wheels",
+    )
+    add("--without-torch", action="store_true", help="build only the small zip")
+    add("--torch", default="2.13.0", help="version of PyTorch")
     names = {"nargs": "+", "choices": list(PLATFORMS), "default": list(PLATFORMS)}
     add("--platform", **names)
     options = parser.parse_args()

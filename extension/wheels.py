@@ -104,7 +104,7 @@ def resolve(target: Target, wanted: list[str]) -> list[str]:
         if name in pins or name in BLENDERS_OWN or not target.needs(requirement):
             continue
         if name.startswith(GPU_PARTS):
-            raise NoCpuBuild(f"torch for {target.name} wants {name}")
+            raise NoCpuBuild(f"torch for {target.name} needs {name}")
         metadata = _look_up(target, requirement)
         pins[name] = f"{name}=={metadata['version']}"
         waiting += [Requirement(text) for text in metadata.get("requires_dist", ())]

@@ -1,9 +1,9 @@
 """Seconds of the stages inside one Cycles render, read from its own status lines.
 
 Blender hands every status line of a background render to the `render_stats` handlers.
-In a window nobody listens, and all seconds count as rendering: Cycles tells its status
-with the scene locked, and the image editor, which holds Python, waits for that lock to
-draw (Blender 5.2 hangs).
+In a window nobody listens, and all seconds count as rendering: Cycles reports its
+status with the scene locked, and the image editor, which holds Python, waits for that
+lock to draw (Blender 5.2 hangs).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _PEAK = re.compile(r"Mem:[\d.]+M, Peak:([\d.]+)M")
 class StageClock:
     """Times one Cycles render: `sync` (scene and BVH) and `render` seconds.
 
-    `peak` is the largest memory in bytes that Cycles reported, 0 when it told none.
+    `peak` is the largest memory in bytes that Cycles reported, 0 when it reported none.
     """
 
     def __init__(self) -> None:

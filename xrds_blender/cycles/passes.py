@@ -142,7 +142,7 @@ class CyclesPasses:
         """The exposure of the whole frame, where a border cuts a part out of it.
 
         From a tiny picture of all of it, so that parts fit together. None without a
-        border: the picture itself then tells it.
+        border: the picture itself then has it.
         """
         if not self._render.use_border:
             return None
@@ -203,7 +203,7 @@ class CyclesPasses:
         seed: int | None = None,
         how: GuideRender | None = None,
     ) -> dict[str, Guides]:
-        """As `guides`, for every view by name; `how` tells what may be left out."""
+        """As `guides`, for every view by name; `how` names what may be left out."""
         how = how or GuideRender(shadows=False)
         settings = nullcontext() if full else guide_settings(self._depsgraph, how)
         with Borrowed() as borrowed, settings:

@@ -27,8 +27,8 @@ _SAMPLES, _ALPHA = "samples", "alpha"
 class CachedGuides:
     """All that a guide render left: passes (H, W, channels) by (view, name).
 
-    `alphas` (H, W) are by view; `samples` tells of how many samples albedo, normal and
-    alpha are the mean. Other passes are those of the first render.
+    `alphas` (H, W) are by view; albedo, normal and alpha are the mean of `samples`
+    samples. Other passes are those of the first render.
     """
 
     samples: int

@@ -1,4 +1,4 @@
-"""Everything that Blender is told of, registered in order and taken back."""
+"""Everything that Blender has to know, registered in order and taken back."""
 
 from __future__ import annotations
 

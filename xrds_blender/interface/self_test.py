@@ -1,4 +1,4 @@
-"""A button that renders a small picture through the whole path and tells how it went.
+"""A button that renders a small picture through the whole path and shows the outcome.
 
 The scene is made for it and taken away again; nothing of the user's file is touched
 but the picture that the Render Result held.
@@ -41,7 +41,7 @@ class XRDS_OT_self_test(bpy.types.Operator):
 
 
 def self_test() -> list[str]:
-    """Render, check the picture, and tell device, seconds and versions by line.
+    """Render, check the picture, and return device, seconds and versions by line.
 
     Raises XRDSError where no picture, or a wrong one, comes out.
     """

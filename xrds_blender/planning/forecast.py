@@ -1,4 +1,4 @@
-"""What a render will take, told before it: sizes, rays and memory.
+"""What a render will take, before it begins: sizes, rays and memory.
 
 Pure functions of numbers; neither Blender nor torch is needed here.
 """

@@ -48,7 +48,7 @@ _RENDER = (
 
 
 class NotFollowed(Exception):
-    """The scene holds something whose changes no key would show; tells what."""
+    """The scene holds something whose changes no key would show; its text names it."""
 
 
 def guide_key(depsgraph: Any, facts: SceneFacts, frame: Any) -> str:

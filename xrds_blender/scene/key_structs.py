@@ -80,7 +80,7 @@ class StructHash:
 
     def tree(self, tree: Any) -> None:
         """A node tree: nodes, sockets, links and the trees of its groups."""
-        # A material's own tree has a name like any other's; its owner was told.
+        # A material's own tree has a name like any other's; its owner is hashed.
         key = f"{tree.name_full} {tree.as_pointer()}"
         if key in self._trees:
             return
