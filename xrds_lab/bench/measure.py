@@ -182,7 +182,9 @@ class SceneBench:
             what = f"{self.name}: {request.kind}, {request.samples} spp"
             meter.done(seconds[request], what)
 
-        self.pictures.render(list(seconds), self.settings.journal, done)
+        # with rising samples one session of Cycles serves them all
+        requests = sorted(seconds, key=lambda request: request.samples)
+        self.pictures.render(requests, self.settings.journal, done)
 
     def _compare(self, meter: Meter) -> None:
         saved = time.perf_counter()

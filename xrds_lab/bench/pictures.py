@@ -94,15 +94,14 @@ class Pictures:
         ]
 
     def missing(self, configs: Sequence[Config]) -> list[Request]:
-        """Renders still missing for them and the reference, fewest rays first.
+        """Renders still missing for them and the reference.
 
-        In this order one session of Cycles serves them all.
+        Guides come after the beauty that they go with, as the product renders them.
         """
         wanted = dict.fromkeys(r for config in configs for r in config.requests())
         for half in self.halves():
             wanted[half] = None
-        known = [r for r in wanted if not self.folder.has(r.file_name(self.shot))]
-        return sorted(known, key=lambda r: r.samples)
+        return [r for r in wanted if not self.folder.has(r.file_name(self.shot))]
 
     def render(
         self,
