@@ -1,0 +1,294 @@
+"""A denoiser that is kept between pictures, as Cycles uses OIDN but quicker.
+
+Arrays are float32 (height, width, channels), row 0 on top, scene-linear. Source of how
+guides are treated: Cycles' ``intern/cycles/integrator/denoiser_oidn.cpp``.
+"""
+
+from __future__ import annotations
+
+import atexit
+import threading
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+from weakref import WeakSet
+
+import numpy as np
+
+from ..errors import UsageError
+from . import library
+from .pictures import check, sample
+from .stages import Stages
+
+if TYPE_CHECKING:
+    from ..progress import Callback
+    from .pictures import Array, Pictures
+
+QUALITIES = {"high": "High", "balanced": "Balanced", "fast": "Fast"}
+"""What we call a quality, and which of OIDN's makes the picture.
+
+``high`` is the large network on guides that a smaller one has denoised first;
+``balanced`` and ``fast`` are smaller networks on the guides as they are.
+"""
+
+# OIDN has no better networks for guides than those of Fast but the large ones, which
+# take twice the seconds for no better picture (within 0.1 dB either way).
+_PREFILTER = "Fast"
+# A guide is clean where that would change it by no more than this, root mean square:
+# as it is, it then costs the picture less than 0.05 dB.
+_CLEAN = {"albedo": 0.001, "normal": 0.002}
+_RANGE = {"albedo": (0.0, 1.0), "normal": (-1.0, 1.0)}  # beyond which OIDN sees nothing
+
+_SECONDS = {"albedo": 0.4, "normal": 0.4, "picture": 1.0}  # only their ratios count
+_NO_ALBEDO = 0.5  # what Cycles gives with a normal alone: OIDN wants both
+_MEBIBYTE = 1 << 20
+
+
+_open: WeakSet[Denoiser] = WeakSet()
+
+
+@atexit.register
+def _close_all() -> None:
+    """Let go of the library before Python does: it would complain."""
+    for denoiser in list(_open):
+        denoiser.close()
+
+
+@dataclass(frozen=True)
+class Denoised:
+    """A denoised picture."""
+
+    radiance: Array
+    """(H, W, 3), or (H, W, 4) with the alpha that was given."""
+    bad_pixels: int
+    """Pixels of the inputs that held NaN, infinities, overflows or negative light."""
+    prefiltered: tuple[str, ...]
+    """The guides that were denoised first: of ``albedo`` and ``normal``."""
+
+
+class Denoiser:
+    """OIDN on a device, ready for any number of pictures of any size.
+
+    Keep it: filters and their memory serve the next picture, too. Calls of several
+    threads run one after the other.
+
+    Args:
+        quality: ``high``, ``balanced`` or ``fast``; see `QUALITIES`.
+        device: ``auto`` (the fastest there is), ``cpu``, ``cuda`` or ``metal``.
+        threads: of the CPU; 0 for one per core.
+        memory_limit: bytes that a call may take beside the arrays given and returned;
+            it works in tiles then. A target, not a bound: a tile has a least size.
+
+    Raises:
+        UsageError: the quality is unknown, the device not here, or a number negative.
+        XRDSError: the library cannot be loaded.
+    """
+
+    def __init__(
+        self,
+        quality: str = "high",
+        device: str = "auto",
+        *,
+        threads: int = 0,
+        memory_limit: int | None = None,
+    ) -> None:
+        if quality not in QUALITIES:
+            known = ", ".join(QUALITIES)
+            raise UsageError(f"quality {quality!r} is not among {known}")
+        for name, number in (("threads", threads), ("memory_limit", memory_limit)):
+            if number is not None and number < 0:
+                raise UsageError(f"{name} is {number}; it must not be negative")
+        self.quality = quality
+        self._oidn = library.load()
+        self._device = library.open_device(device, threads)
+        _open.add(self)
+        self._memory_limit = memory_limit
+        self._filters: dict[str, Any] = {}
+        self._lock = threading.Lock()
+
+    def close(self) -> None:
+        """Give back all memory; there are no more calls after it."""
+        with self._lock:
+            self._filters.clear()
+            self._device = None
+
+    @property
+    def device(self) -> str:
+        """What it runs on: ``cpu``, ``cuda`` or ``metal``."""
+        return str(self._device.type.name).lower()
+
+    def __call__(
+        self,
+        radiance: Array,
+        albedo: Array | None = None,
+        normal: Array | None = None,
+        *,
+        hdr: bool = True,
+        guides_are_clean: bool | None = None,
+        progress: Callback | None = None,
+    ) -> Denoised:
+        """Denoise a picture; the arrays given stay as they are.
+
+        Args:
+            radiance: (H, W, 3), or (H, W, 4) with alpha, premultiplied. Its noise must
+                not be correlated between pixels, as interpolation makes it.
+            albedo: (H, W, 3); values above 1, as of lamps, count as 1, as in Blender.
+            normal: (H, W, 3), means of unit vectors of any space, 0 where nothing is.
+            hdr: False for values in [0, 1] that are shown as they are.
+            guides_are_clean: True if the picture may take over all that they show,
+                False if not, None to judge each by its own noise, which ``high`` alone
+                does: the others then take them for noisy.
+            progress: takes a fraction in [0, 1] that never falls; False as its result
+                cancels.
+
+        Raises PictureError for arrays that do not fit, Cancelled, and OutOfMemory.
+        """
+        if self._device is None:
+            raise UsageError("this denoiser is closed; make another one")
+        pictures = check(radiance, albedo, normal)
+        stages = Stages(progress)
+        result = np.zeros(np.shape(radiance), np.float32)
+        result[..., 3:] = pictures.alpha
+        prefiltered: tuple[str, ...] = ()
+        with self._lock, library.explained(self.device, result.shape):
+            stages.tell(0.0)
+            if pictures.radiance.any():
+                prefiltered = self._to_prefilter(pictures, guides_are_clean)
+                task = self._filter("picture", QUALITIES[self.quality])
+                task.hdr = hdr
+                task.clean_aux = self.quality == "high" or bool(guides_are_clean)
+                self._run(pictures, prefiltered, result[..., :3], stages)
+            stages.tell(1.0)
+        return Denoised(result, pictures.bad_pixels, prefiltered)
+
+    def _to_prefilter(
+        self, pictures: Pictures, are_clean: bool | None
+    ) -> tuple[str, ...]:
+        """Return the names of the guides that are to be denoised first."""
+        if self.quality != "high" or are_clean:
+            return ()
+        return tuple(
+            name
+            for name, guide in pictures.guides.items()
+            if are_clean is False or not self._is_clean(name, guide)
+        )
+
+    def _is_clean(self, name: str, guide: Array) -> bool:
+        """Judge by a sample whether the prefilter would change a guide.
+
+        A network tells noise from texture, which differences of pixels do not; and two
+        renders with different seeds would not show the noise of aliased edges.
+        """
+        blocks = sample(guide)
+        if blocks is None:
+            return False
+        blocks = np.clip(blocks, *_RANGE[name])
+        change = self._prefilter(name, blocks, f"sampled {name}") - blocks
+        return float(np.sqrt(np.mean(np.square(change)))) <= _CLEAN[name]
+
+    def _run(
+        self,
+        pictures: Pictures,
+        prefiltered: tuple[str, ...],
+        output: Array,
+        stages: Stages,
+    ) -> None:
+        """Denoise into ``output``, (H, W, 3)."""
+        images = {"color": pictures.radiance, **pictures.guides}
+        total = sum(_SECONDS[stage] for stage in (*prefiltered, "picture"))
+        for name in prefiltered:
+            stages.begin(_SECONDS[name] / total)
+            images[name] = self._prefilter(name, images[name], name, stages)
+        if "normal" in images and "albedo" not in images:
+            images["albedo"] = np.full_like(images["normal"], _NO_ALBEDO)
+        stages.begin(_SECONDS["picture"] / total)
+        task = self._filter("picture", QUALITIES[self.quality])
+        self._limit(task, sum(images[name].nbytes for name in prefiltered))
+        self._execute(task, images, output, stages)
+
+    def _prefilter(
+        self, name: str, guide: Array, kept_as: str, stages: Stages | None = None
+    ) -> Array:
+        result = np.empty(guide.shape, np.float32)
+        task = self._filter(kept_as, _PREFILTER)
+        self._limit(task, 2 * result.nbytes)
+        self._execute(task, {name: guide}, result, stages or Stages(None))
+        return result
+
+    def _filter(self, kept_as: str, quality: str) -> Any:
+        """Return the filter of one use; a change of its sizes would cost time."""
+        if kept_as not in self._filters:
+            task = self._filters[kept_as] = self._device.new_filter("RT")
+            task.quality = getattr(self._oidn.Quality, quality)
+        return self._filters[kept_as]
+
+    def _limit(self, task: Any, held: int) -> None:
+        """Leave a filter the memory that the ``held`` bytes of guides do not take."""
+        if self._memory_limit is not None:
+            task.max_memory_mb = max(0, self._memory_limit - held) // _MEBIBYTE
+
+    def _execute(
+        self, task: Any, images: dict[str, Array], output: Array, stages: Stages
+    ) -> None:
+        """Run a filter; it keeps none of the arrays."""
+        task.set_progress_monitor(stages.monitor)
+        try:
+            for name, image in images.items():
+                self._lend(task, name, image)
+            buffer = self._lend(task, "output", output)
+            task.execute()
+            if buffer is not None:
+                _read(buffer, output)
+        except self._oidn.Error:
+            stages.check()
+            raise
+        finally:
+            task.set_progress_monitor(None)
+            for name in (*images, "output"):
+                task.unset_image(name)
+
+    def _lend(self, task: Any, name: str, image: Array) -> Any:
+        """Give an array to a filter; return the buffer, where its device needs one."""
+        if self._device.can_share(image):
+            task.set_image(name, image)
+            return None
+        height, width = image.shape[:2]
+        buffer = self._device.new_buffer(image.nbytes, self._oidn.Storage.Device)
+        if name != "output":
+            buffer.write(np.ascontiguousarray(image))
+        task.set_image(
+            name, buffer, format=self._oidn.Format.Float3, width=width, height=height
+        )
+        return buffer
+
+
+def _read(buffer: Any, output: Array) -> None:
+    pixels = np.empty(output.shape, np.float32)
+    buffer.read(pixels)
+    output[...] = pixels
+
+
+def denoise(
+    radiance: Array,
+    albedo: Array | None = None,
+    normal: Array | None = None,
+    *,
+    quality: str = "high",
+    device: str = "auto",
+    guides_are_clean: bool | None = None,
+    memory_limit: int | None = None,
+    progress: Callback | None = None,
+) -> Array:
+    """Denoise one picture; see `Denoiser` for the arrays, the choices and the errors.
+
+    Returns radiance (H, W, 3), or (H, W, 4) with the alpha that was given. The last
+    denoiser used stays loaded.
+    """
+    return _denoiser(quality, device, memory_limit)(
+        radiance, albedo, normal, guides_are_clean=guides_are_clean, progress=progress
+    ).radiance
+
+
+@lru_cache(maxsize=1)
+def _denoiser(quality: str, device: str, memory_limit: int | None) -> Denoiser:
+    return Denoiser(quality, device, memory_limit=memory_limit)

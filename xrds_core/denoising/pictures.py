@@ -1,0 +1,107 @@
+"""The arrays given to a denoiser: checked, cleaned, and sampled for their noise.
+
+Arrays are float32 (height, width, channels).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import PictureError
+from ..holes import clean_radiance, fill_holes
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float32]
+
+_SIDE = 4  # blocks along a side of a sample
+_BLOCK = 64  # pixels along a side of a block
+_WORTH = 4  # samples: a smaller picture is prefiltered sooner than sampled
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """One picture and its guides, without NaN, infinities or negative radiance."""
+
+    radiance: Array
+    """(H, W, 3)"""
+    alpha: Array
+    """(H, W, 1), or (H, W, 0) where none was given."""
+    guides: dict[str, Array]
+    """``albedo`` and ``normal``, those that were given, (H, W, 3)."""
+    bad_pixels: int
+
+
+def check(radiance: Any, albedo: Any, normal: Any) -> Pictures:
+    """Return the arrays, cleaned; float32 ones without a fault are not copied.
+
+    Raises PictureError, with the sizes and the remedy, for arrays that do not fit.
+    """
+    whole = _array("radiance", radiance, (3, 4))
+    given = {"albedo": albedo, "normal": normal}
+    guides = {k: _array(k, v, (3,)) for k, v in given.items() if v is not None}
+    for name, guide in guides.items():
+        if guide.shape[:2] != whole.shape[:2]:
+            raise PictureError(
+                f"{name} is {_size(guide)} pixels, but radiance is {_size(whole)}: "
+                "give both of one render"
+            )
+    light, bad_pixels = clean_radiance(whole[..., :3])
+    alpha, holes = fill_holes(whole[..., 3:])
+    filled = {name: fill_holes(guide) for name, guide in guides.items()}
+    bad_pixels += holes + sum(count for _, count in filled.values())
+    return Pictures(light, alpha, {k: v for k, (v, _) in filled.items()}, bad_pixels)
+
+
+def sample(guide: Array) -> Array | None:
+    """Return blocks of a guide, side by side, that show whether it is noisy.
+
+    Half of them are the busiest, the others stand for the rest of the picture. None
+    where the picture is so small that a sample would save no time.
+    """
+    rows, columns = (size // _BLOCK for size in guide.shape[:2])
+    count = _SIDE**2
+    if rows * columns < _WORTH * count:
+        return None
+    blocks = _split(guide[: rows * _BLOCK, : columns * _BLOCK], rows, columns)
+    order = np.argsort(-_busy(blocks), kind="stable")
+    rest = np.linspace(count // 2, order.size - 1, count - count // 2)
+    chosen = blocks[order[[*range(count // 2), *rest.astype(int)]]]
+    grid = chosen.reshape(_SIDE, _SIDE, _BLOCK, _BLOCK, 3).swapaxes(1, 2)
+    return grid.reshape(_SIDE * _BLOCK, _SIDE * _BLOCK, 3)
+
+
+def _split(x: Array, rows: int, columns: int) -> Array:
+    """(rows block, columns block, 3) -> (rows columns, block, block, 3)."""
+    blocks = x.reshape(rows, _BLOCK, columns, _BLOCK, 3).swapaxes(1, 2)
+    return blocks.reshape(-1, _BLOCK, _BLOCK, 3)
+
+
+def _busy(blocks: Array) -> Array:
+    """Return how much neighbours differ in each block; one channel tells enough."""
+    return np.abs(np.diff(blocks[..., 1], axis=2)).mean(axis=(1, 2))
+
+
+def _array(name: str, value: Any, channels: tuple[int, ...]) -> Array:
+    array = np.asarray(value)
+    if array.ndim != 3 or array.shape[-1] not in channels or not array.size:
+        wanted = " or ".join(map(str, channels))
+        raise PictureError(
+            f"{name} has the shape {array.shape}; it must be (height, width, {wanted})"
+        )
+    if array.dtype.kind != "f":
+        raise PictureError(
+            f"{name} holds {array.dtype}; it must hold scene-linear floats"
+        )
+    with np.errstate(over="ignore"):  # what float32 cannot hold is a bad pixel
+        floats = array.astype(np.float32, copy=False)
+    # OIDN reads rows of pixels; the same memory back to front it does not
+    return floats if floats.flags.c_contiguous else np.ascontiguousarray(floats)
+
+
+def _size(x: Array) -> str:
+    return f"{x.shape[1]}x{x.shape[0]}"

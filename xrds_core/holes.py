@@ -1,0 +1,71 @@
+"""Pixels that hold no number or no light: filled in, and counted.
+
+Arrays are float32 (height, width, channels).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float32]
+
+BRIGHTEST = 1e12
+"""Radiance above it is a renderer's overflow: the sun's is about 1e7 W / (m2 sr)."""
+_LARGEST = np.finfo(np.float32).max
+
+
+def clean_radiance(x: Array) -> tuple[Array, int]:
+    """Return (x, bad pixels): NaN, infinities and overflows filled in, negative 0.
+
+    ``x`` itself is returned where nothing is wrong with it; else a copy.
+    """
+    # min and max propagate NaN and need no array of the size of the picture
+    if not x.size or (x.min() >= 0.0 and x.max() <= BRIGHTEST):
+        return x, 0
+    known = np.abs(x) <= BRIGHTEST
+    bad = int((~known | (x < 0.0)).any(axis=-1).sum())
+    # negative light first, so that no hole is filled with it
+    lit = np.where(known & (x < 0.0), np.float32(0.0), x)
+    return _pull_push(lit, known.all(axis=-1)), bad
+
+
+def fill_holes(x: Array) -> tuple[Array, int]:
+    """Return (x, holes): NaN and infinities get the mean of finite pixels near them.
+
+    ``x`` itself is returned where there are none. A picture without a single finite
+    pixel becomes 0.
+    """
+    if not x.size or (np.isfinite(x.min()) and np.isfinite(x.max())):
+        return x, 0
+    known = np.isfinite(x).all(axis=-1)
+    return _pull_push(x, known), int(known.size - known.sum())
+
+
+def _pull_push(x: Array, known: NDArray[np.bool_]) -> Array:
+    """Fill unknown pixels from the means of 2x2 blocks, coarser where need be."""
+    if known.all():
+        return x
+    x = np.where(known[..., None], x, np.float32(0.0))
+    if not known.any():
+        return x
+    height, width = known.shape
+    even = ((0, height % 2), (0, width % 2))
+    blocks = np.pad(x, (*even, (0, 0))) * np.float32(0.25)  # sums stay in range
+    counts = np.pad(known, even).astype(np.float32) * np.float32(0.25)
+    for axis in (0, 1):
+        blocks = _pair_sums(blocks, axis)
+        counts = _pair_sums(counts, axis)
+    means = blocks / np.maximum(counts, np.float32(0.25))[..., None]
+    coarse = _pull_push(np.clip(means, -_LARGEST, _LARGEST), counts > 0.0)
+    fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
+    return np.where(known[..., None], x, fine)
+
+
+def _pair_sums(x: Array, axis: int) -> Array:
+    even, odd = (np.take(x, range(i, x.shape[axis], 2), axis=axis) for i in (0, 1))
+    return np.asarray(even + odd)
