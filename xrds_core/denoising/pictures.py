@@ -98,9 +98,7 @@ def _array(name: str, value: Any, channels: tuple[int, ...]) -> Array:
             f"{name} holds {array.dtype}; it must hold scene-linear floats"
         )
     with np.errstate(over="ignore"):  # what float32 cannot hold is a bad pixel
-        floats = array.astype(np.float32, copy=False)
-    # OIDN reads rows of pixels; the same memory back to front it does not
-    return floats if floats.flags.c_contiguous else np.ascontiguousarray(floats)
+        return array.astype(np.float32, copy=False)
 
 
 def _size(x: Array) -> str:
