@@ -1,0 +1,187 @@
+"""One frame's samples and the camera that saw them: what accumulation works on.
+
+Arrays are float32 (H, W, C), row 0 on top, radiance scene-linear. World space is the
+renderer's; a camera looks along its own -Z with X to the right and Y up (OpenGL,
+Blender). Pixel (0, 0) of an array covers [0, 1) in both directions, so that its centre
+lies at (0.5, 0.5); y grows downwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import PictureError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import DTypeLike, NDArray
+
+    Array = NDArray[np.float32]
+    Matrix = NDArray[np.float64]
+
+# Blender writes 1e10 where no ray hits anything.
+SKY_DEPTH = 1e9
+LARGEST_HALF = 65504.0
+_PASSES = {"radiance": (3,), "albedo": (3,), "normal": (3,), "depth": ()}
+_OPTIONAL = {"alpha": (), "vector": (4,), "index": ()}
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A perspective or orthographic camera and the part of its frame that arrays hold.
+
+    ``view`` (4, 4) takes world points to the camera's axes, ``project`` (4, 4) those to
+    OpenGL clip space (in Blender: `Object.calc_matrix_camera`). ``size`` is (width,
+    height) of the whole frame in pixels, ``window`` the (x, y) of the arrays' top-left
+    pixel in it: (0, 0) where no border crops the frame.
+    """
+
+    view: Matrix
+    project: Matrix
+    size: tuple[int, int]
+    window: tuple[int, int] = (0, 0)
+
+    @property
+    def orthographic(self) -> bool:
+        return bool(self.project[3, 3] != 0.0)
+
+    def depth(self, position: Array) -> Array:
+        """Return the depth (H, W) of points in world space (H, W, 3).
+
+        Points of exactly 0 are no hits, as in Cycles' Position pass: infinitely far.
+        """
+        origin = np.linalg.inv(self.view)[:3, 3]
+        near = (position - origin.astype(np.float32)) @ self.view[2, :3]
+        hit = (position != 0.0).any(axis=-1)
+        return np.where(hit, -near, np.inf).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the renderer gives of one frame; arrays are not changed.
+
+    ``number`` is the frame's number: ``vector`` leads to number - 1 and number + 1, and
+    frames of one number show one moment (the views of a stereo pair). ``samples`` per
+    pixel weigh the frame against others. ``normal`` is in the camera's axes, but with Z
+    pointing away from the viewer, as in Cycles' `Denoising Normal`. ``depth`` (H, W) is
+    the distance of the first hit from the camera, along the camera's axis, at each
+    pixel's centre; infinite, or above 1e9, without a hit.
+
+    Optional: ``alpha`` (H, W); ``vector`` (H, W, 4), Cycles' Vector pass: where the
+    surface was one frame before minus where it is, then where it is minus where it will
+    be one frame later, in pixels, y upwards; ``index`` (H, W), integers that name the
+    object at each pixel, and ``matrices``, from such an integer to the object's (4, 4)
+    matrix to world. Without these, whatever is hit is taken to stand still.
+    """
+
+    number: int
+    camera: Camera
+    radiance: Array
+    albedo: Array
+    normal: Array
+    depth: Array
+    samples: float = 1.0
+    alpha: Array | None = None
+    vector: Array | None = None
+    index: NDArray[Any] | None = None
+    matrices: Mapping[int, Matrix] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, channels in (_PASSES | _OPTIONAL).items():
+            array = getattr(self, name)
+            if array is not None and array.shape != self.shape + channels:
+                raise PictureError(
+                    f"{name} of frame {self.number} has shape {array.shape} where its "
+                    f"radiance asks for {self.shape + channels}: give passes of one "
+                    "render"
+                )
+        if not self.samples > 0:
+            raise PictureError(
+                f"frame {self.number} has {self.samples} samples per pixel: give the "
+                "number it was rendered with"
+            )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(H, W) of every array."""
+        return self.radiance.shape[0], self.radiance.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """A frame as the window keeps it: flat, packed, and free of NaN.
+
+    ``picture`` (H W, 9 or 10) holds radiance, albedo, normal and alpha, in half floats
+    where memory counts. ``nearness`` (H W) is 1 / depth, 0 without a hit; the depth
+    itself for an orthographic camera; NaN where it is not known. ``spoilt`` (H W) says
+    which pixels held NaN or infinities and are 0 now; None if none did.
+    """
+
+    number: int
+    camera: Camera
+    shape: tuple[int, int]
+    samples: float
+    picture: NDArray[Any]
+    nearness: Array
+    spoilt: NDArray[np.bool_] | None = None
+    vector: NDArray[Any] | None = None
+    index: NDArray[Any] | None = None
+    matrices: Mapping[int, Matrix] = field(default_factory=dict)
+
+    @property
+    def bytes(self) -> int:
+        """What this frame takes of the memory."""
+        arrays = (self.picture, self.nearness, self.vector, self.index)
+        return sum(0 if x is None else x.nbytes for x in arrays)
+
+
+def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
+    """Pack a frame; pixels with NaN or infinities in any pass lend nothing.
+
+    ``dtype`` float16 halves the memory; values beyond +-65504 are cut to it.
+    """
+    parts = [frame.radiance, frame.albedo, frame.normal]
+    if frame.alpha is not None:
+        parts.append(frame.alpha[..., None])
+    picture = np.concatenate(parts, axis=-1, dtype=np.float32)
+    picture = picture.reshape(-1, picture.shape[-1])
+    spoilt = ~np.isfinite(picture).all(axis=-1)
+    picture[spoilt] = 0.0
+    if np.dtype(dtype) == np.float16:
+        np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
+    return Stored(
+        number=frame.number,
+        camera=frame.camera,
+        shape=frame.shape,
+        samples=frame.samples,
+        picture=picture.astype(dtype, copy=False),
+        nearness=_nearness(frame),
+        spoilt=spoilt if spoilt.any() else None,
+        vector=_half(frame.vector),
+        index=None if frame.index is None else np.ravel(frame.index),
+        matrices=frame.matrices,
+    )
+
+
+def _nearness(frame: Frame) -> Array:
+    """Return `Stored.nearness`; a depth of NaN or below 0 stays out of use."""
+    depth = frame.depth.ravel().astype(np.float32)
+    sky = depth > SKY_DEPTH
+    if frame.camera.orthographic:
+        # all of an orthographic camera's sky lies in one direction: nothing to track
+        return np.where(sky, np.float32(np.nan), depth)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        nearness = np.where(depth > 0.0, np.float32(1.0) / depth, np.float32(np.nan))
+    nearness[sky] = 0.0
+    return nearness
+
+
+def _half(vector: Array | None) -> NDArray[Any] | None:
+    if vector is None:
+        return None
+    with np.errstate(over="ignore"):  # what leads out of half's range is no use
+        return vector.reshape(-1, 4).astype(np.float16)

@@ -1,0 +1,194 @@
+"""Where every pixel of one frame was in another one, by geometry without noise.
+
+A pixel's centre, with the depth seen there, is a point of the world; the other frame's
+camera shows it elsewhere. That is linear in (x, y, 1, nearness), so one 3x4 matrix for
+each pair of frames tells it, and another one for each object that moved.
+
+A place counts where going there and back agrees: what the other frame shows there must
+have come from this pixel, to within half a pixel of motion. This throws out whatever
+covers or uncovers the surface, and leaves edges their mixed samples as long as both
+sides of the edge move alike. Choosing samples by what the pixel's own centre shows (by
+depth, position or index alone) would choose by their content and alias the edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from .frame import Array, Camera, Matrix, Stored
+
+# Pixels by which motion there and motion back may differ.
+AGREEMENT = 0.5
+
+
+@dataclass(frozen=True)
+class Grid:
+    """The centres of the pixels of some rows: flat, in order, (n,)."""
+
+    pixels: slice
+    x: Array
+    y: Array
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where pixels were in another frame.
+
+    ``pixel``: flat index of the other frame's nearest pixel, 0 where not seen;
+    ``apart``: squared distance in pixels from the true place to that pixel's centre;
+    ``seen``: where the other frame shows the same. All (n,), in the order of the grid.
+    """
+
+    pixel: NDArray[np.int32]
+    apart: Array
+    seen: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Detour:
+    """What a pair of frames knows of things that moved by themselves.
+
+    ``pixels``: flat, ascending, those of this frame that show such things; ``x`` and
+    ``y``: where they were in the other frame, NaN where motion there and back does not
+    agree. All (m,). ``moving`` (H W): which pixels of the other frame show such things.
+    """
+
+    pixels: NDArray[np.intp]
+    x: Array
+    y: Array
+    moving: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two frames, and how pixels pass from the one to the other and back."""
+
+    here: Stored
+    there: Stored
+    forth: Array
+    back: Array
+    detour: Detour | None = None
+
+
+def world_of(camera: Camera) -> Matrix:
+    """Return (4, 4): (x, y, 1, nearness) -> world point times w, in pixels of arrays.
+
+    Nearness is 1 / depth for a perspective camera, the depth for an orthographic one.
+    """
+    (width, height), (left, top), p = camera.size, camera.window, camera.project
+    screen = np.array(
+        [
+            [2 / width, 0, 2 * left / width - 1],
+            [0, -2 / height, 1 - 2 * top / height],
+            [0, 0, 1],
+        ]
+    )
+    column = 3 if camera.orthographic else 2
+    sign = 1.0 if camera.orthographic else -1.0
+    axes = np.zeros((4, 4))
+    for row in (0, 1):  # clip = p[r, r] X + p[r, column] * (1 or -Z)
+        axes[row, :3] = (screen[row] - sign * p[row, column] * screen[2]) / p[row, row]
+    if camera.orthographic:
+        axes[2, 3], axes[3, 2] = -1.0, 1.0
+    else:
+        axes[2, 2], axes[3, 3] = -1.0, 1.0
+    return np.asarray(np.linalg.inv(camera.view) @ axes)
+
+
+def pixels_of(camera: Camera) -> Matrix:
+    """Return (3, 4): world point -> (x w, y w, w) in pixels of the arrays."""
+    (width, height), (left, top) = camera.size, camera.window
+    screen = np.array(
+        [
+            [width / 2, 0, 0, width / 2 - left],
+            [0, -height / 2, 0, height / 2 - top],
+            [0, 0, 0, 1],
+        ]
+    )
+    return np.asarray(screen @ camera.project @ camera.view)
+
+
+def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Array:
+    """Return (3, 4): (x, y, 1, nearness) here -> (x w, y w, w) there.
+
+    ``moved`` (4, 4) is what the object did to world points in between.
+    """
+    between = np.eye(4) if moved is None else moved
+    return (pixels_of(there) @ between @ world_of(here)).astype(np.float32)
+
+
+def pair(here: Stored, there: Stored, detour: Detour | None = None) -> Pair:
+    """Return what `places` needs to know of two frames."""
+    forth = passage(here.camera, there.camera)
+    back = passage(there.camera, here.camera)
+    return Pair(here, there, forth, back, detour)
+
+
+def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Grid:
+    """Return the centres of the pixels of rows ``first`` to ``last`` (excluded)."""
+    height, width = shape
+    last = height if last is None else last
+    x = np.arange(width, dtype=np.float32) + np.float32(0.5)
+    y = np.arange(first, last, dtype=np.float32) + np.float32(0.5)
+    pixels = slice(first * width, last * width)
+    return Grid(pixels, np.tile(x, last - first), np.repeat(y, width))
+
+
+def carry(passage: Array, x: Array, y: Array, nearness: Array) -> tuple[Array, Array]:
+    """Return where pixels (n,) with their nearness lie by a `passage`; NaN if behind."""
+    across, down, w = (
+        row[0] * x + row[1] * y + row[3] * nearness + row[2] for row in passage
+    )
+    w[~(w > 0.0)] = np.nan
+    return across / w, down / w
+
+
+def places(pair: Pair, grid: Grid) -> Places:
+    """Find where the pixels of a grid of ``pair.here`` were in ``pair.there``."""
+    found = _still(pair, grid)
+    return found if pair.detour is None else _detoured(found, pair, grid)
+
+
+def _still(pair: Pair, grid: Grid) -> Places:
+    """Find places as if nothing but the camera moved."""
+    x, y = carry(pair.forth, grid.x, grid.y, pair.here.nearness[grid.pixels])
+    found = nearest(x, y, pair.there.shape)
+    row, column = np.divmod(found.pixel, np.int32(pair.there.shape[1]))
+    centre_x, centre_y = column + np.float32(0.5), row + np.float32(0.5)
+    nearness = pair.there.nearness.take(found.pixel)
+    back_x, back_y = carry(pair.back, centre_x, centre_y, nearness)
+    # what the way there and the way back leave over
+    back_x += x - grid.x - centre_x
+    back_y += y - grid.y - centre_y
+    seen = found.seen & (back_x**2 + back_y**2 < AGREEMENT**2)
+    return Places(found.pixel, found.apart, seen)
+
+
+def _detoured(found: Places, pair: Pair, grid: Grid) -> Places:
+    """Return places with those of moving things in theirs."""
+    detour = pair.detour
+    assert detour is not None
+    found.seen[...] &= ~detour.moving.take(found.pixel)
+    part = slice(*detour.pixels.searchsorted((grid.pixels.start, grid.pixels.stop)))
+    moved = nearest(detour.x[part], detour.y[part], pair.there.shape)
+    inside = detour.pixels[part] - grid.pixels.start
+    found.pixel[inside] = moved.pixel
+    found.apart[inside] = moved.apart
+    found.seen[inside] = moved.seen
+    return found
+
+
+def nearest(x: Array, y: Array, shape: tuple[int, int]) -> Places:
+    """Return the pixels that hold places (n,); not seen where outside of the frame."""
+    height, width = shape
+    seen = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
+    x, y = np.where(seen, x, np.float32(0.5)), np.where(seen, y, np.float32(0.5))
+    column, row = x.astype(np.int32), y.astype(np.int32)
+    off_x, off_y = x - column - np.float32(0.5), y - row - np.float32(0.5)
+    return Places(row * np.int32(width) + column, off_x**2 + off_y**2, seen)
