@@ -2,8 +2,8 @@
 
 Each pixel takes the other frame's nearest pixel as it is. Interpolation would correlate
 the noise of neighbouring pixels, and denoisers take correlated noise for texture. The
-mean is weighted by sample counts and by how near the pixel taken lies to the true
-place, which keeps fine texture sharp.
+mean is weighted by sample counts, by how near the pixel taken lies to the true place,
+which keeps fine texture sharp, and by whether both frames show the same light.
 """
 
 from __future__ import annotations
@@ -11,24 +11,30 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import PictureError
+from .agreement import REACH, agreement, brightness
 from .motion import grid, pair, places
+from .moving import Movement
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
 
     from .frame import Array, Camera, Stored
-    from .motion import Detour, Grid, Pair
+    from .motion import Detour
+
+    Mask = NDArray[np.bool_]
 
 # Standard deviation, in pixels, of the weight by distance: a wider one loses texture at
 # many samples per pixel, a narrower one loses samples.
 SHARPNESS = 0.4
 _ROWS = 48  # at a time: their arrays stay in a processor's cache
-_NORMAL = slice(6, 9)  # of the packed channels: radiance, albedo, normal, alpha
+_NORMAL = slice(6, 9)  # of `Stored.picture`
 
 
 @dataclass(frozen=True)
@@ -37,9 +43,8 @@ class Accumulated:
 
     ``radiance``, ``albedo``, ``normal`` (in this frame's axes) and ``alpha`` (or None)
     are means over ``samples`` (H, W) samples per pixel, NaN where no frame has any.
-    ``others`` is the mean radiance of the neighbours alone, over ``lent`` (H, W)
-    samples, 0 where none lent. ``rejected`` is the share of the neighbours' pixels that
-    could not be used.
+    ``rejected`` is the share of the neighbours' samples that were left out: pixels that
+    no neighbour shows, or that show other light.
     """
 
     radiance: Array
@@ -47,43 +52,56 @@ class Accumulated:
     normal: Array
     alpha: Array | None
     samples: Array
-    others: Array
-    lent: Array
     rejected: float
 
 
 def accumulate(
     target: Stored,
     others: Sequence[Stored],
-    detours: Mapping[int, Detour] | None = None,
+    movement: Movement | None = None,
     threads: int | None = None,
 ) -> Accumulated:
     """Return ``target`` with the samples of ``others``.
 
-    ``detours`` tells, by the position in ``others``, the places of things that moved by
-    themselves (see `moving`). Without others the result is the target's own picture to
-    the bit. Raises PictureError where the frames hold different passes.
+    ``movement`` knows what moved by itself in this shot; without it each call finds it
+    anew. Without others the result is the target's own picture to
+    the bit. ``threads``: all processors by default; the result does not depend on it.
+    Raises PictureError where the frames hold different passes.
     """
-    detours = detours or {}
-    lenders = [_Lender(target, x, detours.get(i)) for i, x in enumerate(others)]
+    detours = (movement or Movement()).detours(target, others)
+    lenders = [_Lender(target, *x) for x in zip(others, detours, strict=True)]
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
-    radiance = np.empty((height * width, 3), np.float32)
-    lent = np.empty(height * width, np.float32)
+    samples = np.empty(height * width, np.float32)
 
-    def work(first: int) -> int:
-        block = grid(target.shape, first, min(first + _ROWS, height))
-        sums = np.zeros((len(block.x), means.shape[1]), np.float32)
-        weights = np.zeros(len(block.x), np.float32)
-        seen = sum(lender.add(block, sums, weights) for lender in lenders)
-        sums /= np.maximum(weights, np.float32(1e-30))[:, None]
-        radiance[block.pixels], lent[block.pixels] = sums[:, :3], weights
-        means[block.pixels] = _joined(target, block.pixels, sums, weights)
-        return seen
+    def work(first: int) -> float:
+        rows = slice(first, min(first + _ROWS, height))
+        block = _Block(target, rows)
+        taken = sum(lender.add(block) for lender in lenders)
+        means[block.pixels], samples[block.pixels] = _means(target, block)
+        return taken
 
-    seen = sum(_in_threads(work, range(0, height, _ROWS), threads))
-    rejected = 1.0 - seen / (len(others) * lent.size) if others else 0.0
-    return _unpacked(target, means, radiance, lent, rejected)
+    taken = sum(_in_threads(work, range(0, height, _ROWS), threads))
+    asked = sum(x.samples for x in others) * height * width
+    return _unpacked(target, means, samples, 1.0 - taken / asked if asked else 0.0)
+
+
+class _Block:
+    """Some rows of the target, with a margin that the test of agreement looks at."""
+
+    def __init__(self, target: Stored, rows: slice) -> None:
+        height, width = target.shape
+        first, last = max(rows.start - REACH, 0), min(rows.stop + REACH, height)
+        self.pixels = slice(rows.start * width, rows.stop * width)
+        self.wide = grid(target.shape, first, last)
+        start = self.pixels.start - self.wide.pixels.start
+        self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
+        # rows of the margin that lie outside of the picture
+        self.outside = (REACH - rows.start + first, REACH - last + rows.stop)
+        self.brightness = brightness(_floats(target.picture[self.wide.pixels, :3]))
+        size = self.pixels.stop - self.pixels.start
+        self.sums = np.zeros((size, target.picture.shape[1]), np.float32)
+        self.weights = np.zeros(size, np.float32)
 
 
 class _Lender:
@@ -98,53 +116,66 @@ class _Lender:
         self._pair = pair(target, other, detour)
         self._turn = _turn(target.camera, other.camera)
 
-    def add(self, block: Grid, sums: Array, weights: Array) -> int:
-        """Add the samples it lends to the pixels of a block; return to how many."""
-        found, other = places(self._pair, block), self._pair.there
+    def add(self, block: _Block) -> float:
+        """Add the samples it lends to the pixels of a block; return their sum."""
+        other, inner = self._pair.there, block.inner
+        found = places(self._pair, block.wide)
         if other.spoilt is not None:
             found.seen[...] &= ~other.spoilt.take(found.pixel)
-        weight = np.exp(found.apart * np.float32(-0.5 / SHARPNESS**2))
-        weight *= found.seen
+        picked = _floats(other.picture.take(found.pixel, axis=0))
+        weight = self._agreement(block, picked, found.seen)
+        weight *= found.seen[inner]
         weight *= np.float32(other.samples)
-        picked = other.picture.take(found.pixel, axis=0).astype(np.float32, copy=False)
+        taken = float(weight.sum(dtype=np.float64))
+        weight *= np.exp(found.apart[inner] * np.float32(-0.5 / SHARPNESS**2))
+        picked = picked[inner]
         if self._turn is not None:
             picked[:, _NORMAL] = picked[:, _NORMAL] @ self._turn.T
         picked *= weight[:, None]
-        sums += picked
-        weights += weight
-        return int(np.count_nonzero(found.seen))
+        block.sums += picked
+        block.weights += weight
+        return taken
+
+    def _agreement(self, block: _Block, picked: Array, seen: Mask) -> Array:
+        """Return the weights (n,) of the block's inner pixels."""
+        target = self._pair.here
+        known = seen
+        if target.spoilt is not None:
+            known = seen & ~target.spoilt[block.wide.pixels]
+        difference = brightness(picked[:, :3]) - block.brightness
+        difference *= known
+        rows = difference.reshape(-1, target.shape[1])
+        return agreement(np.pad(rows, (block.outside, (0, 0)))).ravel()
 
 
-def _joined(target: Stored, pixels: slice, others: Array, lent: Array) -> Array:
-    """Return the means of the target's own samples and those lent."""
-    own = target.picture[pixels].astype(np.float32, copy=False)
-    share = lent / (lent + np.float32(target.samples))
+def _means(target: Stored, block: _Block) -> tuple[Array, Array]:
+    """Return the means of the target's own samples and those lent, and their number."""
+    sums, weights = block.sums, block.weights
+    own = _floats(target.picture[block.pixels])
+    samples = np.full(len(own), target.samples, np.float32)
     if target.spoilt is not None:
-        spoilt = target.spoilt[pixels]
-        share[spoilt] = np.where(lent[spoilt] > 0.0, np.float32(1.0), np.float32(np.nan))
+        samples[target.spoilt[block.pixels]] = 0.0
+    total = samples + weights
+    sums -= own * weights[:, None]
+    with np.errstate(invalid="ignore"):  # NaN where nobody has samples
+        sums /= total[:, None]
     # in this form nothing is rounded where nothing is lent
-    return np.asarray(own + (others - own) * share[:, None])
+    return own + sums, total
 
 
 def _unpacked(
-    target: Stored, means: Array, others: Array, lent: Array, rejected: float
+    target: Stored, means: Array, samples: Array, rejected: float
 ) -> Accumulated:
     radiance, albedo, normal, *alpha = (
         np.ascontiguousarray(x).reshape(*target.shape, -1)
         for x in np.split(means, range(3, means.shape[1], 3), axis=1)
     )
-    lent = lent.reshape(target.shape)
-    own = np.full(target.shape, target.samples, np.float32)
-    if target.spoilt is not None:
-        own[target.spoilt.reshape(target.shape)] = 0.0
     return Accumulated(
         radiance,
         albedo,
         normal,
         alpha[0][..., 0] if alpha else None,
-        own + lent,
-        others.reshape(*target.shape, 3),
-        lent,
+        samples.reshape(target.shape),
         rejected,
     )
 
@@ -159,9 +190,13 @@ def _turn(here: Camera, there: Camera) -> Array | None:
     return None if np.allclose(turn, np.eye(3), atol=1e-7) else turn.astype(np.float32)
 
 
+def _floats(x: NDArray[Any]) -> Array:
+    return x.astype(np.float32, copy=False)
+
+
 def _in_threads(
-    work: Callable[[int], int], items: Sequence[int], threads: int | None
-) -> list[int]:
+    work: Callable[[int], float], items: Sequence[int], threads: int | None
+) -> list[float]:
     """Do every item; NumPy lets threads run at once in all that takes long here."""
     count = min(threads or os.cpu_count() or 1, len(items))
     with ThreadPoolExecutor(max(count, 1)) as pool:

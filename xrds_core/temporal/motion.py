@@ -141,7 +141,7 @@ def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Gri
 
 
 def carry(passage: Array, x: Array, y: Array, nearness: Array) -> tuple[Array, Array]:
-    """Return where pixels (n,) with their nearness lie by a `passage`; NaN if behind."""
+    """Return where pixels (n,) lie by a `passage`; NaN behind the camera."""
     across, down, w = (
         row[0] * x + row[1] * y + row[3] * nearness + row[2] for row in passage
     )
@@ -159,8 +159,7 @@ def _still(pair: Pair, grid: Grid) -> Places:
     """Find places as if nothing but the camera moved."""
     x, y = carry(pair.forth, grid.x, grid.y, pair.here.nearness[grid.pixels])
     found = nearest(x, y, pair.there.shape)
-    row, column = np.divmod(found.pixel, np.int32(pair.there.shape[1]))
-    centre_x, centre_y = column + np.float32(0.5), row + np.float32(0.5)
+    centre_x, centre_y = centres(found.pixel, pair.there.shape[1])
     nearness = pair.there.nearness.take(found.pixel)
     back_x, back_y = carry(pair.back, centre_x, centre_y, nearness)
     # what the way there and the way back leave over
@@ -192,3 +191,15 @@ def nearest(x: Array, y: Array, shape: tuple[int, int]) -> Places:
     column, row = x.astype(np.int32), y.astype(np.int32)
     off_x, off_y = x - column - np.float32(0.5), y - row - np.float32(0.5)
     return Places(row * np.int32(width) + column, off_x**2 + off_y**2, seen)
+
+
+def centres(pixels: NDArray[np.integer], width: int) -> tuple[Array, Array]:
+    """Return the centres (x, y) of flat pixels (n,)."""
+    row, column = np.divmod(pixels.astype(np.int32), np.int32(width))
+    return column + np.float32(0.5), row + np.float32(0.5)
+
+
+def known(x: Array, y: Array, mask: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Return places with NaN outside of ``mask``."""
+    nan = np.float32(np.nan)
+    return np.where(mask, x, nan), np.where(mask, y, nan)

@@ -1,0 +1,145 @@
+"""The places of things that moved by themselves, by Cycles' Vector passes.
+
+They hold for everything, deforming meshes too, and are followed from each frame to the
+next, there and back. A place is given up at the first frame where the way back leads
+elsewhere: something came before it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from .motion import AGREEMENT, Detour, carry, centres, grid, known, nearest, passage
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from .frame import Array, Camera, Stored
+
+    Mask = NDArray[np.bool_]
+    Trail = tuple[Array, Array]  # x and y, NaN where lost
+
+
+class Trails:
+    """Follows the Vector passes of a shot's frames; keeps each frame's moving pixels.
+
+    One object serves a whole shot: what is known of a frame is kept while the frame is.
+    """
+
+    def __init__(self) -> None:
+        self._moving: WeakKeyDictionary[Stored, Mask] = WeakKeyDictionary()
+
+    def detours(self, here: Stored, others: Sequence[Stored]) -> dict[int, Detour]:
+        """Return, by position in ``others``, the places of what moved by itself.
+
+        Frames of one number as ``here`` show the same moment and need none. Where a
+        frame in between is missing nothing moving is known beyond it.
+        """
+        frames = {x.number: x for x in (*others, here) if x.vector is not None}
+        trails: dict[int, Trail] = {}
+        if here.vector is not None:
+            for step in (-1, 1):
+                trails |= self._trail(here, frames, step)
+        places = {x: i for i, x in enumerate(others) if x.number != here.number}
+        return {
+            i: self._detour(here, other, frames, trails) for other, i in places.items()
+        }
+
+    def _detour(
+        self,
+        here: Stored,
+        there: Stored,
+        frames: Mapping[int, Stored],
+        trails: Mapping[int, Trail],
+    ) -> Detour:
+        pixels = np.flatnonzero(self.moving(here, frames))
+        nowhere = np.full((2, len(pixels)), np.nan, np.float32)
+        x, y = trails.get(there.number, nowhere)
+        return Detour(pixels, x, y, self.moving(there, frames))
+
+    def _trail(
+        self, here: Stored, frames: Mapping[int, Stored], step: int
+    ) -> dict[int, Trail]:
+        """Follow the moving pixels of ``here`` frame by frame; number -> places."""
+        x, y = centres(np.flatnonzero(self.moving(here, frames)), here.shape[1])
+        trail, frame = {}, here
+        while (after := frames.get(frame.number + step)) is not None:
+            x, y = self._step(frame, after, frames, x, y)
+            trail[after.number], frame = (x, y), after
+        return trail
+
+    def _step(
+        self,
+        here: Stored,
+        there: Stored,
+        frames: Mapping[int, Stored],
+        x: Array,
+        y: Array,
+    ) -> tuple[Array, Array]:
+        """Carry places (NaN: lost) into the frame before or after."""
+        forward = there.number > here.number
+        start = nearest(x, y, here.shape)
+        flow_x, flow_y = _flow(here, start.pixel, forward)
+        found = nearest(x + flow_x, y + flow_y, there.shape)
+        back_x, back_y = _flow(there, found.pixel, not forward)
+        agreed = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2 < AGREEMENT**2
+        agreed &= self.moving(there, frames)[found.pixel] & found.seen & start.seen
+        return known(x + flow_x, y + flow_y, agreed)
+
+    def moving(self, frame: Stored, frames: Mapping[int, Stored]) -> Mask:
+        """Return (H W): where the Vector pass is not what the cameras alone explain.
+
+        All is taken to move where no camera beside the frame is known.
+        """
+        mask = self._moving.get(frame)
+        if mask is None and (mask := _moving(frame, frames)) is not None:
+            self._moving[frame] = mask
+        everything = np.full(frame.nearness.shape, frame.vector is not None)
+        return everything if mask is None else mask
+
+
+def _moving(frame: Stored, frames: Mapping[int, Stored]) -> Mask | None:
+    for forward in (True, False):
+        beside = frames.get(frame.number + (1 if forward else -1))
+        if beside is not None and frame.vector is not None:
+            return _unexplained(frame, beside.camera, forward)
+    return None
+
+
+def _unexplained(frame: Stored, beside: Camera, forward: bool) -> Mask:
+    """Return (H W): where the Vector pass differs from the camera's own motion.
+
+    It is a mean over the pixel's samples, so it may lie anywhere between what the
+    camera explains for the pixels around it.
+    """
+    own = grid(frame.shape)
+    x, y = carry(passage(frame.camera, beside), own.x, own.y, frame.nearness)
+    flows = _flow(frame, slice(None), forward)
+    apart = np.zeros(frame.shape, np.float32)
+    for still, flow in ((x - own.x, flows[0]), (y - own.y, flows[1])):
+        explained, given = still.reshape(frame.shape), flow.reshape(frame.shape)
+        np.fmax(apart, _around(explained, np.fmin) - given, out=apart)
+        np.fmax(apart, given - _around(explained, np.fmax), out=apart)
+    hit = (frame.nearness > 0.0) | (frame.nearness < 0.0)  # neither sky nor NaN
+    return np.asarray((apart.ravel() > AGREEMENT / 2) & hit)
+
+
+def _around(x: Array, smaller: np.ufunc) -> Array:
+    """Return the least (fmin) or largest (fmax) value of each 3x3 pixels."""
+    wide = np.pad(x, 1, "edge")
+    rows = smaller(smaller(wide[:-2], wide[1:-1]), wide[2:])
+    return np.asarray(smaller(smaller(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
+
+
+def _flow(
+    frame: Stored, pixels: NDArray[np.int32] | slice, forward: bool
+) -> tuple[Array, Array]:
+    """Return (x, y downwards) in pixels to the next frame, or to the previous one."""
+    assert frame.vector is not None
+    picked = frame.vector[pixels].astype(np.float32)
+    return (-picked[:, 2], picked[:, 3]) if forward else (picked[:, 0], -picked[:, 1])

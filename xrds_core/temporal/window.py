@@ -1,0 +1,106 @@
+"""Which frames lend to which, in what order they are needed, and what they cost.
+
+A frame takes samples from those up to ``radius`` frames before and after it, within
+one cut of the shot; at the ends it takes what there is. Frames go by in order: each is
+loaded once, kept while a frame to come needs it, and finished when its last neighbour
+is there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar
+
+from ..errors import UsageError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+Kept = TypeVar("Kept")
+
+# Of radiance, albedo and normal, in half floats, and nearness; then of a Vector pass
+# and an alpha, in half floats, and an index.
+_BYTES = 3 * 3 * 2 + 4
+_VECTOR_BYTES, _ALPHA_BYTES, _INDEX_BYTES = 8, 2, 4
+
+
+@dataclass(frozen=True)
+class Shot:
+    """The frames of a shot in order of time, and how far they lend to each other.
+
+    ``frames`` are frame numbers, those that are to be finished; ``radius`` counts in
+    them, so that a shot rendered in steps lends as far. ``cuts`` are the frames that
+    begin something new: nothing is lent across. ``lending`` are frames that only lend,
+    as those that another machine finishes. Raises UsageError for what cannot be.
+    """
+
+    frames: tuple[int, ...]
+    radius: int
+    cuts: frozenset[int] = frozenset()
+    lending: tuple[int, ...] = ()
+    order: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        if self.radius < 0:
+            raise UsageError(f"temporal radius {self.radius}: give 0 or more frames")
+        order = tuple(sorted({*self.frames, *self.lending}))
+        object.__setattr__(self, "order", order)
+
+    def lenders(self, frame: int) -> tuple[int, ...]:
+        """Return the frames that lend to ``frame``, the nearest ones first."""
+        place = self.order.index(frame)
+        around = self.order[max(0, place - self.radius) : place + self.radius + 1]
+        take = self._take(frame)
+        return tuple(
+            sorted(
+                (x for x in around if x != frame and self._take(x) == take),
+                key=lambda x: (abs(x - frame), x),
+            )
+        )
+
+    def _take(self, frame: int) -> int:
+        """Return between which cuts a frame lies."""
+        return sum(cut <= frame for cut in self.cuts)
+
+    @property
+    def most_kept(self) -> int:
+        """The most frames that `slide` ever keeps at once."""
+        return min(2 * self.radius + 1, len(self.order))
+
+
+def slide(
+    shot: Shot, load: Callable[[int], Kept | None]
+) -> Iterator[tuple[int, Kept, dict[int, Kept]]]:
+    """Yield (number, frame, lenders by number) for each frame of a shot, in order.
+
+    ``load`` gives one frame and is called once for each, in order, and not before it is
+    needed; None where a frame is missing or damaged: it lends nothing and is left out.
+    At most ``shot.most_kept`` frames are kept; what is yielded is dropped when the next
+    one is asked for.
+    """
+    kept: dict[int, Kept | None] = {}
+    for number in sorted(set(shot.frames)):
+        lenders = shot.lenders(number)
+        needed = sorted((number, *lenders))
+        for old in [x for x in kept if x < needed[0]]:
+            del kept[old]
+        for new in needed:
+            if new not in kept:
+                kept[new] = load(new)
+        frame = kept[number]
+        if frame is not None:
+            there = {x: kept[x] for x in lenders}
+            yield number, frame, {x: y for x, y in there.items() if y is not None}
+
+
+def bytes_needed(
+    width: int,
+    height: int,
+    frames: int,
+    alpha: bool = False,
+    vector: bool = False,
+    index: bool = False,
+) -> int:
+    """Return the bytes that ``frames`` frames of half floats take in a window."""
+    each = _BYTES + _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha + _INDEX_BYTES * index
+    return width * height * each * frames
