@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import PictureError
 from .agreement import REACH, agreement, brightness
-from .motion import grid, pair, places
+from .motion import grid, pair, places, surroundings
 from .moving import Movement
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from .frame import Array, Camera, Stored
-    from .motion import Detour
+    from .motion import Pair
 
     Mask = NDArray[np.bool_]
 
@@ -69,7 +69,11 @@ def accumulate(
     Raises PictureError where the frames hold different passes.
     """
     detours = (movement or Movement()).detours(target, others)
-    lenders = [_Lender(target, *x) for x in zip(others, detours, strict=True)]
+    around = surroundings(target)
+    lenders = [
+        _Lender(pair(target, other, detour, around))
+        for other, detour in zip(others, detours, strict=True)
+    ]
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
     samples = np.empty(height * width, np.float32)
@@ -107,13 +111,14 @@ class _Block:
 class _Lender:
     """One neighbour of the target."""
 
-    def __init__(self, target: Stored, other: Stored, detour: Detour | None) -> None:
+    def __init__(self, pair: Pair) -> None:
+        target, other = pair.here, pair.there
         if other.picture.shape[1] != target.picture.shape[1]:
             raise PictureError(
                 f"frame {other.number} and frame {target.number} hold different passes:"
                 " give alpha for all frames of a shot or for none"
             )
-        self._pair = pair(target, other, detour)
+        self._pair = pair
         self._turn = _turn(target.camera, other.camera)
 
     def add(self, block: _Block) -> float:

@@ -1,14 +1,16 @@
 """Where every pixel of one frame was in another one, by geometry without noise.
 
 A pixel's centre, with the depth seen there, is a point of the world; the other frame's
-camera shows it elsewhere. That is linear in (x, y, 1, nearness), so one 3x4 matrix for
-each pair of frames tells it, and another one for each object that moved.
+camera shows it elsewhere. That is linear in (x, y, 1, nearness), so one 4x4 matrix for
+each pair of frames tells it, and another one for each object that moved. Nearness is
+1 / depth for a perspective camera, 0 for the sky; for an orthographic one the depth.
 
 A place counts where going there and back agrees: what the other frame shows there must
-have come from this pixel, to within half a pixel of motion. This throws out whatever
-covers or uncovers the surface, and leaves edges their mixed samples as long as both
-sides of the edge move alike. Choosing samples by what the pixel's own centre shows (by
-depth, position or index alone) would choose by their content and alias the edges.
+come from this pixel, to within half a pixel of motion, and be as near as something in
+the 3x3 pixels around it. This throws out whatever covers or uncovers the surface, and
+leaves edges their mixed samples as long as both sides of the edge move alike. Choosing
+samples by what shows at the pixel's own centre would choose by their content: edges
+would lose what smooths them.
 """
 
 from __future__ import annotations
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 
 # Pixels by which motion there and motion back may differ.
 AGREEMENT = 0.5
+# Share of itself by which nearness may lie beyond what is around.
+_NEARNESS_SLACK = 0.02
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,7 @@ class Pair:
     there: Stored
     forth: Array
     back: Array
+    around: tuple[Array, Array]
     detour: Detour | None = None
 
 
@@ -102,7 +107,7 @@ def world_of(camera: Camera) -> Matrix:
 
 
 def pixels_of(camera: Camera) -> Matrix:
-    """Return (3, 4): world point -> (x w, y w, w) in pixels of the arrays."""
+    """Return (4, 4): world point -> (x w, y w, w, nearness w) in pixels of arrays."""
     (width, height), (left, top) = camera.size, camera.window
     screen = np.array(
         [
@@ -111,11 +116,12 @@ def pixels_of(camera: Camera) -> Matrix:
             [0, 0, 0, 1],
         ]
     )
-    return np.asarray(screen @ camera.project @ camera.view)
+    near = -camera.view[2] if camera.orthographic else np.array([0.0, 0.0, 0.0, 1.0])
+    return np.vstack([screen @ camera.project @ camera.view, near])
 
 
 def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Array:
-    """Return (3, 4): (x, y, 1, nearness) here -> (x w, y w, w) there.
+    """Return (4, 4): (x, y, 1, nearness) here -> (x w, y w, w, nearness w) there.
 
     ``moved`` (4, 4) is what the object did to world points in between.
     """
@@ -123,11 +129,35 @@ def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Array:
     return (pixels_of(there) @ between @ world_of(here)).astype(np.float32)
 
 
-def pair(here: Stored, there: Stored, detour: Detour | None = None) -> Pair:
-    """Return what `places` needs to know of two frames."""
+def pair(
+    here: Stored,
+    there: Stored,
+    detour: Detour | None = None,
+    around: tuple[Array, Array] | None = None,
+) -> Pair:
+    """Return what `places` needs to know of two frames.
+
+    ``around`` is `surroundings` of ``here``, for callers with many pairs.
+    """
     forth = passage(here.camera, there.camera)
     back = passage(there.camera, here.camera)
-    return Pair(here, there, forth, back, detour)
+    return Pair(here, there, forth, back, around or surroundings(here), detour)
+
+
+def surroundings(frame: Stored) -> tuple[Array, Array]:
+    """Return the least and largest nearness around each pixel, with some slack."""
+    nearness = frame.nearness.reshape(frame.shape)
+    slack = np.float32(_NEARNESS_SLACK)
+    least = extreme(nearness, np.fmin) * (1 - slack)
+    most = extreme(nearness, np.fmax) * (1 + slack)
+    return least.ravel(), most.ravel()
+
+
+def extreme(x: Array, smaller: np.ufunc) -> Array:
+    """Return the least (`np.fmin`) or largest (`np.fmax`) value of each 3x3 pixels."""
+    wide = np.pad(x, 1, "edge")
+    rows = smaller(smaller(wide[:-2], wide[1:-1]), wide[2:])
+    return np.asarray(smaller(smaller(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
 
 
 def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Grid:
@@ -140,13 +170,15 @@ def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Gri
     return Grid(pixels, np.tile(x, last - first), np.repeat(y, width))
 
 
-def carry(passage: Array, x: Array, y: Array, nearness: Array) -> tuple[Array, Array]:
-    """Return where pixels (n,) lie by a `passage`; NaN behind the camera."""
-    across, down, w = (
+def carry(
+    passage: Array, x: Array, y: Array, nearness: Array
+) -> tuple[Array, Array, Array]:
+    """Return (x, y, nearness) there of pixels (n,) here; NaN behind the camera."""
+    across, down, w, near = (
         row[0] * x + row[1] * y + row[3] * nearness + row[2] for row in passage
     )
     w[~(w > 0.0)] = np.nan
-    return across / w, down / w
+    return across / w, down / w, near / w
 
 
 def places(pair: Pair, grid: Grid) -> Places:
@@ -157,15 +189,18 @@ def places(pair: Pair, grid: Grid) -> Places:
 
 def _still(pair: Pair, grid: Grid) -> Places:
     """Find places as if nothing but the camera moved."""
-    x, y = carry(pair.forth, grid.x, grid.y, pair.here.nearness[grid.pixels])
+    near = pair.here.nearness[grid.pixels]
+    x, y, _ = carry(pair.forth, grid.x, grid.y, near)
     found = nearest(x, y, pair.there.shape)
     centre_x, centre_y = centres(found.pixel, pair.there.shape[1])
-    nearness = pair.there.nearness.take(found.pixel)
-    back_x, back_y = carry(pair.back, centre_x, centre_y, nearness)
+    near = pair.there.nearness.take(found.pixel)
+    back_x, back_y, near = carry(pair.back, centre_x, centre_y, near)
     # what the way there and the way back leave over
     back_x += x - grid.x - centre_x
     back_y += y - grid.y - centre_y
     seen = found.seen & (back_x**2 + back_y**2 < AGREEMENT**2)
+    least, most = (part[grid.pixels] for part in pair.around)
+    seen &= (near >= least) & (near <= most)
     return Places(found.pixel, found.apart, seen)
 
 

@@ -63,11 +63,11 @@ def _rigid(
     moved = there.matrices[name] @ np.linalg.inv(here.matrices[name])
     own_x, own_y = centres(pixels, here.shape[1])
     forth = passage(here.camera, there.camera, moved)
-    x, y = carry(forth, own_x, own_y, here.nearness[pixels])
+    x, y, _ = carry(forth, own_x, own_y, here.nearness[pixels])
     found = nearest(x, y, there.shape)
     centre_x, centre_y = centres(found.pixel, there.shape[1])
     back = passage(there.camera, here.camera, np.linalg.inv(moved))
-    back_x, back_y = carry(back, centre_x, centre_y, there.nearness[found.pixel])
+    back_x, back_y, _ = carry(back, centre_x, centre_y, there.nearness[found.pixel])
     off_x, off_y = x - own_x + back_x - centre_x, y - own_y + back_y - centre_y
     same = found.seen & (there.index[found.pixel] == name)
     return known(x, y, same & (off_x**2 + off_y**2 < AGREEMENT**2))

@@ -12,7 +12,17 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from .motion import AGREEMENT, Detour, carry, centres, grid, known, nearest, passage
+from .motion import (
+    AGREEMENT,
+    Detour,
+    carry,
+    centres,
+    extreme,
+    grid,
+    known,
+    nearest,
+    passage,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -118,22 +128,16 @@ def _unexplained(frame: Stored, beside: Camera, forward: bool) -> Mask:
     camera explains for the pixels around it.
     """
     own = grid(frame.shape)
-    x, y = carry(passage(frame.camera, beside), own.x, own.y, frame.nearness)
+    forth = passage(frame.camera, beside)
+    x, y, _ = carry(forth, own.x, own.y, frame.nearness)
     flows = _flow(frame, slice(None), forward)
     apart = np.zeros(frame.shape, np.float32)
     for still, flow in ((x - own.x, flows[0]), (y - own.y, flows[1])):
         explained, given = still.reshape(frame.shape), flow.reshape(frame.shape)
-        np.fmax(apart, _around(explained, np.fmin) - given, out=apart)
-        np.fmax(apart, given - _around(explained, np.fmax), out=apart)
+        np.fmax(apart, extreme(explained, np.fmin) - given, out=apart)
+        np.fmax(apart, given - extreme(explained, np.fmax), out=apart)
     hit = (frame.nearness > 0.0) | (frame.nearness < 0.0)  # neither sky nor NaN
     return np.asarray((apart.ravel() > AGREEMENT / 2) & hit)
-
-
-def _around(x: Array, smaller: np.ufunc) -> Array:
-    """Return the least (fmin) or largest (fmax) value of each 3x3 pixels."""
-    wide = np.pad(x, 1, "edge")
-    rows = smaller(smaller(wide[:-2], wide[1:-1]), wide[2:])
-    return np.asarray(smaller(smaller(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
 
 
 def _flow(

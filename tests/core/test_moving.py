@@ -1,0 +1,140 @@
+"""The places of things that move by themselves, by Vector passes and by matrices."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shots import CARD, PIXEL, WALL, View, World, camera, project, vector, view
+
+from xrds_core.temporal.frame import Stored, store
+from xrds_core.temporal.motion import Places, grid, pair, places
+from xrds_core.temporal.moving import Movement
+
+STEP = 3.3 * 5 * PIXEL  # of the card in a frame: 3.3 pixels
+FRAMES = range(5)
+
+
+def worlds() -> list[World]:
+    return [World(card=(STEP * (k - 2), 0.0)) for k in FRAMES]
+
+
+def views(pan: float) -> list[View]:
+    pairs = zip(FRAMES, worlds(), strict=True)
+    return [view(k, camera(x=pan * k), world) for k, world in pairs]
+
+
+def by_vectors(shown: list[View]) -> list[Stored]:
+    passes = [vector(shown, k, worlds()) for k in FRAMES]
+    return [
+        store(replace(each.frame, vector=one))
+        for each, one in zip(shown, passes, strict=True)
+    ]
+
+
+def by_matrices(shown: list[View]) -> list[Stored]:
+    stored = []
+    for each, world in zip(shown, worlds(), strict=True):
+        assert world.card is not None
+        matrix = np.eye(4)
+        matrix[:2, 3] = world.card
+        matrices = {WALL: np.eye(4), CARD: matrix}
+        stored.append(store(replace(each.frame, index=each.name, matrices=matrices)))
+    return stored
+
+
+def find(stored: list[Stored], here: int, there: int) -> Places:
+    others = [x for k, x in enumerate(stored) if k != here]
+    detours = Movement().detours(stored[here], others)
+    at = others.index(stored[there])
+    together = pair(stored[here], stored[there], detours[at])
+    return places(together, grid(stored[here].shape))
+
+
+@pytest.mark.parametrize("way", [by_vectors, by_matrices])
+@pytest.mark.parametrize("pan", [0.0, 0.21])
+@pytest.mark.parametrize("there", [0, 1, 3, 4])
+def test_a_moving_card_is_followed(way, pan: float, there: int) -> None:  # noqa: ANN001
+    shown = views(pan)
+    result = find(way(shown), 2, there)
+    card = shown[2].name == CARD
+    point = shown[2].point[card] + [STEP * (there - 2), 0, 0]
+    expected = project(shown[there].frame.camera, point)
+    pixel = result.pixel.reshape(card.shape)[card]
+    seen = result.seen.reshape(card.shape)[card]
+    got = np.stack(np.divmod(pixel, card.shape[1])[::-1], -1) + 0.5
+    # half floats and rounding of places: to a pixel
+    assert np.abs(got - expected)[seen].max() < 0.55
+    assert seen.mean() > 0.9
+
+
+@pytest.mark.parametrize("way", [by_vectors, by_matrices])
+@pytest.mark.parametrize("pan", [0.0, 0.21])
+def test_the_wall_takes_no_samples_of_a_card_that_passes(way, pan: float) -> None:  # noqa: ANN001
+    shown = views(pan)
+    stored = way(shown)
+    for there in (0, 1, 3, 4):
+        result = find(stored, 2, there)
+        wall = (shown[2].name == WALL).ravel()
+        took = shown[there].name.ravel()[result.pixel]
+        assert (took[wall & result.seen] == WALL).all()
+        assert result.seen[wall].mean() > 0.6
+        assert (took[~wall & result.seen] == CARD).all()
+
+
+def test_without_either_a_card_leaves_ghosts() -> None:
+    # so that the tests above are known to be able to fail
+    shown = views(0.0)
+    result = find([store(x.frame) for x in shown], 2, 3)
+    wall = (shown[2].name == WALL).ravel()
+    took = shown[3].name.ravel()[result.pixel]
+    assert (took[(shown[2].name == CARD).ravel() & result.seen] == WALL).any() or (
+        took[wall & result.seen] == CARD
+    ).any()
+
+
+def test_nothing_moving_is_known_beyond_a_missing_frame() -> None:
+    stored = by_vectors(views(0.0))
+    del stored[3]
+    result = find(stored, 2, 3)  # the last one, number 4
+    assert stored[3].number == 4
+    card = (views(0.0)[2].name == CARD).ravel()
+    assert not result.seen[card].any()
+
+
+def test_an_object_that_appears_lends_nothing() -> None:
+    stored = by_matrices(views(0.0))
+    gone = replace(stored[3], matrices={WALL: np.eye(4)})
+    result = find([*stored[:3], gone, stored[4]], 2, 3)
+    assert gone.index is not None
+    card = stored[2].index == CARD
+    assert not result.seen[card].any()
+    assert (gone.index[result.pixel[~card & result.seen]] == WALL).all()
+
+
+def test_one_movement_serves_a_whole_shot() -> None:
+    stored = by_vectors(views(0.21))
+    movement = Movement()
+    for here in FRAMES:
+        others = [x for k, x in enumerate(stored) if k != here]
+        kept = movement.detours(stored[here], others)
+        for old, new in zip(
+            kept, Movement().detours(stored[here], others), strict=True
+        ):
+            assert old is not None
+            assert new is not None
+            assert np.array_equal(old.pixels, new.pixels)
+            assert np.array_equal(old.x, new.x, equal_nan=True)
+            assert np.array_equal(old.moving, new.moving)
+
+
+def test_stereo_views_of_one_moment_need_no_vectors() -> None:
+    world = worlds()[2]
+    left, right = view(2, camera(), world), view(2, camera(x=0.1), world)
+    motion = np.full((*left.name.shape, 4), 3.0, np.float32)
+    stored = [store(replace(x.frame, vector=motion)) for x in (left, right)]
+    result = find(stored, 0, 1)
+    took = right.name.ravel()[result.pixel]
+    assert result.seen.mean() > 0.9
+    assert (took == left.name.ravel())[result.seen].all()
