@@ -1,0 +1,247 @@
+"""Samples of neighbouring frames on the pixels of one."""
+
+from __future__ import annotations
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from shots import HEIGHT, WIDTH, World, camera, view
+
+from xrds_core.errors import PictureError
+from xrds_core.temporal.accumulate import Accumulated, accumulate
+from xrds_core.temporal.agreement import REACH, agreement, brightness
+from xrds_core.temporal.frame import Frame, Stored, store
+
+Array = NDArray[np.float32]
+PASSES = ("radiance", "albedo", "normal")
+
+
+def still(count: int, noise: float = 0.0, light: float = 1.0) -> list[Stored]:
+    world = World(card=(0.3, 0.1), light=light)
+    frames = [view(k, camera(), world, noise).frame for k in range(count)]
+    return [store(x) for x in frames]
+
+
+def equal(one: Accumulated, two: Accumulated) -> bool:
+    return all(np.array_equal(getattr(one, x), getattr(two, x)) for x in PASSES)
+
+
+def mean_square(x: Array) -> float:
+    return float(np.mean(np.square(x, dtype=np.float64)))
+
+
+def test_radius_0_gives_the_frame_to_the_bit() -> None:
+    frame = replace(view(0, camera(), noise=0.5).frame, samples=3.0)
+    result = accumulate(store(frame), [])
+    for name in PASSES:
+        assert np.array_equal(getattr(result, name), getattr(frame, name))
+    assert (result.samples == 3.0).all()
+    assert result.alpha is None
+    assert result.rejected == 0.0
+
+
+def test_equal_still_frames_are_their_own_mean() -> None:
+    target, *others = still(5)
+    result = accumulate(target, others)
+    assert result.radiance.reshape(-1, 3) == pytest.approx(
+        target.picture[:, :3], rel=1e-6
+    )
+    assert result.samples == pytest.approx(5.0, rel=1e-4)
+    assert result.rejected < 1e-4
+
+
+def test_noise_falls_as_samples_say() -> None:
+    stored = still(9, noise=0.3)
+    truth = view(0, camera(), World(card=(0.3, 0.1))).colour
+    result = accumulate(stored[4], stored[:4] + stored[5:])
+    alone = mean_square(stored[4].picture[:, :3].reshape(truth.shape) - truth)
+    assert 8.0 < alone / mean_square(result.radiance - truth) < 9.5
+    assert result.rejected < 0.03
+
+
+def test_sample_counts_are_weights() -> None:
+    frame = view(0, camera()).frame
+    brighter = replace(frame, number=1, albedo=frame.albedo + 1, samples=6.0)
+    result = accumulate(store(replace(frame, samples=2.0)), [store(brighter)])
+    assert result.albedo == pytest.approx(frame.albedo + 0.75, abs=1e-4)
+    assert result.samples == pytest.approx(8.0, rel=1e-4)
+
+
+def test_a_moving_camera_brings_samples_to_their_pixels() -> None:
+    frames = [view(k, camera(x=0.21 * k), noise=0.3) for k in range(-3, 4)]
+    here = frames.pop(3)
+    result = accumulate(store(here.frame), [store(x.frame) for x in frames])
+    middle = np.s_[4:-4, 12:-12]  # what all frames show
+    alone = mean_square((here.frame.radiance - here.colour)[middle])
+    # the texture is half a pixel off at most, and weights fall with the distance
+    assert alone / mean_square((result.radiance - here.colour)[middle]) > 4.0
+    assert np.abs(result.albedo - here.colour)[middle].max() < 0.06
+    assert result.samples[middle].min() > 4.0
+
+
+def test_normals_turn_with_the_camera() -> None:
+    here, there = view(0, camera()), view(1, camera(yaw=0.3))
+    assert np.abs(there.frame.normal - here.frame.normal).max() > 0.2
+    other = replace(there.frame, samples=1e6)
+    result = accumulate(store(here.frame), [store(other)])
+    lent = result.samples > 2.0
+    assert lent.any()
+    assert result.normal[lent] == pytest.approx(here.frame.normal[lent], abs=1e-5)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", PASSES)
+def test_bad_samples_never_spread(bad: float, where: str) -> None:
+    clean = accumulate(*split(still(3, noise=0.1)))
+    for spoilt in range(3):
+        frames = [
+            view(k, camera(), World(card=(0.3, 0.1)), 0.1).frame for k in range(3)
+        ]
+        getattr(frames[spoilt], where)[20, 30, 1] = bad
+        result = accumulate(*split([store(x) for x in frames]))
+        for name in PASSES:
+            assert np.isfinite(getattr(result, name)).all()
+        far = np.ones((HEIGHT, WIDTH), bool)
+        far[20 - REACH : 21 + REACH, 30 - REACH : 31 + REACH] = False
+        assert np.array_equal(result.radiance[far], clean.radiance[far])
+        assert result.samples[20, 30] < clean.samples[20, 30] - 0.4
+
+
+def split(stored: list[Stored]) -> tuple[Stored, list[Stored]]:
+    return stored[1], [stored[0], *stored[2:]]
+
+
+def test_a_pixel_that_no_frame_knows_is_nan_alone() -> None:
+    frame = view(0, camera()).frame
+    frame.radiance[7, 9] = np.nan
+    result = accumulate(store(frame), [])
+    assert result.samples[7, 9] == 0.0
+    assert np.isnan(result.radiance[7, 9]).all()
+    assert np.isfinite(result.radiance).sum() == result.radiance.size - 3
+
+
+def test_nothing_is_lent_across_a_change_of_place() -> None:
+    target, other = still(1)[0], store(view(1, camera(), World(wall_z=-4.0)).frame)
+    result = accumulate(target, [other])
+    assert equal(result, accumulate(target, []))
+    assert result.rejected == 1.0
+
+
+def test_other_light_is_not_lent() -> None:
+    target, *others = still(5, noise=0.3)
+    others += still(5, noise=0.3, light=3.0)[1:]
+    result = accumulate(target, others)
+    truth = view(0, camera(), World(card=(0.3, 0.1))).colour
+    assert np.median(result.samples) < 6.2
+    assert mean_square(result.radiance - truth) < 0.35 * mean_square(
+        target.picture[:, :3].reshape(truth.shape) - truth
+    )
+
+
+def test_a_shadow_stays_where_it_is() -> None:
+    frames = [view(k, camera(), noise=0.3).frame for k in range(3)]
+    frames[0].radiance[10:30, 20:40] *= 0.1
+    frames[2].radiance[10:30, 20:40] *= 0.1
+    target, others = split([store(x) for x in frames])
+    result = accumulate(target, others)
+    inner = np.s_[12:28, 22:38]
+    ghost = np.abs(result.radiance - frames[1].radiance)[inner].mean()
+    assert ghost < 0.03 * frames[1].radiance[inner].mean()
+    assert result.samples[35:, :].min() > 1.5
+
+
+def test_rare_bright_samples_are_no_other_light() -> None:
+    rng = np.random.default_rng(3)
+    frames = []
+    for k in range(9):
+        frame = view(k, camera()).frame
+        fireflies = rng.random((HEIGHT, WIDTH, 1)) < 0.01
+        light = (frame.radiance * (1 + 200 * fireflies)).astype(np.float32)
+        frames.append(store(replace(frame, radiance=light)))
+    result = accumulate(frames[4], frames[:4] + frames[5:])
+    assert result.rejected < 0.03
+
+
+def test_alpha_is_gathered_and_must_be_in_all_frames() -> None:
+    frames = [view(k, camera()).frame for k in range(2)]
+    ones = np.ones((HEIGHT, WIDTH), np.float32)
+    with_alpha = [store(replace(x, alpha=ones * k)) for k, x in enumerate(frames)]
+    result = accumulate(with_alpha[0], [with_alpha[1]])
+    assert result.alpha is not None
+    assert result.alpha == pytest.approx(ones / 2, abs=1e-4)
+    with pytest.raises(PictureError, match="frame 1 and frame 0 hold different passes"):
+        accumulate(with_alpha[0], [store(frames[1])])
+
+
+def test_half_floats_lose_little_and_never_overflow() -> None:
+    frames = [view(k, camera(x=0.1 * k), noise=0.3).frame for k in range(3)]
+    frames[0].radiance[0, 0] = 1e9
+    full, half = (
+        accumulate(*split([store(x, dtype) for x in frames]))
+        for dtype in (np.float32, np.float16)
+    )
+    assert np.isfinite(half.radiance).all()
+    assert half.radiance[2:] == pytest.approx(full.radiance[2:], rel=2e-3, abs=2e-3)
+
+
+def test_the_result_does_not_depend_on_threads() -> None:
+    stored = [store(view(k, camera(x=0.2 * k), noise=0.3).frame) for k in range(3)]
+    one, many = (accumulate(*split(stored), threads=n) for n in (1, 7))
+    assert equal(one, many)
+    assert np.array_equal(one.samples, many.samples)
+
+
+def test_frames_of_other_sizes_may_lend() -> None:
+    # resolution or border may change within a shot
+    here = view(0, camera()).frame
+    part = view(1, camera(window=(8, 8)), shape=(32, 40)).frame
+    result = accumulate(store(here), [store(part)])
+    inside = np.zeros((HEIGHT, WIDTH), bool)
+    inside[8:40, 8:48] = True
+    assert np.array_equal(result.samples > 1.5, inside)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"albedo": np.zeros((4, 4, 3), np.float32)}, "albedo of frame 0 has shape"),
+        ({"depth": np.zeros((HEIGHT, WIDTH, 1), np.float32)}, "depth of frame 0"),
+        ({"alpha": np.zeros((2, 2), np.float32)}, "alpha of frame 0 has shape"),
+        ({"samples": 0.0}, "frame 0 has 0.0 samples per pixel"),
+        ({"samples": float("nan")}, "frame 0 has nan samples per pixel"),
+    ],
+)
+def test_frames_that_cannot_be_say_why(change: dict[str, object], message: str) -> None:
+    frame: Frame = view(0, camera()).frame
+    with pytest.raises(PictureError, match=message):
+        replace(frame, **change)  # type: ignore[arg-type]
+
+
+def test_the_memory_of_a_call_does_not_grow_with_the_window() -> None:
+    stored = [store(view(k, camera()).frame) for k in range(9)]
+    peaks = []
+    for others in (stored[1:2], stored[1:]):
+        accumulate(stored[0], others, threads=1)
+        tracemalloc.start()
+        accumulate(stored[0], others, threads=1)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]
+
+
+def test_agreement_of_noise_and_of_light() -> None:
+    rng = np.random.default_rng(1)
+    noise = rng.standard_normal((60, 80)).astype(np.float32)
+    assert agreement(noise).shape == (60 - 2 * REACH, 80)
+    assert agreement(noise).mean() > 0.97
+    assert agreement(noise + 2).max() < 0.3
+    assert (agreement(np.zeros((20, 20), np.float32)) == 1.0).all()
+    assert (agreement(np.full((20, 20), 2.0, np.float32))[:, REACH:-REACH] < 1e-3).all()
+
+
+def test_brightness_bears_negative_light() -> None:
+    assert brightness(np.array([[-1.0, -1.0, -1.0]], np.float32))[0] == 0.0
+    assert brightness(np.ones((2, 3), np.float32)) == pytest.approx(1.0)

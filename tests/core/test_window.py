@@ -1,0 +1,92 @@
+"""Which frames lend to which, and when they are loaded and dropped."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shots import HEIGHT, WIDTH, camera, view
+
+from xrds_core.errors import UsageError
+from xrds_core.temporal.frame import store
+from xrds_core.temporal.window import Shot, bytes_needed, slide
+
+
+def test_lenders_lie_on_both_sides_and_end_with_the_shot() -> None:
+    shot = Shot(tuple(range(1, 8)), radius=2)
+    assert shot.lenders(4) == (3, 5, 2, 6)
+    assert shot.lenders(1) == (2, 3)
+    assert shot.lenders(7) == (6, 5)
+    assert Shot((5,), radius=3).lenders(5) == ()
+    assert Shot((1, 2, 3), radius=0).lenders(2) == ()
+
+
+def test_steps_count_as_one_frame_each() -> None:
+    assert Shot((1, 11, 21, 31), radius=1).lenders(21) == (11, 31)
+
+
+def test_nothing_is_lent_across_a_cut() -> None:
+    shot = Shot(tuple(range(1, 9)), radius=3, cuts=frozenset({4, 6}))
+    assert shot.lenders(3) == (2, 1)
+    assert shot.lenders(4) == (5,)
+    assert shot.lenders(6) == (7, 8)
+
+
+def test_frames_of_other_machines_only_lend() -> None:
+    shot = Shot((5, 6), radius=2, lending=(1, 2, 3, 4, 7, 8, 9))
+    loaded = []
+    done = [x for x, _, _ in slide(shot, lambda n: loaded.append(n) or n)]
+    assert done == [5, 6]
+    assert loaded == [3, 4, 5, 6, 7, 8]  # and no frame that nobody needs
+
+
+@pytest.mark.parametrize("radius", [0, 1, 3, 20])
+@pytest.mark.parametrize("cuts", [(), (5, 9)])
+def test_each_frame_is_loaded_once_and_few_are_kept(
+    radius: int, cuts: tuple[int, ...]
+) -> None:
+    shot = Shot(tuple(range(12)), radius, frozenset(cuts))
+    alive: dict[int, int] = {}
+    loads: list[int] = []
+    most = 0
+
+    class Picture:
+        def __init__(self, number: int) -> None:
+            self.number = number
+            alive[number] = 1
+
+        def __del__(self) -> None:
+            del alive[self.number]
+
+    def load(number: int) -> Picture:
+        loads.append(number)
+        return Picture(number)
+
+    done = []
+    for number, frame, others in slide(shot, load):
+        assert frame.number == number
+        assert tuple(others) == shot.lenders(number)
+        assert all(x.number == n for n, x in others.items())
+        done.append(number)
+        most = max(most, len(alive))
+        # no later than it must be: the last neighbour is there, and nothing beyond
+        assert max(loads) == max((number, *others))
+        del frame, others
+    assert done == loads == list(range(12))
+    assert most <= shot.most_kept
+
+
+def test_missing_frames_lend_nothing_and_are_left_out() -> None:
+    shot = Shot((1, 2, 3, 4), radius=1)
+    found = list(slide(shot, lambda n: None if n == 2 else n))
+    assert found == [(1, 1, {}), (3, 3, {4: 4}), (4, 4, {3: 3})]
+
+
+def test_a_negative_radius_is_refused() -> None:
+    with pytest.raises(UsageError, match="temporal radius -1: give 0 or more"):
+        Shot((1, 2), radius=-1)
+
+
+def test_memory_is_foretold() -> None:
+    frame = view(0, camera()).frame
+    assert store(frame, np.float16).bytes == bytes_needed(WIDTH, HEIGHT, 1)
+    assert bytes_needed(1920, 1080, 9) < 420e6
