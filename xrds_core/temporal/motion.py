@@ -7,7 +7,7 @@ each pair of frames tells it, and another one for each object that moved. Nearne
 
 A place counts where going there and back agrees: what the other frame shows there must
 come from this pixel, to within half a pixel of motion, and be as near as something in
-the 3x3 pixels around it. This throws out whatever covers or uncovers the surface, and
+the 9x9 pixels around it. This throws out whatever covers or uncovers the surface, and
 leaves edges their mixed samples as long as both sides of the edge move alike. Choosing
 samples by what shows at the pixel's own centre would choose by their content: edges
 would lose what smooths them.
@@ -145,19 +145,30 @@ def pair(
 
 
 def surroundings(frame: Stored) -> tuple[Array, Array]:
-    """Return the least and largest nearness around each pixel, with some slack."""
+    """Return the least and largest nearness in the 9x9 pixels around, with some slack.
+
+    Less than 9x9 cost 1.4 dB on a house with fine rails: hits and misses of what is
+    thinner than a pixel must not choose its samples.
+    """
     nearness = frame.nearness.reshape(frame.shape)
+    least, most = (
+        extreme(extreme(nearness, smaller), smaller, step=3).ravel()
+        for smaller in (np.fmin, np.fmax)
+    )
     slack = np.float32(_NEARNESS_SLACK)
-    least = extreme(nearness, np.fmin) * (1 - slack)
-    most = extreme(nearness, np.fmax) * (1 + slack)
-    return least.ravel(), most.ravel()
+    return least * (1 - slack), most * (1 + slack)
 
 
-def extreme(x: Array, smaller: np.ufunc) -> Array:
-    """Return the least (`np.fmin`) or largest (`np.fmax`) value of each 3x3 pixels."""
-    wide = np.pad(x, 1, "edge")
-    rows = smaller(smaller(wide[:-2], wide[1:-1]), wide[2:])
-    return np.asarray(smaller(smaller(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:]))
+def extreme(x: Array, smaller: np.ufunc, step: int = 1) -> Array:
+    """Return the least (`np.fmin`) or largest (`np.fmax`) value of 3x3 pixels.
+
+    They lie ``step`` pixels apart, the middle one at the pixel itself.
+    """
+    wide = np.pad(x, step, "edge")
+    end = slice(2 * step, None)
+    rows = smaller(smaller(wide[: -2 * step], wide[step:-step]), wide[end])
+    columns = smaller(rows[:, : -2 * step], rows[:, step:-step])
+    return np.asarray(smaller(columns, rows[:, end]))
 
 
 def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Grid:
