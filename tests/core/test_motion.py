@@ -54,7 +54,9 @@ def test_the_wall_is_found_where_rays_say(eye: Camera, flat: bool) -> None:
     assert inside.mean() > 0.5
     assert np.array_equal(result.seen[inside], np.ones(inside.sum(), bool))
     off = expected - np.floor(expected) - 0.5
-    assert result.apart[inside] == pytest.approx((off**2).sum(-1)[inside], abs=5e-3)
+    # and what the way there and back leaves over, where the scale changes
+    beyond = result.apart[inside] - (off**2).sum(-1)[inside]
+    assert -5e-3 < beyond.min() <= beyond.max() < 0.02
 
 
 def test_a_still_camera_finds_every_pixel_in_itself() -> None:

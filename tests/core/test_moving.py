@@ -131,7 +131,7 @@ def test_one_movement_serves_a_whole_shot() -> None:
 
 def test_stereo_views_of_one_moment_need_no_vectors() -> None:
     world = worlds()[2]
-    left, right = view(2, camera(), world), view(2, camera(x=0.1), world)
+    left, right = view(2, camera(), world), view(2, camera(x=0.3), world)
     motion = np.full((*left.name.shape, 4), 3.0, np.float32)
     stored = [store(replace(x.frame, vector=motion)) for x in (left, right)]
     result = find(stored, 0, 1)

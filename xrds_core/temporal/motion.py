@@ -6,7 +6,7 @@ each pair of frames tells it, and another one for each object that moved. Nearne
 1 / depth for a perspective camera, 0 for the sky; for an orthographic one the depth.
 
 A place counts where going there and back agrees: what the other frame shows there must
-come from this pixel, to within half a pixel of motion, and be as near as something in
+come from this pixel, to within a pixel of motion, and be as near as something in
 the 9x9 pixels around it. This throws out whatever covers or uncovers the surface, and
 leaves edges their mixed samples as long as both sides of the edge move alike. Choosing
 samples by what shows at the pixel's own centre would choose by their content: edges
@@ -25,8 +25,12 @@ if TYPE_CHECKING:
 
     from .frame import Array, Camera, Matrix, Stored
 
-# Pixels by which motion there and motion back may differ.
-AGREEMENT = 0.5
+# Pixels by which motion there and motion back may differ; for things that move by
+# themselves, whose edges are known less well, half as much.
+_AGREEMENT = 1.0
+AGREEMENT_OF_MOVING = 0.5
+# What they differ by is as bad as this much distance from the true place (squared).
+_AS_DISTANCE = 2.0
 # Share of itself by which nearness may lie beyond what is around.
 _NEARNESS_SLACK = 0.02
 
@@ -45,7 +49,8 @@ class Places:
     """Where pixels were in another frame.
 
     ``pixel``: flat index of the other frame's nearest pixel, 0 where not seen;
-    ``apart``: squared distance in pixels from the true place to that pixel's centre;
+    ``apart``: squared distance in pixels from the true place to that pixel's centre,
+    and what motion there and back leave over;
     ``seen``: where the other frame shows the same. All (n,), in the order of the grid.
     """
 
@@ -209,10 +214,11 @@ def _still(pair: Pair, grid: Grid) -> Places:
     # what the way there and the way back leave over
     back_x += x - grid.x - centre_x
     back_y += y - grid.y - centre_y
-    seen = found.seen & (back_x**2 + back_y**2 < AGREEMENT**2)
+    left = back_x**2 + back_y**2
     least, most = (part[grid.pixels] for part in pair.around)
-    seen &= (near >= least) & (near <= most)
-    return Places(found.pixel, found.apart, seen)
+    seen = found.seen & (left < _AGREEMENT**2) & (near >= least) & (near <= most)
+    left[~seen] = 0.0
+    return Places(found.pixel, found.apart + np.float32(_AS_DISTANCE) * left, seen)
 
 
 def _detoured(found: Places, pair: Pair, grid: Grid) -> Places:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .motion import AGREEMENT, Detour, carry, centres, known, nearest, passage
+from .motion import AGREEMENT_OF_MOVING, Detour, carry, centres, known, nearest, passage
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -70,4 +70,4 @@ def _rigid(
     back_x, back_y, _ = carry(back, centre_x, centre_y, there.nearness[found.pixel])
     off_x, off_y = x - own_x + back_x - centre_x, y - own_y + back_y - centre_y
     same = found.seen & (there.index[found.pixel] == name)
-    return known(x, y, same & (off_x**2 + off_y**2 < AGREEMENT**2))
+    return known(x, y, same & (off_x**2 + off_y**2 < AGREEMENT_OF_MOVING**2))

@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from .motion import (
-    AGREEMENT,
+    AGREEMENT_OF_MOVING,
     Detour,
     carry,
     centres,
@@ -97,7 +97,9 @@ class Trails:
         flow_x, flow_y = _flow(here, start.pixel, forward)
         found = nearest(x + flow_x, y + flow_y, there.shape)
         back_x, back_y = _flow(there, found.pixel, not forward)
-        agreed = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2 < AGREEMENT**2
+        agreed = (flow_x + back_x) ** 2 + (
+            flow_y + back_y
+        ) ** 2 < AGREEMENT_OF_MOVING**2
         agreed &= self.moving(there, frames)[found.pixel] & found.seen & start.seen
         return known(x + flow_x, y + flow_y, agreed)
 
@@ -137,7 +139,7 @@ def _unexplained(frame: Stored, beside: Camera, forward: bool) -> Mask:
         np.fmax(apart, extreme(explained, np.fmin) - given, out=apart)
         np.fmax(apart, given - extreme(explained, np.fmax), out=apart)
     hit = (frame.nearness > 0.0) | (frame.nearness < 0.0)  # neither sky nor NaN
-    return np.asarray((apart.ravel() > AGREEMENT / 2) & hit)
+    return np.asarray((apart.ravel() > AGREEMENT_OF_MOVING / 2) & hit)
 
 
 def _flow(
