@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 REACH = 3  # pixels to each side that are summed: 7x7
 # z squared is 1 on the mean where frames agree, and above 4 in one pixel of twenty.
 _NOISE = 4.0
-_FALL = 4.0
+_FALL = 2.0
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
 _TINY = np.float32(1e-30)
 
