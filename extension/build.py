@@ -1,8 +1,10 @@
-"""Build the extension's zips: one per platform and Python, and one without torch.
+"""Build the extension's zips, for each platform and Python of Blender.
 
-Each holds a manifest, a root module and wheels: the project's own and, but for the one
-without torch, those of PyTorch's CPU build, safetensors and OpenEXR. Blender's own
-`extension build` makes and checks them; it comes with the bpy module.
+Each holds a manifest, a root module and wheels. `light` zips render at full size: they
+hold the project's own wheel, Open Image Denoise and OpenEXR. `full` zips hold PyTorch's
+CPU build and safetensors beside these. The `bare` zip, one for all, holds the project's
+own wheel alone, for pipelines that bring the libraries. Blender's own `extension build`
+makes and checks them; it comes with the bpy module.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ import tempfile
 import tomllib
 from pathlib import Path
 
-from wheels import PLATFORMS, NoCpuBuild, download, resolve, targets
+from wheels import PLATFORMS, NoCpuBuild, Target, download, resolve, targets
 
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = "blender_manifest.toml"
@@ -25,7 +27,7 @@ PACKAGES = ("xrds_core", "xrds_blender")
 SIZE_LIMIT = 300_000_000  # bytes; what the extension platform means to take
 # Python inside Blender, and the Blenders that have it: from, to (not included).
 PYTHONS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
-WITHOUT_TORCH = "without_torch"
+LIGHT = ("mitsuba-oidn", "OpenEXR")
 
 
 def build(
@@ -89,21 +91,30 @@ def _run(*words: str) -> None:
         sys.exit(f"{' '.join(words)} failed:\n{done.stdout}{done.stderr}")
 
 
-def _with_torch(options: argparse.Namespace, own: Path) -> None:
-    """One zip for each platform and Python that the index has a CPU torch for."""
-    wanted = [f"torch=={options.torch}", "safetensors", "OpenEXR"]
-    for target in targets(options.platform, list(PYTHONS)):
+def _with_libraries(kind: str, options: argparse.Namespace, own: Path) -> None:
+    """One zip of a kind for each platform and Python that the index has wheels for."""
+    wanted = list(LIGHT)
+    if kind == "full":
+        wanted += [f"torch=={options.torch}", "safetensors"]
+    for target in targets(options.platform, options.python):
+        name = target.name if kind == "full" else f"{kind}-{target.name}"
         try:
             pins = resolve(target, wanted)
-            wheels = download(target, pins, options.cache / target.name)
+            wheels = download(target, pins, options.cache / name)
         except (NoCpuBuild, LookupError) as error:
-            print(f"{target.name}: no zip with torch, {error}")
+            print(f"{name}: no zip, {error}")
             continue
-        least, end = PYTHONS[target.python]
-        lines = {"platforms": [target.platform], "blender_version_min": least}
-        if end:
-            lines["blender_version_max"] = end
-        _print_size(build(options.out, target.name, [own, *wheels], lines))
+        lines = {"platforms": [target.platform]} | _versions(target, options)
+        _print_size(build(options.out, name, [own, *wheels], lines))
+
+
+def _versions(target: Target, options: argparse.Namespace) -> dict[str, object]:
+    """The Blenders that have the target's Python, as lines of the manifest."""
+    if options.any_blender:
+        return {}
+    least, end = PYTHONS[target.python]
+    newest = {"blender_version_max": end} if end else {}
+    return {"blender_version_min": least, **newest}
 
 
 def _print_size(path: Path) -> None:
@@ -123,16 +134,24 @@ def main() -> None:
         default=ROOT / "build" / "wheels",
         help="folder for downloaded wheels",
     )
-    add("--without-torch", action="store_true", help="build only the small zip")
+    kinds = ("bare", "light", "full")
+    add("--kind", nargs="+", choices=kinds, default=["light", "full"])
     add("--torch", default="2.13.0", help="version of PyTorch")
     names = {"nargs": "+", "choices": list(PLATFORMS), "default": list(PLATFORMS)}
     add("--platform", **names)
+    add("--python", nargs="+", default=list(PYTHONS), help="as 3.11")
+    distributions = "for builds of distributions, which pair it with other Pythons"
+    add("--any-blender", action="store_true", help=distributions)
     options = parser.parse_args()
+    if not options.any_blender and set(options.python) - set(PYTHONS):
+        parser.error(f"Blenders have Python {', '.join(PYTHONS)}; see --any-blender")
     with tempfile.TemporaryDirectory() as folder:
         own = own_wheel(Path(folder))
-        _print_size(build(options.out, WITHOUT_TORCH, [own]))
-        if not options.without_torch:
-            _with_torch(options, own)
+        for kind in options.kind:
+            if kind == "bare":
+                _print_size(build(options.out, kind, [own]))
+            else:
+                _with_libraries(kind, options, own)
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
@@ -20,27 +21,36 @@ ARTIFACTS = ROOT / "build" / "app"
 NONE = "no Blender program: make test-app fetches one, or name some in XRDS_BLENDERS"
 
 
-@pytest.fixture(scope="session")
-def extension(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The small zip: the programs have a PyTorch of their own."""
-    out = tmp_path_factory.mktemp("zip")
-    script = ROOT / "extension" / "build.py"
-    command = [sys.executable, str(script), "--without-torch", "--out", str(out)]
-    subprocess.run(command, check=True, capture_output=True)
-    (path,) = out.glob("*.zip")
-    return path
-
-
 @pytest.fixture(scope="session", params=programs() or [None], ids=str)
-def program(request: pytest.FixtureRequest, extension: Path) -> Program:
-    """A program with a folder of its own under build/app, emptied first."""
+def program(request: pytest.FixtureRequest) -> Program:
+    """A program with a folder of its own under build/app, emptied first.
+
+    The folder holds the light zip: the programs have a PyTorch of their own.
+    """
     if request.param is None:
         pytest.skip(NONE)
     share = ARTIFACTS / request.param.name
     shutil.rmtree(share, ignore_errors=True)
     (share / "home").mkdir(parents=True)
-    shutil.copy(extension, share)
-    return Program(request.param, share)
+    found = Program(request.param, share)
+    build_light_zip(share, python_of(found))
+    return found
+
+
+def python_of(program: Program) -> str:
+    """The version of the Python inside the program, as 3.13."""
+    code = "import sys; print('python=%d.%d' % sys.version_info[:2])"
+    done = program.run("blender", "-b", "--factory-startup", "--python-expr", code)
+    (version,) = re.findall(r"^python=(\S+)$", done.stdout, re.MULTILINE)
+    return version
+
+
+def build_light_zip(folder: Path, python: str) -> None:
+    script = str(ROOT / "extension" / "build.py")
+    which = ["--kind", "light", "--platform", "linux-x64", "--python", python]
+    which.append("--any-blender")  # Debian pairs it with a Python of its own
+    command = [sys.executable, script, *which, "--out", str(folder)]
+    subprocess.run(command, check=True, capture_output=True)
 
 
 @pytest.fixture(scope="session")

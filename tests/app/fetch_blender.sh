@@ -41,11 +41,12 @@ inside apt-get install -y -qq blender python3-torch python3-numpy python3-reques
 inside apt-get install -y -qq python3-cattr || true
 inside apt-get clean
 
-# Debian has no packages of these two; the wheels are those of the program's Python.
+# Debian has no packages of these; the wheels are those of the program's Python.
 python=$(inside python3 -c 'import sys; print("%d.%d" % sys.version_info[:2])')
 "${PYTHON:-python3}" -m pip install --quiet --no-deps --only-binary :all: \
     --python-version "$python" --platform manylinux_2_28_x86_64 \
-    --platform manylinux2014_x86_64 \
-    --target "$root/usr/local/lib/python$python/dist-packages" safetensors OpenEXR
+    --platform manylinux_2_27_x86_64 --platform manylinux2014_x86_64 \
+    --target "$root/usr/local/lib/python$python/dist-packages" \
+    safetensors OpenEXR mitsuba-oidn drjit nanobind-backend
 inside blender --version | head -1
 touch "$root/.complete"

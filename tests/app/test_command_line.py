@@ -233,6 +233,35 @@ except RuntimeError as error:
     assert "preferences tell where from" in error
 
 
+def test_the_first_click_renders_at_full_size_without_torch(bare: Program) -> None:
+    code = f"""
+import sys
+for name in ("torch", "safetensors"):
+    sys.modules[name] = None
+# what the zip holds, not what the tests of the matrix were given
+sys.path[:] = [path for path in sys.path if not path.startswith("/usr/local/lib")]
+import bpy
+scene = bpy.context.scene
+scene.render.engine = "XRDS"
+scene.xrds.scale = "1"
+scene.cycles.samples = 1
+scene.render.resolution_x = scene.render.resolution_y = 64
+scene.render.resolution_percentage = 100
+scene.render.image_settings.file_format = "OPEN_EXR"
+scene.render.filepath = {bare.seen(bare.share / "full.exr")!r}
+bpy.ops.render.render(write_still=True)
+import mitsuba_oidn
+print("from=" + mitsuba_oidn.__file__)
+"""
+    text = python(bare, code)
+    assert "/extensions/.local/" in told(text, "from")
+    openexr = pytest.importorskip("OpenEXR")
+    with openexr.File(str(bare.share / "full.exr"), separate_channels=True) as file:
+        red = file.channels()["R"].pixels
+    assert red.shape == (64, 64)
+    assert red.std() > 0.01
+
+
 def test_uninstalls_without_residue(bare: Program) -> None:
     extension(bare, "remove", "xrds")
     assert not files(bare.share / "home")

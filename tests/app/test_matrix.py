@@ -25,6 +25,7 @@ COPIED = (
     "xrds_lab",
     "tests/blender",
     "tests/conftest.py",
+    "tests/channels.py",
     "pyproject.toml",
 )
 # Left out: what starts a Python of its own.

@@ -77,6 +77,26 @@ def test_help_is_0(capfd: pytest.CaptureFixture[str]) -> None:
     assert "--guide-samples" in capfd.readouterr().out
 
 
+def test_without_the_laboratory_its_commands_are_not_listed(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(main, "entry_points", lambda **_: [])
+    assert main.main(["--help"]) == 0
+    listed = capfd.readouterr().out
+    assert "render" in listed
+    assert not [name for name in main.LABORATORY if name in listed]
+    assert main.main(["bench", "a.blend"]) == 2
+    err = capfd.readouterr().err
+    assert err.startswith("xrds: bench belongs to the laboratory")
+    assert err.count("\n") == 1
+
+
+def test_with_it_they_are(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["--help"]) == 0
+    listed = capfd.readouterr().out
+    assert all(name in listed for name in main.LABORATORY)
+
+
 def test_render_options() -> None:
     options = parse(
         "render a.blend -o f_####.png --frames=-2-3 --resolution 640x360 "

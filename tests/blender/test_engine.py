@@ -12,7 +12,8 @@ from channels import read_channels
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import render, run_job
-from xrds_blender.cycles import session
+from xrds_blender.frame.denoisers import in_process
+from xrds_blender.frame.job import RenderJob
 from xrds_core.errors import UsageError, WeightsError
 
 BLENDER_5 = bpy.app.version >= (5, 0)
@@ -20,7 +21,8 @@ BLENDER_5 = bpy.app.version >= (5, 0)
 
 def low_picture(scene: Any, scale: int = 2) -> np.ndarray:
     """What the stand-in makes of the scene's low-resolution render."""
-    beauty = run_job(scene, lambda passes: passes.beauty(scale))
+    ours = in_process(RenderJob())
+    beauty = run_job(scene, lambda passes: passes.beauty(scale, in_process=ours))
     large = beauty.radiance.repeat(scale, 0).repeat(scale, 1)
     return large[: scene.render.resolution_y, : scene.render.resolution_x]
 
@@ -36,10 +38,9 @@ def test_a_still_is_the_enlarged_picture(
     assert network[0].scale == int(scale)
 
 
-@pytest.mark.parametrize("scale", [1, 2])
-def test_plain_is_cycles_bit_for_bit(life: Any, written: Any, scale: int) -> None:
+def test_plain_is_cycles_bit_for_bit(life: Any, written: Any) -> None:
     expected = written(life, "CYCLES")
-    picture = render(life, scale, plain=scale != 1)
+    picture = render(life, 2, plain=True)
     np.testing.assert_array_equal(picture.radiance, expected[..., :3])
     np.testing.assert_array_equal(picture.alpha, expected[..., 3])
     life.xrds.plain = True
@@ -128,12 +129,14 @@ def test_persistent_data_changes_no_pixel(
 
 
 def test_the_network_sees_the_picture_before_denoising(life: Any, network: Any) -> None:
-    if not session.has_denoiser():
-        pytest.skip("this Blender has no OpenImageDenoise")
     render(life, 2, samples=2, seed=1)
+    ours = in_process(RenderJob())
     rough, smooth = run_job(
         life,
-        lambda passes: [passes.beauty(2, 2, denoise=d, seed=1) for d in (False, True)],
+        lambda passes: [
+            passes.beauty(2, 2, denoise=d, seed=1, in_process=ours)
+            for d in (False, True)
+        ],
     )
     (call,) = network[0].calls
     np.testing.assert_array_equal(call["noisy"], rough.radiance)

@@ -27,7 +27,7 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("extension")
     script = ROOT / "extension" / "build.py"
     done = subprocess.run(
-        [sys.executable, script, "--without-torch", "--out", out],
+        [sys.executable, script, "--kind", "bare", "--out", out],
         capture_output=True,
         text=True,
         check=False,

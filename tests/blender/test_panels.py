@@ -9,7 +9,7 @@ import bpy
 import pytest
 
 import xrds_blender
-from xrds_blender.frame import progress, torch_folder
+from xrds_blender.frame import denoisers, progress, torch_folder
 from xrds_blender.interface import (
     cycles_panels,
     machine,
@@ -107,10 +107,13 @@ def test_panel_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert panels.remarks(scene) == []
     monkeypatch.setattr(torch_folder, "is_there", lambda: False)
     monkeypatch.setattr(panels.session, "has_denoiser", lambda: False)
+    monkeypatch.setattr(denoisers, "is_there", lambda: False)
     scene.view_layers[0].use_pass_glossy_direct = True
     told = " ".join(text for _, text in panels.remarks(scene))
     for word in ("PyTorch is missing", "no denoiser", "Light passes"):
         assert word in told
+    scene.xrds.scale = "1"
+    assert panels.remarks(scene) == [("ERROR", panels.NO_DENOISER)]
 
 
 def test_operator_needs_a_camera() -> None:

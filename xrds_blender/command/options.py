@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..frame.job import GUIDES, PRESETS, SCALES, RenderJob
+from xrds_core.errors import UsageError
+
+from ..frame.job import GUIDES, PRESETS, QUALITIES, SCALES, RenderJob
 from ..planning.plan import SAVINGS
 from . import arguments
 
+RADIUS = 4  # frames, by default: more bring little
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
 
 
@@ -40,7 +43,20 @@ def add_job(command: argparse.ArgumentParser) -> None:
     add(
         "--samples",
         type=arguments.positive,
-        help="samples per pixel of the low-resolution render",
+        help="samples per pixel of the low-resolution render, or at scale 1",
+    )
+    add(
+        "--denoise",
+        choices=QUALITIES,
+        default="high",
+        help="quality of the denoiser at scale 1 (default: high)",
+    )
+    add(
+        "--temporal-radius",
+        type=int,
+        metavar="N",
+        help="frames before and after that lend their samples, at scale 1 "
+        "(default: 4 for several frames)",
     )
     add(
         "--guide-samples",
@@ -106,7 +122,23 @@ def job_of(options: argparse.Namespace) -> RenderJob:
         quality=options.quality,
         memory_limit=options.memory_limit,
         weights=options.weights,
+        denoise=options.denoise,
+        temporal_radius=_temporal_radius(options),
         savings=() if options.keep_all else SAVINGS,
         guide_cache=options.guide_cache,
         guide_limit=options.guide_limit,
     )
+
+
+def _temporal_radius(options: argparse.Namespace) -> int:
+    """The radius asked for; by default one that pays, where frames can lend."""
+    asked: int | None = options.temporal_radius
+    full_size = options.scale == 1 and not (options.plain or options.time_budget)
+    if asked is not None:
+        if asked and not full_size:
+            raise UsageError(
+                "--temporal-radius needs --scale 1: other scales cannot yet"
+            )
+        return asked
+    several = len(getattr(options, "frames", None) or ()) > 1
+    return RADIUS if several and full_size else 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,11 @@ from xrds_core.atomic import sweep
 from xrds_core.errors import PictureError, XRDSError
 
 from ..cycles.size import picture_size
+from ..frame.denoisers import load_denoiser
 from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.networks import known_networks, load_upscaler
+from ..frame.rendering import render
+from ..shot.shot import render_shot
 from . import picture_file
 from .scene_file import open_scene
 from .whole_file import is_whole
@@ -47,55 +50,76 @@ def render_file(
     """
     picture_file.check_output(output, len(frames or [0]))
     scene = open_scene(path, resolution)
-    _check_network(job)
+    _check_libraries(job)
     numbers = list(frames or [scene.frame_current])
     if resume:
         sweep(Path(output).parent)
-    kept, entries, last = [], [], None
     size = picture_size(scene.render)
-    for number in numbers:
+
+    def is_done(number: int) -> bool:
         # asked anew for each: another render may be writing the same frames
-        if resume and is_whole(picture_file.frame_path(output, number), size):
-            kept.append(number)
-            continue
-        entry, last = _frame(scene, job, output, number)
-        entries.append(entry)
+        return resume and is_whole(picture_file.frame_path(output, number), size)
+
+    written, last = [], None
+    for number, last in _pictures(scene, job, output, numbers, is_done):
+        written.append(_write(scene, output, number, last))
     job = (last and last.job) or job
+    rendered = {entry["frame"] for entry in written}
     return {
         "output": output,
         "resolution": list(size),
-        "scale": 1 if job.is_plain else job.scale,
-        "preset": None if job.is_plain else job.preset,
+        "scale": 1 if job.plain else job.scale,
+        "preset": job.preset if job.is_enlarged else None,
         "device": last.device if last else "",
-        "frames": entries,
-        "kept": kept,
+        "frames": written,
+        "kept": [number for number in numbers if number not in rendered],
         "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
     }
 
 
-def _check_network(job: RenderJob) -> None:
+def _check_libraries(job: RenderJob) -> None:
     """Raise XRDSError now rather than after the Cycles renders."""
     if job.is_picked:
         known_networks(job)  # and PyTorch is loaded before the budget begins
-    elif not job.is_plain:
+    elif job.is_enlarged:
         load_upscaler(job)
+    elif not job.plain:
+        load_denoiser(job)
 
 
-def _frame(
-    scene: Any, job: RenderJob, output: str, number: int
-) -> tuple[dict[str, Any], Picture]:
-    """Render and write one frame; its entry for the JSON, and the picture."""
-    from ..frame.rendering import render
+def _pictures(
+    scene: Any,
+    job: RenderJob,
+    output: str,
+    numbers: Sequence[int],
+    is_done: Callable[[int], bool],
+) -> Iterator[tuple[int, Picture]]:
+    """Number and picture of every frame that is not done."""
+    if job.temporal_radius and len(numbers) > 1:
+        yield from render_shot(scene, job, numbers, is_done)
+        return
+    for number in numbers:
+        if not is_done(number):
+            yield number, _picture(scene, job, output, number)
 
+
+def _picture(scene: Any, job: RenderJob, output: str, number: int) -> Picture:
     scene.frame_set(number)
-    target = picture_file.frame_path(output, number)
     try:
-        picture = render(scene, **vars(job))
+        return render(scene, **vars(job))
     except NetworkFailed as error:
+        target = picture_file.frame_path(output, number)
         low = target.with_stem(f"{target.stem}_low")
         place = _keep(low, error.radiance, error.alpha, scene)
         raise XRDSError(f"frame {number}: {error}, {place}") from error
+
+
+def _write(scene: Any, output: str, number: int, picture: Picture) -> dict[str, Any]:
+    """Write one frame; returns its entry for the JSON."""
+    target = picture_file.frame_path(output, number)
     start = time.perf_counter()
+    if scene.frame_current != number and scene.animation_data:
+        scene.frame_set(number)  # its view settings may be animated
     try:
         picture_file.save(target, picture.radiance, picture.alpha, scene)
     except PictureError as error:
@@ -105,13 +129,13 @@ def _frame(
     seconds = dict(picture.seconds)
     seconds["write"] += written
     seconds["total"] += written
-    entry = {
+    return {
         "frame": number,
         "output": str(target),
         "seconds": seconds,
+        "temporal": picture.temporal and dataclasses.asdict(picture.temporal),
         "peak_memory": picture.peak_memory,
     }
-    return entry, picture
 
 
 def _keep(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:

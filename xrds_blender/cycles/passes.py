@@ -8,8 +8,10 @@ of the render settings, and all of it is given back.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ from .borrowed import Borrowed, PipelineSettings
 from .guide_settings import guide_settings
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
 from .pass_names import ALBEDO, COMBINED, DEPTH, GUIDE_PASSES, NOISY, NORMAL, is_light
-from .rendered import Beauty, Guides
+from .rendered import Beauty, Guides, InProcess
 from .settings import set_box_filter, set_denoising, set_sampling
 from .size import border_start, frame_size
 
@@ -77,10 +79,7 @@ class CyclesPasses:
         self._scene = self._depsgraph.scene_eval
         self._layer_eval = self._depsgraph.view_layer_eval
         for name, letters in self._wanted_passes():
-            if name not in self._layer().passes:
-                self._engine.add_pass(
-                    name, len(letters), letters, layer=self._layer_name
-                )
+            session.add_pass(self._engine, self._layer_name, name, letters)
         return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
@@ -106,15 +105,22 @@ class CyclesPasses:
         denoise: bool = True,
         seed: int | None = None,
         denoiser: Denoiser | None = None,
+        in_process: InProcess | None = None,
     ) -> Beauty:
         """Render the beauty at 1/scale of the size, filtered by a box of one pixel.
 
         Scale 1 keeps the scene's own filter: plain Cycles. `samples` None takes the
         scene's sampling, adaptive or not; `denoiser` None the scene's mode. Without a
-        denoiser in this Blender the picture stays noisy.
+        denoiser in this Blender the picture stays noisy. `in_process` denoises in
+        Cycles' place.
         """
         return self.beauties(
-            scale, samples, denoise=denoise, seed=seed, denoiser=denoiser
+            scale,
+            samples,
+            denoise=denoise,
+            seed=seed,
+            denoiser=denoiser,
+            in_process=in_process,
         )[self.views[0]]
 
     def beauties(
@@ -125,15 +131,22 @@ class CyclesPasses:
         denoise: bool = True,
         seed: int | None = None,
         denoiser: Denoiser | None = None,
+        in_process: InProcess | None = None,
     ) -> dict[str, Beauty]:
         """As `beauty`, for every view by name (one without stereo)."""
-        denoise = denoise and session.has_denoiser()
+        in_process = in_process if denoise else None
+        denoise = denoise and in_process is None and session.has_denoiser()
         grid = self._grid(scale)
         with Borrowed() as borrowed:
             set_sampling(borrowed, self._scene, samples, seed)
             set_denoising(borrowed, self._scene, self._layer_eval, denoise, denoiser)
             clock = self._run_low(borrowed, grid)
         seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
+        if in_process is not None:
+            return {
+                view: self._denoised_beauty(view, grid, in_process, seconds)
+                for view in self.views
+            }
         return {
             view: self._read_beauty(view, grid, denoise, seconds) for view in self.views
         }
@@ -174,6 +187,12 @@ class CyclesPasses:
         kept = [n for n in self.pass_names() if n != COMBINED and not is_light(n)]
         passes = {(view, n): self._read(n, view) for view in self.views for n in kept}
         return {key: pixels for key, pixels in passes.items() if pixels is not None}
+
+    def all_passes(self) -> dict[tuple[str, str], Array]:
+        """Copies of all passes by (view, name), as they are now."""
+        names = self.pass_names()
+        found = {(view, n): self._read(n, view) for view in self.views for n in names}
+        return {key: pixels for key, pixels in found.items() if pixels is not None}
 
     def put_back(self, passes: dict[tuple[str, str], Array]) -> None:
         """Write passes that `data_passes` gave into the result again."""
@@ -305,6 +324,25 @@ class CyclesPasses:
             grid.offset(self.region),
             seconds,
             {name: low(pixels) for name, pixels in self._light_passes(view)},
+        )
+
+    def _denoised_beauty(
+        self, view: str, grid: LowGrid, denoise: InProcess, seconds: dict[str, float]
+    ) -> Beauty:
+        """Denoise before resampling: interpolated noise would count as texture."""
+        rendered = grid.rendered(self._size)
+        beauty = self._read_beauty(view, grid, False, seconds)
+        corners = [self._radiance(view, False)]
+        corners += [self._read(name, view) for name in (ALBEDO, NORMAL)]
+        noisy, albedo, normal = (self._read_corner(x, rendered) for x in corners)
+        started = time.perf_counter()
+        picture = grid.resample(denoise(noisy, albedo, normal), rendered)
+        spent = time.perf_counter() - started
+        return replace(
+            beauty,
+            radiance=picture[..., :3].copy(),
+            noisy=beauty.radiance,
+            seconds=seconds | {"denoise": spent},
         )
 
     def _light_passes(self, view: str) -> Iterator[tuple[str, Array]]:

@@ -5,9 +5,13 @@ Arrays are float32, scene-linear, row 0 on top. Seconds are by stage.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from xrds_core.arrays import Array
+
+InProcess = Callable[[Array, Array, Array], Array]
+"""Denoises: radiance and alpha (h, w, 4), albedo, normal (h, w, 3) -> (h, w, 4)."""
 
 
 @dataclass(frozen=True)

@@ -127,6 +127,19 @@ def free(engine: Any) -> None:
     engine.session = None
 
 
+def add_pass(engine: Any, layer_name: str, name: str, letters: str) -> None:
+    """Add a pass to the result, where the file does not ask for it."""
+    if name not in engine.get_result().layers[layer_name].passes:
+        engine.add_pass(name, len(letters), letters, layer=layer_name)
+
+
+def allocate(engine: Any) -> None:
+    """Make room for the result's pixels; Blender has none where nothing is rendered."""
+    result = engine.get_result()
+    size = result.resolution_x, result.resolution_y
+    engine.end_result(engine.begin_result(0, 0, *size))
+
+
 def read_pass(layer: Any, name: str, view: str, size: tuple[int, int]) -> Array | None:
     """Pixels (height, width, channels), row 0 on top; None if there is no such pass.
 

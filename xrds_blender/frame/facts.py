@@ -9,6 +9,7 @@ from ..cycles import low_camera, session
 from ..cycles.size import frame_size
 from ..planning.facts import Facts, SceneFacts
 from ..scene.facts import scene_facts
+from . import denoisers
 from .job import RenderJob
 
 # Core-seconds of a million guide samples with nothing left out: docs/performance.md.
@@ -30,7 +31,7 @@ def join_facts(scene: Any, job: RenderJob, scene_facts: SceneFacts) -> Facts:
         height=height,
         guides=job.guides,
         max_bounces=scene.cycles.max_bounces,
-        has_denoiser=session.has_denoiser(),
+        has_denoiser=session.has_denoiser() or denoisers.is_there(),
         exact_camera=camera is None or low_camera.is_exact(camera.data),
         guide_samples=job.guide_samples,
         scene=scene_facts,

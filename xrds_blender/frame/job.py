@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from xrds_core.errors import UsageError, XRDSError
 
 from ..planning.denoiser import Denoiser
-from ..planning.plan import SAVINGS, Decision, Facts, Plan, decide, plain
+from ..planning.plan import SAVINGS, Decision, Facts, Plan, decide, full_size, plain
 
 if TYPE_CHECKING:
     from xrds_core.arrays import Array
@@ -19,6 +19,7 @@ ENGINE = "XRDS"
 SCALES = (1, 2, 4, 8)
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
+QUALITIES = ("high", "balanced", "fast")
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,10 @@ class RenderJob:
     the plan may leave out where the scene does not need it. `guide_cache` is a folder
     for guides beside those in memory; each render of the same view adds its samples to
     them until they are `guide_limit`.
-    `denoiser` is a mode of Cycles' denoiser or its name, None the scene's own. With
+    `denoiser` is a mode of Cycles' denoiser or its name, None the scene's own;
+    `denoise` is the quality of ours (high, balanced or fast) at scale 1.
+    `temporal_radius` is how many frames before and after lend their samples, in a shot
+    at scale 1. With
     `time_budget` (seconds a frame) or `quality` (PSNR in dB) scale, samples, guides,
     network and denoiser are chosen anew for the scene.
     Raises UsageError on values out of range.
@@ -52,6 +56,8 @@ class RenderJob:
     guide_cache: str | Path | None = None
     guide_limit: int = 0
     denoiser: Denoiser | str | None = None
+    denoise: str = "high"
+    temporal_radius: int = 0
     time_budget: float | None = None
     quality: float | None = None
     threads: int | None = None
@@ -73,6 +79,11 @@ class RenderJob:
         if self.denoiser is not None:
             # The class is frozen; a name is as good as the mode it names.
             object.__setattr__(self, "denoiser", _denoiser(self.denoiser))
+        if self.temporal_radius < 0:
+            raise UsageError(f"temporal radius {self.temporal_radius} is below 0")
+        if self.denoise not in QUALITIES:
+            known = ", ".join(QUALITIES)
+            raise UsageError(f"denoise {self.denoise!r} is not one of {known}")
         if self.time_budget is not None and not self.time_budget > 0:
             raise UsageError(f"time budget {self.time_budget} s must be above 0")
         if self.time_budget is not None and self.quality is not None:
@@ -84,17 +95,16 @@ class RenderJob:
         return self.time_budget is not None or self.quality is not None
 
     @property
-    def is_plain(self) -> bool:
-        """Whether Cycles renders alone."""
-        return self.plain or self.scale == 1
+    def is_enlarged(self) -> bool:
+        """Whether a network makes the picture."""
+        return not self.plain and self.scale > 1
 
     def plan(self, facts: Facts | None = None) -> Plan:
-        """What is decided for this job; plain ones rest on no facts."""
-        if self.is_plain:
-            reason = (
-                "as requested" if self.plain else "scale 1 leaves nothing to enlarge"
-            )
-            return plain(reason)
+        """What is decided for this job; at full size it rests on no facts."""
+        if self.plain:
+            return plain("as requested")
+        if self.scale == 1:
+            return full_size(self.denoise)
         assert facts is not None
         return decide(facts, self.savings)
 
@@ -120,6 +130,21 @@ class NetworkFailed(XRDSError):
 
 
 @dataclass(frozen=True)
+class Temporal:
+    """What neighbouring frames lent to a picture.
+
+    `frames`: the numbers of those whose samples went in, its own too; `mean_samples`
+    per pixel after accumulation; `rejected`: the share of the neighbours' samples that
+    were left out.
+    """
+
+    radius: int
+    frames: tuple[int, ...]
+    mean_samples: float
+    rejected: float
+
+
+@dataclass(frozen=True)
 class Picture:
     """A rendered region: arrays float32, scene-linear, row 0 on top.
 
@@ -142,3 +167,4 @@ class Picture:
     peak_memory: int = 0
     device: str = ""
     job: RenderJob | None = None
+    temporal: Temporal | None = None

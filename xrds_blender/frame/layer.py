@@ -8,6 +8,7 @@ from typing import Any
 
 from ..cycles.passes import CyclesPasses
 from . import progress
+from .full_size import render_full_size
 from .job import Picture, RenderJob
 from .networks import load_upscaler
 from .picking import pick
@@ -29,8 +30,10 @@ def render_layer(
     if job.is_picked:
         return _render_picked(engine, depsgraph, job, start)
     try:
-        if job.is_plain:
+        if job.plain:
             picture = render_plain(engine, depsgraph, job)
+        elif job.scale == 1:
+            picture = render_full_size(engine, depsgraph, job)
         else:
             # first: missing weights are to cost no render
             upscaler = load_upscaler(job)
@@ -51,5 +54,5 @@ def _render_picked(
         engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
         picture = render_layer(engine, depsgraph, picked)
     seconds = picture.seconds | {"total": time.perf_counter() - start}
-    rest = () if picked.is_plain else picture.plan  # its reason stands above
+    rest = () if picked.plain else picture.plan  # its reason stands above
     return replace(picture, seconds=seconds, plan=(decision, *rest), job=picked)

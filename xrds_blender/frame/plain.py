@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..cycles import session
-from ..cycles.borrowed import Borrowed
+from ..cycles.once import render_once
 from ..cycles.pass_names import COMBINED
-from ..cycles.settings import set_denoising, set_sampling
 from .job import Picture, RenderJob
 from .memory import peak_memory
 from .progress import STAGES
@@ -21,8 +20,13 @@ def render_plain(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
     Raises Cancelled when the user stops it.
     """
     name = depsgraph.view_layer_eval.name
-    clock = _run(engine, depsgraph, job)
-    session.stop_if_cancelled(engine)
+    clock = render_once(
+        engine,
+        depsgraph,
+        samples=job.samples,
+        seed=job.seed,
+        denoiser=job.denoiser,
+    )
     result = engine.get_result()
     layer, size = result.layers[name], (result.resolution_x, result.resolution_y)
     view = next((view.name for view in result.views), "")
@@ -36,18 +40,3 @@ def render_plain(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
         plan=job.plan().decisions,
         peak_memory=peak_memory(),
     )
-
-
-def _run(engine: Any, depsgraph: Any, job: RenderJob) -> session.StageClock:
-    keeps_session = engine.path_resolve("render").use_persistent_data
-    with Borrowed() as borrowed:
-        set_sampling(borrowed, depsgraph.scene_eval, job.samples, job.seed)
-        if job.denoiser is not None and session.has_denoiser():
-            scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
-            set_denoising(borrowed, scene, layer, True, job.denoiser)
-        try:
-            return session.run(engine, depsgraph)
-        finally:
-            if not keeps_session:
-                borrowed.forget()  # Cycles frees the evaluated scene as it syncs
-                session.free(engine)

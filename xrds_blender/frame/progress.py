@@ -9,16 +9,26 @@ from __future__ import annotations
 from typing import Any
 
 LOW, GUIDES, NETWORK = "Low resolution", "Guides", "Network"
-STAGES = ("total", "sync", "beauty", "denoise", "guides", "network", "write")
+SAMPLES, DENOISE = "Samples", "Denoising"
+STAGES = (
+    "total",
+    "sync",
+    "beauty",
+    "accumulate",
+    "denoise",
+    "guides",
+    "network",
+    "write",
+)
 
 _current: str | None = None
 _last_seconds: dict[str, float] = {}
 
 
-def begin(engine: Any, stage: str, number: int) -> None:
+def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
     """Note that the stage of this number has begun."""
     global _current
-    _current = f"XRDS {number}/3: {stage}"
+    _current = f"XRDS {number}/{of}: {stage}"
     engine.update_stats("XRDS", stage)
     engine.update_progress(0.0)
 

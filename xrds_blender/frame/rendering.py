@@ -39,7 +39,7 @@ def render(
     def work(engine: Any, depsgraph: Any) -> Picture:
         return render_layer(engine, depsgraph, job, start)
 
-    return _run(scene, work, layer)
+    return call_engine(scene, work, layer)
 
 
 def run_job(
@@ -51,7 +51,7 @@ def run_job(
         with CyclesPasses(engine, depsgraph, noisy=True, depth=True) as passes:
             return job(passes)
 
-    return _run(scene, work, layer)
+    return call_engine(scene, work, layer)
 
 
 def evaluate(scene: Any, look: Callable[[Any], T]) -> T:
@@ -59,14 +59,11 @@ def evaluate(scene: Any, look: Callable[[Any], T]) -> T:
 
     Nothing is rendered. Raises SceneError without a camera.
     """
-    return _run(scene, lambda _, depsgraph: look(depsgraph), None)
+    return call_engine(scene, lambda _, depsgraph: look(depsgraph))
 
 
-def render_in(engine: Any, depsgraph: Any, asked: Callable[[], RenderJob]) -> None:
-    """Do the work that waits for the engine, or what Blender asks of it.
-
-    `asked` finds the job that the scene's settings describe.
-    """
+def render_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
+    """Do the work that waits for the engine, or what Blender asks of it: `asked`."""
     if _task is not None:
         try:
             _task.results.append(_task.work(engine, depsgraph))
@@ -74,7 +71,7 @@ def render_in(engine: Any, depsgraph: Any, asked: Callable[[], RenderJob]) -> No
             _task.error = error
         return
     try:
-        render_layer(engine, depsgraph, asked())
+        asked()
     except Cancelled:
         return  # it was Blender that cancelled
     except XRDSError as error:
@@ -89,8 +86,14 @@ def _fail(engine: Any, message: str) -> None:
     engine.report({"ERROR"}, message)
 
 
-def _run(scene: Any, work: Callable[[Any, Any], T], layer: str | None) -> T:
-    """Let Blender render one layer of `scene` with `work` as the engine's."""
+def call_engine(
+    scene: Any, work: Callable[[Any, Any], T], layer: str | None = None
+) -> T:
+    """Let Blender render one layer of `scene` with `work` as the engine's.
+
+    `work` takes the engine and the dependency graph; what it returns is returned, what
+    it raises is raised. Raises SceneError where Blender does not render.
+    """
     import bpy
 
     global _task

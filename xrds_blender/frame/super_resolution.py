@@ -18,6 +18,7 @@ from ..cycles.passes import CyclesPasses
 from ..cycles.rendered import Beauty, Guides
 from ..planning import plan
 from . import progress
+from .denoisers import in_process
 from .facts import find_facts
 from .guides import GuideSource
 from .job import NetworkFailed, Picture, RenderJob
@@ -132,14 +133,16 @@ class _Renders:
 
     def light(self) -> tuple[dict[str, Beauty], float | None]:
         """The low-resolution pictures by view, and the exposure if it is known."""
+        job = self.job
         beauties = self.passes.beauties(
-            self.job.scale,
-            self.job.samples,
+            job.scale,
+            job.samples,
             denoise=self.chosen.denoise,
-            seed=self.job.seed,
-            denoiser=self.job.denoiser,
+            seed=job.seed,
+            denoiser=job.denoiser,
+            in_process=in_process(job),
         )
-        return beauties, self.job.exposure or self.passes.border_exposure()
+        return beauties, job.exposure or self.passes.border_exposure()
 
 
 def _seconds(inputs: Inputs) -> dict[str, float]:

@@ -61,9 +61,15 @@ class XRDSRender(bpy.types.RenderEngine):
         else:
             with write_lock.shared():
                 from ..frame.rendering import render_in
-                from .properties import job_of
 
-                render_in(self, depsgraph, lambda: job_of(depsgraph.scene_eval.xrds))
+                render_in(self, depsgraph, lambda: self._render_asked(depsgraph))
+
+    def _render_asked(self, depsgraph: Any) -> None:
+        """Render what the scene's settings describe."""
+        from ..shot.animation import render_frame
+        from .properties import job_of
+
+        render_frame(self, depsgraph, job_of(depsgraph.scene_eval.xrds))
 
     def render_frame_finish(self) -> None:
         if self.session:

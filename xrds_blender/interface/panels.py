@@ -10,7 +10,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..cycles import session
-from ..frame import progress, torch_folder
+from ..frame import denoisers, progress, torch_folder
 from ..frame.job import ENGINE
 from ..planning import forecast
 from . import cycles_panels, presets, status_bar, support, translations
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .facts_cache import FactsCache
 
 CHARACTER = 6.5  # pixels that a letter takes on the average, at an interface scale of 1
+NO_DENOISER = "The denoiser is missing: install XRDS from its zip, or mitsuba-oidn"
 STAGE_NAMES = {
     "sync": "Scene",
     "beauty": "Low Resolution",
@@ -63,7 +64,11 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
         column = layout.column()
         column.active = not (settings.plain or settings.use_time_budget)
         column.prop(settings, "scale")
-        column.prop(settings, "preset")
+        if settings.scale == "1":
+            column.prop(settings, "denoise")
+            column.prop(settings, "temporal_radius")
+        else:
+            column.prop(settings, "preset")
         layout.prop(scene.cycles, "samples")
         layout.prop(settings, "plain")
         width = context.region.width / context.preferences.system.ui_scale
@@ -169,13 +174,15 @@ def remarks(scene: bpy.types.Scene) -> list[tuple[str, str]]:
     """Icon and sentence of all that is missing or otherwise than under Cycles."""
     if scene.xrds.plain:
         return [("INFO", "Plain: one full-resolution Cycles render, no network")]
+    if scene.xrds.scale == "1":
+        return [] if denoisers.is_there() else [("ERROR", NO_DENOISER)]
     lines = []
     if not torch_folder.is_there():
         lines.append(("ERROR", "PyTorch is missing: see the add-on's preferences"))
-    if not session.has_denoiser():
+    if not (session.has_denoiser() or denoisers.is_there()):
         sentence = (
-            "This Blender has no denoiser: the network gets the noisy picture. "
-            "Use more samples"
+            "There is no denoiser: the network gets the noisy picture. "
+            "Use more samples, or install mitsuba-oidn"
         )
         lines.append(("INFO", sentence))
     return lines + [("INFO", sentence) for sentence in support.notes(scene)]
@@ -197,8 +204,8 @@ def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
     job = job_of(scene.xrds)
     if job.is_picked:
         return [("Settings", "chosen when rendering")]
-    if job.is_plain:
-        return []
+    if not job.is_enlarged:
+        return [(d.decision.capitalize(), d.value) for d in job.plan().decisions]
     facts = _facts_cache().facts(scene, bpy.context.view_layer, job)
     chosen = job.plan(facts)
     width, height = forecast.low_size(facts.width, facts.height, job.scale)

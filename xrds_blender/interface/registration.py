@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import sys
+from typing import Any
+
 import bpy
 
 from ..cycles import session
 from . import engine, operators, panels, preferences, properties, write_lock
 
+_ADD_ON = __name__.partition(".")[0]
 _registered = False
 
 
@@ -24,12 +28,16 @@ def register(package: str = "xrds_blender") -> None:
     preferences.register(package)
     operators.register()
     panels.register()
+    for handlers in _render_jobs():
+        handlers.append(_forget_frames)
     _registered = True
 
 
 def unregister() -> None:
     """Take back everything that `register` did."""
     global _registered
+    for handlers in _render_jobs():
+        handlers.remove(_forget_frames)
     panels.unregister()
     operators.unregister()
     preferences.unregister()
@@ -38,6 +46,20 @@ def unregister() -> None:
     del bpy.types.Scene.xrds
     bpy.utils.unregister_class(properties.XRDSSettings)
     _registered = False
+
+
+@bpy.app.handlers.persistent
+def _forget_frames(*_: Any) -> None:
+    """What frames lend each other lasts for one render job."""
+    animation = sys.modules.get(f"{_ADD_ON}.shot.animation")
+    if animation is not None:
+        animation.forget()
+
+
+def _render_jobs() -> tuple[Any, ...]:
+    """The handlers of a render job's beginning and end."""
+    handlers = bpy.app.handlers
+    return handlers.render_init, handlers.render_complete, handlers.render_cancel
 
 
 def ensure_registered() -> None:

@@ -22,6 +22,7 @@ __all__ = [
     "SceneFacts",
     "after",
     "decide",
+    "full_size",
     "guide_bounces",
     "plain",
     "savings_but",
@@ -93,6 +94,15 @@ def plain(reason: str) -> Plan:
     return Plan(False, GuideRender(), 0, True, True, False, decisions)
 
 
+def full_size(quality: str) -> Plan:
+    """The plan at scale 1: all of Cycles' samples, denoised in process."""
+    decisions = (
+        Decision("method", "full size", "asked for"),
+        Decision("denoise", quality, "in process, by Open Image Denoise"),
+    )
+    return Plan(False, GuideRender(), 0, True, True, False, decisions)
+
+
 def savings_but(*names: str) -> tuple[str, ...]:
     """All savings but those named."""
     return tuple(name for name in SAVINGS if name not in names)
@@ -139,7 +149,9 @@ def guide_bounces(max_bounces: int) -> int:
 def _denoise(facts: Facts, allowed: bool) -> tuple[bool, Decision]:
     scene, name = facts.scene, "denoise"
     if not facts.has_denoiser:
-        reason = "this Blender was built without OpenImageDenoise; expect noise"
+        reason = (
+            "neither this Blender nor its Python has Open Image Denoise; expect noise"
+        )
         return False, Decision(name, "skipped", reason)
     blurred = scene.depth_of_field or (scene.motion_blur and scene.moving)
     if allowed and not (scene.scatters or scene.volumes or blurred):

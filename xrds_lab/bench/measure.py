@@ -312,7 +312,7 @@ def picked_config(job: RenderJob) -> Config:
     """The configuration of a job that the picker made."""
     denoiser = OFF if job.denoiser is None else Denoiser(job.denoiser)
     samples = job.samples or 0
-    if job.is_plain:
+    if job.plain:
         return Config("oidn", samples, denoiser)
     return Config(
         "xrds",

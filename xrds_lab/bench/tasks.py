@@ -65,7 +65,7 @@ def frame(shot: Shot, job: RenderJob) -> tuple[Picture, Run]:
     from xrds_blender.frame.networks import load_upscaler
 
     scene = open_scene(shot.path, shot.window.whole)
-    if not job.is_picked and not job.is_plain:
+    if not job.is_picked and job.is_enlarged:
         load_upscaler(job)
     pictures: list[Picture] = []
     choices = vars(job) | {"savings": savings_but("guide cache")}

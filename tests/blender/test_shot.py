@@ -1,0 +1,248 @@
+"""Shots: frames that lend their samples to their neighbours."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from channels import read_channels
+
+bpy = pytest.importorskip("bpy")
+pytest.importorskip("mitsuba_oidn")
+
+from xrds_blender import run_job
+from xrds_blender.command import main
+from xrds_blender.command.render_file import render_file
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.frame.rendering import call_engine
+from xrds_blender.shot import shot
+
+FRAMES = [1, 2, 3, 4, 5]
+
+
+@pytest.fixture
+def blend(life: Any, tmp_path: Path) -> Path:
+    """The still life under a camera that moves; 64 x 48 pixels, one sample."""
+    life.render.resolution_x, life.render.resolution_y = 64, 48
+    life.cycles.samples = 1
+    for frame in (1, 5):
+        life.camera.location.x = 0.05 * (frame - 3)
+        life.camera.keyframe_insert("location", frame=frame)
+    path = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def picture(path: Path) -> np.ndarray:
+    channels = read_channels(path)
+    return np.dstack([channels[name] for name in "RGB"])
+
+
+def render(blend: Path, out: str, **more: Any) -> dict[str, Any]:
+    job = {"scale": 1, "temporal_radius": 2} | more.pop("job", {})
+    pattern = str(blend.parent / out / "#.exr")
+    return render_file(blend, pattern, RenderJob(**job), **{"frames": FRAMES, **more})
+
+
+def truth(blend: Path) -> np.ndarray:
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    scene.frame_set(3)
+    return run_job(scene, lambda p: p.beauty(1, 256, denoise=False, seed=9)).radiance
+
+
+def test_neighbours_make_a_better_picture(blend: Path) -> None:
+    render(blend, "alone", job={"temporal_radius": 0})
+    result = render(blend, "shot")
+    reference = truth(blend)
+    alone, shared = (
+        np.square(picture(blend.parent / name / "3.exr") - reference).mean()
+        for name in ("alone", "shot")
+    )
+    assert shared < 0.8 * alone
+    temporal = [frame["temporal"] for frame in result["frames"]]
+    assert [t["frames"] for t in temporal] == [
+        (1, 2, 3),
+        (1, 2, 3, 4),
+        (1, 2, 3, 4, 5),
+        (2, 3, 4, 5),
+        (3, 4, 5),
+    ]
+    assert 2.0 < temporal[2]["mean_samples"] <= 5.0
+    assert all(0.0 <= t["rejected"] < 0.5 for t in temporal)
+    assert all(frame["seconds"]["accumulate"] > 0.0 for frame in result["frames"])
+
+
+def test_every_frame_is_sampled_once(
+    blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rendered = []
+
+    def count(scene: Any, work: Any) -> Any:
+        rendered.append(scene.frame_current)
+        return call_engine(scene, work)
+
+    monkeypatch.setattr(shot, "call_engine", count)
+    render(blend, "shot")
+    assert rendered == FRAMES
+
+
+def test_frames_that_are_there_only_lend(
+    blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    render(blend, "shot")
+    folder = blend.parent / "shot"
+    whole = {number: (folder / f"{number}.exr").read_bytes() for number in FRAMES}
+    (folder / "5.exr").unlink()
+    rendered = []
+
+    def count(scene: Any, work: Any) -> Any:
+        rendered.append(scene.frame_current)
+        return call_engine(scene, work)
+
+    monkeypatch.setattr(shot, "call_engine", count)
+    result = render(blend, "shot", resume=True)
+    assert result["kept"] == [1, 2, 3, 4]
+    assert rendered == [3, 4, 5]
+    assert (folder / "5.exr").read_bytes() == whole[5]
+
+
+def test_no_two_frames_have_the_same_noise(blend: Path) -> None:
+    """Whatever the file's seed says: a still camera would gain nothing."""
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    scene.camera.animation_data_clear()
+    scene.cycles.use_animated_seed = False
+    job = RenderJob(scale=1, temporal_radius=1)
+    pictures = [p for _, p in shot.render_shot(scene, job, [1, 2])]
+    assert pictures[0].temporal.mean_samples == pytest.approx(2.0, abs=0.05)
+    alone = RenderJob(scale=1, temporal_radius=0)
+    first, second = (p for _, p in shot.render_shot(scene, alone, [1, 2]))
+    assert np.abs(first.radiance - second.radiance).mean() > 1e-4
+
+
+def test_a_cancelled_shot_keeps_the_frames_before(
+    blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from xrds_core.errors import Cancelled
+
+    def cancel_at_four(scene: Any, work: Any) -> Any:
+        if scene.frame_current == 4:
+            raise Cancelled
+        return call_engine(scene, work)
+
+    monkeypatch.setattr(shot, "call_engine", cancel_at_four)
+    with pytest.raises(Cancelled):
+        render(blend, "shot")
+    assert [p.name for p in sorted((blend.parent / "shot").iterdir())] == ["1.exr"]
+
+
+@pytest.mark.parametrize(
+    ("line", "radius"),
+    [
+        ("--scale 1 --frames 1-3", 4),
+        ("--scale 1 --frames 1-3 --temporal-radius 2", 2),
+        ("--scale 1 --frames 1-3 --temporal-radius 0", 0),
+        ("--scale 1 --frame 1", 0),
+        ("--scale 2 --frames 1-3", 0),
+        ("--plain --frames 1-3", 0),
+    ],
+)
+def test_the_radius_by_default(line: str, radius: int) -> None:
+    from xrds_blender.command.options import job_of
+
+    words = ["render", "a.blend", "-o", "b_#.exr", *line.split()]
+    assert job_of(main._parser(words).parse_args(words)).temporal_radius == radius
+
+
+def test_a_radius_that_cannot_be_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
+    words = "render a.blend -o b_#.exr --scale 2 --frames 1-3 --temporal-radius 1"
+    assert main.main(words.split()) == 2
+    assert "--temporal-radius needs --scale 1" in capfd.readouterr().err
+
+
+# --- Blender's own animation renders --------------------------------------------------
+
+
+@pytest.fixture
+def animation(blend: Path) -> Any:
+    """The shot, set up for the engine to write multilayer files."""
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    scene.render.engine = "XRDS"
+    scene.xrds.scale, scene.xrds.temporal_radius = "1", 2
+    scene.frame_start, scene.frame_end = 1, 5
+    scene.view_layers[0].use_pass_normal = True
+    settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    scene.render.filepath = str(blend.parent / "f12" / "#.exr")
+    return scene
+
+
+def layers(path: Path) -> dict[str, np.ndarray]:
+    return read_channels(path)
+
+
+def combined(path: Path) -> np.ndarray:
+    found = layers(path)
+    names = [next(n for n in found if n.endswith(f"Combined.{c}")) for c in "RGB"]
+    return np.dstack([found[name] for name in names])
+
+
+def test_an_animation_is_the_shot_of_the_command(animation: Any, blend: Path) -> None:
+    bpy.ops.render.render(animation=True)
+    render(blend, "command")
+    for number in FRAMES:
+        ours = combined(blend.parent / "f12" / f"{number}.exr")
+        theirs = picture(blend.parent / "command" / f"{number}.exr")
+        np.testing.assert_allclose(ours, theirs, atol=2e-3)
+
+
+def test_passes_are_those_of_the_frame(animation: Any, blend: Path) -> None:
+    bpy.ops.render.render(animation=True)
+    animation.render.engine = "CYCLES"
+    animation.cycles.seed = 3
+    for number in (1, 4):
+        animation.frame_set(number)
+        animation.render.filepath = str(blend.parent / f"own{number}.exr")
+        bpy.ops.render.render(write_still=True)
+        own = layers(blend.parent / f"own{number}.exr")
+        ours = layers(blend.parent / "f12" / f"{number}.exr")
+        for channel in "XYZ":
+            (name,) = [n for n in own if n.endswith(f"Normal.{channel}")]
+            assert np.abs(own[name] - ours[name]).mean() < 0.05
+
+
+def test_frames_in_steps_lend_in_steps(animation: Any, blend: Path) -> None:
+    from xrds_blender.shot import animation as module
+
+    seen = []
+    finish = module.finish
+
+    def look(own: Any, lenders: Any, *rest: Any) -> Any:
+        seen.append(sorted([own.number, *(each.number for each in lenders)]))
+        return finish(own, lenders, *rest)
+
+    animation.frame_step = 2
+    module.finish = look
+    try:
+        bpy.ops.render.render(animation=True)
+    finally:
+        module.finish = finish
+    assert seen == [[1, 3, 5]] * 3
+    assert not module._windows
+
+
+def test_a_still_has_no_neighbours(animation: Any, blend: Path) -> None:
+    animation.frame_set(3)
+    animation.render.filepath = str(blend.parent / "still.exr")
+    bpy.ops.render.render(write_still=True)
+    render(blend, "alone", job={"temporal_radius": 0}, frames=[3])
+    ours = combined(blend.parent / "still.exr")
+    np.testing.assert_allclose(
+        ours, picture(blend.parent / "alone" / "3.exr"), atol=2e-3
+    )

@@ -1,0 +1,48 @@
+"""One Cycles render of a layer as the file has it, at full size."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..planning.denoiser import Denoiser
+from . import session
+from .borrowed import Borrowed
+from .clock import StageClock
+from .pass_names import GUIDE_PASSES
+from .settings import set_denoising, set_sampling
+
+
+def render_once(
+    engine: Any,
+    depsgraph: Any,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
+    denoiser: Denoiser | None = None,
+    noisy: bool = False,
+) -> StageClock:
+    """Render into the engine's result, exactly as Cycles' own engine would.
+
+    `samples`, `seed` and `denoiser` None leave the scene's own. `noisy` switches
+    Cycles' denoiser off and adds the passes that guide another one. Raises Cancelled
+    when the user stops it.
+    """
+    keeps_session = engine.path_resolve("render").use_persistent_data
+    scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
+    if noisy:
+        for name, letters, _ in GUIDE_PASSES:
+            session.add_pass(engine, layer.name, name, letters)
+    with Borrowed() as borrowed:
+        set_sampling(borrowed, scene, samples, seed)
+        if noisy:
+            set_denoising(borrowed, scene, layer, False)
+        elif denoiser is not None and session.has_denoiser():
+            set_denoising(borrowed, scene, layer, True, denoiser)
+        try:
+            clock = session.run(engine, depsgraph)
+        finally:
+            if not keeps_session:
+                borrowed.forget()  # Cycles frees the evaluated scene as it syncs
+                session.free(engine)
+    session.stop_if_cancelled(engine)
+    return clock

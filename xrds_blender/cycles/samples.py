@@ -1,0 +1,71 @@
+"""Cycles' noisy samples of one layer at full size, with what a denoiser asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from xrds_core.arrays import Array
+
+from . import session
+from .once import render_once
+from .pass_names import ALBEDO, COMBINED, FIRST_HIT, MOTION, NOISY, NORMAL
+
+GEOMETRY = ((FIRST_HIT, "Z"), (MOTION, "XYZW"))
+"""Passes that tell where a pixel was in another frame."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One view as Cycles sampled it.
+
+    `picture` (H, W, 4) is radiance and alpha; `albedo` and `normal` are (H, W, 3),
+    normals in camera space. `depth` (H, W) of the first hit, in the scene's units, and
+    `vector` (H, W, 4), motion in pixels, are there when asked for.
+    """
+
+    picture: Array
+    albedo: Array
+    normal: Array
+    depth: Array | None = None
+    vector: Array | None = None
+
+
+def sample_layer(
+    engine: Any,
+    depsgraph: Any,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
+    geometry: Sequence[tuple[str, str]] = (),
+) -> tuple[dict[str, Samples], session.StageClock]:
+    """Render without Cycles' denoiser; samples by view, and what it took.
+
+    `geometry` names those of GEOMETRY that are wanted. The result holds Cycles' own
+    passes. Raises Cancelled when the user stops it.
+    """
+    layer_name = depsgraph.view_layer_eval.name
+    for name, letters in geometry:
+        session.add_pass(engine, layer_name, name, letters)
+    clock = render_once(engine, depsgraph, samples=samples, seed=seed, noisy=True)
+    result = engine.get_result()
+    views = [view.name for view in result.views] or [""]
+    layer, size = result.layers[layer_name], (result.resolution_x, result.resolution_y)
+    wanted = {name for name, _ in geometry}
+    return {view: _read(layer, view, size, wanted) for view in views}, clock
+
+
+def _read(layer: Any, view: str, size: tuple[int, int], wanted: set[str]) -> Samples:
+    def read(name: str) -> Array:
+        pixels = session.read_pass(layer, name, view, size)
+        assert pixels is not None
+        return np.ascontiguousarray(pixels)
+
+    # Without its denoiser Cycles leaves Combined black where there is Noisy Image.
+    picture = read(NOISY if NOISY in layer.passes else COMBINED)
+    depth = read(FIRST_HIT)[..., 0] if FIRST_HIT in wanted else None
+    vector = read(MOTION) if MOTION in wanted else None
+    return Samples(picture, read(ALBEDO), read(NORMAL), depth, vector)

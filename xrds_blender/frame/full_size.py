@@ -1,0 +1,80 @@
+"""Full size: Cycles' samples, denoised in this process; no network, no torch."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..cycles import session
+from ..cycles.pass_names import COMBINED
+from ..cycles.samples import Samples, sample_layer
+from ..planning.plan import Decision
+from . import progress
+from .denoisers import load_denoiser
+from .job import Picture, RenderJob
+from .memory import peak_memory
+
+if TYPE_CHECKING:
+    from xrds_core.denoising import Denoised, Denoiser
+
+
+def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
+    """Render into the engine's result and return the first view's picture.
+
+    Every pass but Combined is Cycles' own. Raises Cancelled when the user stops it,
+    and XRDSError where the denoiser cannot be loaded, before anything is rendered.
+    """
+    denoiser = load_denoiser(job)
+    layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
+    progress.begin(engine, progress.SAMPLES, 1, 2)
+    noisy, clock = sample_layer(engine, depsgraph, samples=job.samples, seed=job.seed)
+    progress.begin(engine, progress.DENOISE, 2, 2)
+    started = time.perf_counter()
+    denoised = {view: _denoise(engine, denoiser, noisy[view]) for view in noisy}
+    finished = time.perf_counter()
+    _write(engine, layer_name, denoised)
+    stages = {
+        "sync": clock.sync,
+        "beauty": clock.render,
+        "denoise": finished - started,
+        "write": time.perf_counter() - finished,
+    }
+    first = next(iter(noisy))
+    picture = denoised[first].radiance
+    return Picture(
+        radiance=np.ascontiguousarray(picture[..., :3]),
+        alpha=np.ascontiguousarray(picture[..., 3]),
+        albedo=noisy[first].albedo,
+        normal=noisy[first].normal,
+        seconds=dict.fromkeys(progress.STAGES, 0.0) | stages,
+        plan=(*job.plan().decisions, prefilter(denoised[first])),
+        peak_memory=peak_memory(),
+        device=denoiser.device,
+    )
+
+
+def _denoise(engine: Any, denoiser: Denoiser, noisy: Samples) -> Denoised:
+    def report(done: float) -> bool:
+        engine.update_progress(done)
+        return not session.is_stopped(engine)
+
+    return denoiser(noisy.picture, noisy.albedo, noisy.normal, progress=report)
+
+
+def _write(engine: Any, layer_name: str, denoised: dict[str, Denoised]) -> None:
+    result = engine.get_result()
+    layer = result.layers[layer_name]
+    for view, picture in denoised.items():
+        session.write_pass(layer, COMBINED, view, picture.radiance)
+    engine.update_result(result)
+
+
+def prefilter(denoised: Denoised) -> Decision:
+    """Which guides were denoised before they guided."""
+    name = "guide prefilter"
+    if denoised.prefiltered:
+        guides = " and ".join(denoised.prefiltered)
+        return Decision(name, guides, "their own noise would stay in the picture")
+    return Decision(name, "none", "the guides are clean, or the quality takes them raw")

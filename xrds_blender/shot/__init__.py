@@ -1,0 +1,1 @@
+"""Many frames: a window that slides over a shot."""

@@ -1,0 +1,90 @@
+"""The noisy samples of one frame of a shot, packed for the window."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from xrds_core.errors import SceneError
+from xrds_core.temporal.frame import Camera, Frame, Stored, store
+
+from ..cycles.samples import GEOMETRY, Samples, sample_layer
+from ..cycles.view import camera_of
+from ..frame import progress
+from ..frame.job import RenderJob
+from ..scene.facts import scene_facts
+
+# Frames of one seed would have the same noise, and gain nothing from each other.
+SEED_STEP = 7919
+LARGEST_SEED = 2**31 - 1
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """One frame as the window keeps it, by view, and the seconds that it took."""
+
+    views: dict[str, Stored]
+    seconds: dict[str, float]
+
+
+def can_lend(scene: Any) -> bool:
+    """Whether frames can lend to each other: not under a panoramic camera."""
+    return scene.camera is not None and scene.camera.data.type in {"PERSP", "ORTHO"}
+
+
+def sample_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Sampled:
+    """Render the frame that the dependency graph is at; the result holds its passes.
+
+    Every frame has a seed of its own, whatever the file says. Raises Cancelled when the
+    user stops it, SceneError under a camera that no matrix describes.
+    """
+    scene = depsgraph.scene_eval
+    number, count = scene.frame_current, job.samples or scene.cycles.samples
+    seed = scene.cycles.seed if job.seed is None else job.seed
+    camera = camera_of(depsgraph, engine.path_resolve("render"))
+    if camera is None:
+        raise SceneError("a panorama has no neighbours; set the temporal radius to 0")
+    noisy, clock = sample_layer(
+        engine,
+        depsgraph,
+        samples=job.samples,
+        seed=(seed + number * SEED_STEP) % LARGEST_SEED,
+        geometry=_geometry(depsgraph),
+    )
+    views = {
+        view: store(_frame(number, camera, samples, count), np.float16)
+        for view, samples in noisy.items()
+    }
+    seconds = dict.fromkeys(progress.STAGES, 0.0)
+    return Sampled(views, seconds | {"sync": clock.sync, "beauty": clock.render})
+
+
+def _geometry(depsgraph: Any) -> Sequence[tuple[str, str]]:
+    """The passes that tell where pixels were; motion only where things may move.
+
+    Cycles gives no vectors with motion blur. A moving camera alone needs none.
+    """
+    scene = depsgraph.scene_eval
+    facts = scene_facts(depsgraph)
+    camera = {scene.camera.name, scene.camera.data.name}
+    if facts.motion_blur or set(facts.moving) <= camera:
+        return GEOMETRY[:1]
+    return GEOMETRY
+
+
+def _frame(number: int, camera: Camera, samples: Samples, count: int) -> Frame:
+    assert samples.depth is not None
+    return Frame(
+        number=number,
+        camera=camera,
+        radiance=samples.picture[..., :3],
+        alpha=samples.picture[..., 3],
+        albedo=samples.albedo,
+        normal=samples.normal,
+        depth=samples.depth,
+        vector=samples.vector,
+        samples=count,
+    )
