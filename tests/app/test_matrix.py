@@ -32,6 +32,7 @@ COPIED = (
 MODULES = (
     "engine",
     "features",
+    "full_size",
     "guide_cache",
     "guide_key",
     "low_camera",
@@ -39,6 +40,7 @@ MODULES = (
     "panels",
     "passes",
     "picking",
+    "shot",
     "unchanged",
 )
 Verdicts = dict[str, str]

@@ -14,9 +14,9 @@ from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
-PLAIN, QUICK = Choice("HIGH-ACCURATE", 0), Choice("FAST-FAST", 0)
-LOW = Choice("HIGH-FAST", 0, 4, "fast", "fast", 2)
-FULL = Choice("HIGH-FAST", 0, 2, "fast", "full", 1)
+PLAIN, QUICK = Choice(Denoiser.HIGH_ACCURATE, 0), Choice(Denoiser.FAST_FAST, 0)
+LOW = Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 2)
+FULL = Choice(Denoiser.HIGH_FAST, 0, 2, "fast", "full", 1)
 NETWORKS = [LOW.network, FULL.network]
 ERRORS = ErrorModel(
     {
@@ -77,7 +77,7 @@ def test_more_budget_never_expects_more_error(
 def test_what_is_chosen_keeps_to_the_budget(seconds: float) -> None:
     picked = choose(seconds)
     assert picked.seconds == COSTS.seconds(picked.choice)
-    assert picked.fits == (picked.seconds <= seconds)
+    assert picked.fits == (picked.seconds <= seconds * budget.AIM)
     assert picked.psnr == ERRORS.psnr(picked.choice)
 
 
@@ -115,7 +115,7 @@ def test_plain_is_taken_where_it_is_better_and_xrds_named_beside() -> None:
     assert (
         decision.value == f"plain, {picked.choice.samples} samples, OIDN HIGH-ACCURATE"
     )
-    assert "best XRDS for 300 s: fast x2" in decision.reason
+    assert "best super-resolution for 300 s: fast x2" in decision.reason
 
 
 def test_xrds_is_taken_where_the_denoiser_leaves_no_time() -> None:
@@ -124,6 +124,19 @@ def test_xrds_is_taken_where_the_denoiser_leaves_no_time() -> None:
     assert picked.choice.scale > 1
     assert picked.rival is None
     assert "the only method" in picked.decision(20.0).reason
+
+
+def test_denoisers_that_are_not_there_are_not_chosen() -> None:
+    ours = Choice(Denoiser.XRDS_HIGH, 0)
+    errors = ErrorModel({**ERRORS.curves, ours: Curve((1, 4, 16), (24.0, 29.0, 33.0))})
+    costs = replace(COSTS, denoise={**COSTS.denoise, Denoiser.XRDS_HIGH: 14.0})
+    picked = budget.choose(60.0, costs, errors, [])
+    assert picked.choice.denoiser is Denoiser.XRDS_HIGH  # more samples fit
+    assert picked.choice.label == "full size, 10 samples, high denoising"
+    assert "best plain for 60 s" in picked.decision(60.0).reason
+    left = errors.limited({Denoiser.HIGH_ACCURATE})
+    assert budget.choose(60.0, costs, left, []).choice.denoiser == "HIGH-ACCURATE"
+    assert set(left.curves) == {PLAIN, LOW, FULL}
 
 
 def test_networks_without_weights_are_not_chosen() -> None:

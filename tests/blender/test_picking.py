@@ -17,8 +17,9 @@ from xrds_blender.planning import budget
 from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import UsageError
 
-XRDS = budget.Choice("HIGH-FAST", 0, 4, "fast", "fast", 1)
-PLAIN = budget.Choice("FAST-FAST", 0)
+XRDS = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 1)
+PLAIN = budget.Choice(Denoiser.FAST_FAST, 0)
+FULL = budget.Choice(Denoiser.XRDS_FAST, 0)
 
 
 # So dear that four samples are many: no test depends on how busy the machine is.
@@ -36,7 +37,7 @@ def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Leave the picker nothing but these families, each as good as it is told."""
 
     def leave(**psnr: float) -> None:
-        families = {"xrds": XRDS, "plain": PLAIN}
+        families = {"xrds": XRDS, "plain": PLAIN, "full": FULL}
         curves = {
             families[name]: budget.Curve((1, 16), (best - 4, best))
             for name, best in psnr.items()
@@ -85,7 +86,7 @@ def test_plain_is_rendered_where_it_is_better(
 ) -> None:
     only(xrds=20.0, plain=40.0)
     picture = render(still_life(160, 96), time_budget=500.0)
-    assert picture.job.is_plain
+    assert picture.job.plain
     assert picture.job.samples == 4
     assert picture.low_resolution is None
     assert picture.plan[0].value.startswith("plain")
@@ -108,6 +109,23 @@ def test_quality_asks_for_no_more_than_it_needs(
     picture = render(still_life(160, 96), quality=38.0)
     assert picture.job.samples == 4  # 36 dB at one sample, 40 at 16
     assert picture.plan[0].decision == "quality"
+
+
+@pytest.mark.parametrize("has_own", [True, False])
+def test_full_size_is_denoised_by_ours_in_any_blender(
+    still_life: Callable[..., Any],
+    only: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+    has_own: bool,
+) -> None:
+    pytest.importorskip("mitsuba_oidn")
+    monkeypatch.setattr(picking, "has_denoiser", lambda: has_own)
+    only(full=40.0)
+    picture = render(still_life(64, 48), quality=38.0)
+    job = picture.job
+    assert (job.plain, job.scale, job.denoise, job.denoiser) == (False, 1, "fast", None)
+    assert picture.plan[0].value == "full size, 4 samples, fast denoising"
+    assert picture.seconds["denoise"] > 0.0
 
 
 def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(

@@ -173,9 +173,9 @@ def test_the_pickers_model_is_written_and_can_be_read(world: World) -> None:
     world.run(timing=False, model=file)
     model = budget.Model.read(file)
     assert model.source.startswith("mean over 1 scenes: cubes; weights: fast x4")
-    plain = budget.Choice("HIGH-FAST", 0)
+    plain = budget.Choice(Denoiser.HIGH_FAST, 0)
     assert model.errors.curves[plain].samples == (1, 2)
-    own = budget.Choice("HIGH-FAST", 0, 4, "fast", "fast", 2)
+    own = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 2)
     assert own in model.errors.curves
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from xrds_core.errors import UsageError, XRDSError
 
-from ..planning.denoiser import Denoiser
+from ..planning.denoiser import CYCLES_DENOISERS, Denoiser
 from ..planning.plan import SAVINGS, Decision, Facts, Plan, decide, full_size, plain
 
 if TYPE_CHECKING:
@@ -111,9 +111,12 @@ class RenderJob:
 
 def _denoiser(name: str) -> Denoiser:
     try:
-        return Denoiser(name)
+        found = Denoiser(name)
+        if found.is_ours:
+            raise ValueError(name)
+        return found
     except ValueError as error:
-        known = ", ".join(Denoiser)
+        known = ", ".join(CYCLES_DENOISERS)
         raise UsageError(f"denoiser {name!r} is not one of {known}") from error
 
 

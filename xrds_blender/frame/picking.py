@@ -12,11 +12,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from ..cycles.passes import CyclesPasses
+from ..cycles.rendered import InProcess
 from ..cycles.session import has_denoiser
 from ..planning import budget
 from ..planning.budget import Costs, Network, Picked
-from ..planning.denoiser import DEFAULT_DENOISER
+from ..planning.denoiser import (
+    CYCLES_DENOISERS,
+    DEFAULT_DENOISER,
+    OUR_DENOISERS,
+    Denoiser,
+)
 from ..planning.plan import Decision
+from . import denoisers
+from .denoisers import in_process
 from .job import RenderJob
 from .networks import known_networks, load_upscaler
 
@@ -33,8 +41,9 @@ def pick(
     since then and what the probes take is part of it.
     """
     model = budget.shipped()
+    model = replace(model, errors=model.errors.limited(_denoisers()))
     networks = [n for n in known_networks(job) if n in model.network_speed]
-    costs = probe(passes, model, networks, start)
+    costs = probe(passes, model, networks, start, in_process(job))
     picked = _choose(job, costs, model, networks)
     if picked.choice.scale > 1:
         # The network's speed was a guess so far; others are slower by as much.
@@ -43,6 +52,13 @@ def pick(
     goal = job.time_budget or job.quality
     assert goal is not None
     return _job(job, picked), picked.decision(goal, job.time_budget is not None)
+
+
+def _denoisers() -> tuple[Denoiser, ...]:
+    """Those that can denoise here; all of Cycles' where nothing can."""
+    ours = OUR_DENOISERS if denoisers.is_there() else ()
+    cycles = CYCLES_DENOISERS if has_denoiser() or not ours else ()
+    return (*cycles, *ours)
 
 
 def _choose(
@@ -57,7 +73,10 @@ def _choose(
 def _job(job: RenderJob, picked: Picked) -> RenderJob:
     choice = picked.choice
     chosen = {"denoiser": choice.denoiser, "samples": choice.samples}
-    if choice.scale == 1:
+    if choice.scale == 1 and choice.denoiser.is_ours:
+        quality = choice.denoiser.quality
+        chosen |= {"plain": False, "scale": 1, "denoiser": None, "denoise": quality}
+    elif choice.scale == 1:
         chosen |= {"plain": True}
     else:
         chosen |= {
@@ -75,23 +94,27 @@ def probe(
     model: budget.Model,
     networks: Sequence[Network],
     start: float,
+    ours: InProcess | None = None,
 ) -> Costs:
     """Costs of the scene's frame; those of the networks are guessed from OIDN's.
+
+    `ours` denoises where this Blender cannot.
 
     What a render costs whatever its size (5 ms) is lost in the largest probe, what the
     denoiser does (0.1 s) is not: its seconds are the slope between two sizes.
     """
     pixels = passes.region.width * passes.region.height
     scale = max(1, round(math.sqrt(pixels / PROBE_PIXELS)))
-    oidn = DEFAULT_DENOISER
-    passes.beauty(8 * scale, 1, denoiser=oidn)  # the first pays for more: thrown away
-    tiny = passes.beauty(8 * scale, 1, denoiser=oidn).seconds["beauty"]
-    small = passes.beauty(2 * scale, 1, denoiser=oidn).seconds["beauty"]
+    slope = _slope(passes, scale, None if has_denoiser() else ours)
     whole = scale**2
     beauty = passes.beauty(scale, 1, denoise=False).seconds["beauty"] * whole
     guide = passes.probe_guides(scale, 1)["guides"] * whole
-    denoised = (small - tiny) * whole / (1 / 2**2 - 1 / 8**2)
-    denoise = max(denoised - beauty, 0.0) if has_denoiser() else 0.0
+    denoise = 0.0
+    if has_denoiser():
+        denoise = max(slope * whole - beauty, 0.0)
+    elif ours is not None:
+        speed = model.denoiser_speed[Denoiser.XRDS_HIGH]
+        denoise = max(slope * whole - beauty, 0.0) / speed
     megapixels = pixels / 1e6
     return budget.Costs(
         fixed=time.perf_counter() - start + model.other_per_megapixel * megapixels,
@@ -100,6 +123,21 @@ def probe(
         denoise={mode: denoise * x for mode, x in model.denoiser_speed.items()},
         network={n: denoise * model.network_speed[n] for n in networks},
     )
+
+
+def _slope(passes: CyclesPasses, scale: int, ours: InProcess | None) -> float:
+    """Seconds of sampling and denoising a picture of 1/scale of the size.
+
+    By Blender's default denoiser, or by `ours` where it is given.
+    """
+
+    def seconds(size: int) -> float:
+        spent = passes.beauty(size, 1, denoiser=DEFAULT_DENOISER, in_process=ours)
+        return spent.seconds["beauty"] + spent.seconds["denoise"]
+
+    seconds(8 * scale)  # the first pays for more, and is thrown away
+    tiny, small = seconds(8 * scale), seconds(2 * scale)
+    return (small - tiny) / (1 / 2**2 - 1 / 8**2)
 
 
 def _with_network(

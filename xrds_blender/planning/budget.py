@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -37,7 +37,7 @@ class Network(NamedTuple):
 
 @dataclass(frozen=True)
 class Choice:
-    """What is rendered: scale 1 is Cycles + OIDN alone, without a network.
+    """What is rendered: scale 1 needs no network, only a denoiser, Cycles' or ours.
 
     `samples` are per low-resolution pixel, `guide_samples` per full one.
     """
@@ -57,6 +57,10 @@ class Choice:
     @property
     def label(self) -> str:
         """In a few words, as the panel and the command print it."""
+        if self.scale == 1 and self.denoiser.is_ours:
+            return (
+                f"full size, {self.samples} samples, {self.denoiser.quality} denoising"
+            )
         if self.scale == 1:
             return f"plain, {self.samples} samples, OIDN {self.denoiser}"
         guides = "full guide" if self.guides == "full" else "guide"
@@ -141,6 +145,15 @@ class ErrorModel:
     def psnr(self, choice: Choice) -> float:
         """In dB; raises KeyError for what was not measured."""
         return self.curves[_without_count(choice)].at(choice.samples)
+
+    def limited(self, denoisers: Collection[Denoiser]) -> ErrorModel:
+        """Without those choices at scale 1 whose denoiser is not among these."""
+        kept = {
+            choice: curve
+            for choice, curve in self.curves.items()
+            if choice.scale > 1 or choice.denoiser in denoisers
+        }
+        return ErrorModel(kept)
 
     def families(self, networks: Sequence[Network]) -> Iterator[tuple[Choice, Curve]]:
         """Everything but the sample counts, of what these weights can render."""
@@ -312,7 +325,9 @@ def _merit(picked: Picked) -> tuple[float, float]:
 
 
 def _kind(choice: Choice) -> str:
-    return "plain" if choice.scale == 1 else "XRDS"
+    if choice.scale > 1:
+        return "super-resolution"
+    return "full size" if choice.denoiser.is_ours else "plain"
 
 
 def _choice_of(fields: Mapping[str, Any]) -> Choice:

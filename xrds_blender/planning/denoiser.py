@@ -1,4 +1,4 @@
-"""Cycles' denoiser (OpenImageDenoise) in its modes."""
+"""Who denoises, and how: Cycles in its modes, or XRDS in its qualities."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 
 class Denoiser(StrEnum):
-    """Quality and prefilter of the guides, as Cycles names them."""
+    """Cycles' OpenImageDenoise as QUALITY-PREFILTER, or ours as XRDS-QUALITY."""
 
     HIGH_ACCURATE = "HIGH-ACCURATE"
     HIGH_FAST = "HIGH-FAST"
@@ -17,18 +17,29 @@ class Denoiser(StrEnum):
     FAST_ACCURATE = "FAST-ACCURATE"
     FAST_FAST = "FAST-FAST"
     FAST_NONE = "FAST-NONE"
+    XRDS_HIGH = "XRDS-HIGH"
+    XRDS_BALANCED = "XRDS-BALANCED"
+    XRDS_FAST = "XRDS-FAST"
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether XRDS denoises, in this process."""
+        return self.value.startswith("XRDS-")
 
     @property
     def quality(self) -> str:
-        """HIGH, BALANCED or FAST."""
-        return self.value.partition("-")[0]
+        """HIGH, BALANCED or FAST, as Cycles says it; high, balanced or fast of ours."""
+        first, _, second = self.value.partition("-")
+        return second.lower() if self.is_ours else first
 
     @property
     def prefilter(self) -> str:
-        """ACCURATE, FAST or NONE."""
-        return self.value.partition("-")[2]
+        """How Cycles treats the guides: ACCURATE, FAST or NONE; empty for ours."""
+        return "" if self.is_ours else self.value.partition("-")[2]
 
 
+CYCLES_DENOISERS = tuple(mode for mode in Denoiser if not mode.is_ours)
+OUR_DENOISERS = tuple(mode for mode in Denoiser if mode.is_ours)
 DEFAULT_DENOISER = Denoiser.HIGH_ACCURATE
 """Blender's own default."""
 LOW_DENOISERS = (

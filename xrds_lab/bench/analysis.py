@@ -9,7 +9,7 @@ from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Curve
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
-from . import pareto
+from . import ours, pareto
 from .stages import PLAIN_FRAME, XRDS_FRAME, network_name
 from .sweep import DENOISERS, xrds
 
@@ -217,6 +217,7 @@ def _speeds(
         )
     denoisers = {mode: _ratio(timed, lambda s, m=mode: s.times.denoising(m))
                  for mode in DENOISERS}  # fmt: skip
+    denoisers |= ours.speeds_of(budget.shipped())
     networks = {
         network: _ratio(
             timed, lambda s, n=network: s.times.median(network_name(xrds(n)))

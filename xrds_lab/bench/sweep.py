@@ -7,7 +7,12 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.budget import Network
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, LOW_DENOISERS, Denoiser
+from xrds_blender.planning.denoiser import (
+    CYCLES_DENOISERS,
+    DEFAULT_DENOISER,
+    LOW_DENOISERS,
+    Denoiser,
+)
 
 from .inputs import OFF, Mode, Request
 
@@ -18,7 +23,7 @@ PLAIN_SAMPLES = (1, 2, 4, 8, 16, 32, 64)
 # Every mode of the denoiser is tried on few samples; on many only those that can
 # still win: there the denoiser's own seconds count for little.
 FEW_SAMPLES = 4
-DENOISERS = tuple(Denoiser)
+DENOISERS = CYCLES_DENOISERS
 MANY_DENOISERS = (Denoiser.HIGH_ACCURATE, Denoiser.HIGH_FAST)
 LOW_SAMPLES = {
     2: (2, 4, 8, 16, 32, 64),
