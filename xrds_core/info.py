@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from .network import (
     WindowCrossAttention,
     preset_config,
 )
+from .version import package_version
 from .weights import available, guide_filter_record
 
 PAPER_ROWS = ((5, 3), (3, 3), (1, 3), (5, 2), (5, 1))  # RDST per XDG, XDG: table 5
@@ -139,14 +139,6 @@ def devices() -> list[str]:
     if torch.backends.mps.is_available():
         names.append("mps")
     return names
-
-
-def package_version() -> str:
-    """The installed version, or "unknown" when run from bare source."""
-    try:
-        return version("xrds")
-    except PackageNotFoundError:
-        return "unknown"
 
 
 def info(

@@ -111,7 +111,7 @@ for _ in range(2):
     addon_utils.disable({MODULE!r}); addon_utils.enable({MODULE!r})
 addon_utils.enable({MODULE!r})  # twice, without a disable
 bpy.ops.script.reload()
-assert bpy.context.scene.xrds.scale == "2"
+assert bpy.context.scene.xrds.scale == "1"
 bpy.ops.wm.read_factory_settings()
 assert not hasattr(bpy.types.Scene, "xrds")
 addon_utils.enable({MODULE!r})

@@ -17,6 +17,8 @@ bpy = pytest.importorskip("bpy")
 
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
+from xrds_blender.frame.denoisers import in_process
+from xrds_blender.frame.job import RenderJob
 
 BLENDER_5 = bpy.app.version >= (5, 0)
 
@@ -56,7 +58,8 @@ def settings_of_passes(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 
 def enlarged(scene: Any, scale: int = 2) -> np.ndarray:
     """What the stand-in makes of the scene's small render."""
-    low = run_job(scene, lambda passes: passes.beauty(scale)).radiance
+    ours = in_process(RenderJob())
+    low = run_job(scene, lambda p: p.beauty(scale, in_process=ours)).radiance
     large = low.repeat(scale, 0).repeat(scale, 1)
     return large[: scene.render.resolution_y, : scene.render.resolution_x]
 
@@ -237,7 +240,7 @@ def test_two_scenes_in_one_compositor(life: Any, network: Any, written: Any) -> 
     other.world = life.world
     other.render.resolution_x, other.render.resolution_y = 45, 33
     other.render.resolution_percentage = 100
-    other.render.engine = "XRDS"
+    other.render.engine, other.xrds.scale = "XRDS", "2"
     other.cycles.samples, other.cycles.use_denoising = 2, False
     tree, end = compositor(life)
     layers = tree.nodes.new("CompositorNodeRLayers")

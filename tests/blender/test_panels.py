@@ -75,9 +75,12 @@ def test_panel_draws_every_property_it_names() -> None:
         preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
 
     progress.keep({**dict.fromkeys(panels.STAGE_NAMES, 0.0), "network": 12.34})
-    for panel in panels.CLASSES:
-        panel.draw(Drawn, Context)
+    for scale in ("1", "2"):
+        Context.scene.xrds.scale = scale
+        for panel in panels.CLASSES:
+            panel.draw(Drawn, Context)
     drawn = set(Drawn.layout.drawn)
+    assert {"denoise", "temporal_radius"} <= drawn
     assert {"scale", "preset", "samples", "guide_samples", "guides"} <= drawn
     assert {"use_exposure", "exposure", "plain"} <= drawn
     assert {"12.3 s", "960 × 540, 4096 spp"} <= drawn
@@ -103,6 +106,7 @@ def test_summary_tells_the_low_size(scale: str, low: str) -> None:
 
 def test_panel_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
     scene = bpy.context.scene
+    scene.xrds.scale = "2"
     monkeypatch.setattr(panels.session, "has_denoiser", lambda: True)
     assert panels.remarks(scene) == []
     monkeypatch.setattr(torch_folder, "is_there", lambda: False)

@@ -90,7 +90,7 @@ def test_plain_is_rendered_where_it_is_better(
     assert picture.job.samples == 4
     assert picture.low_resolution is None
     assert picture.plan[0].value.startswith("plain")
-    assert "best XRDS" in picture.plan[0].reason
+    assert "best super-resolution" in picture.plan[0].reason
 
 
 def test_too_little_time_renders_the_fastest(

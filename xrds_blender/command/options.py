@@ -25,7 +25,7 @@ def add_job(command: argparse.ArgumentParser) -> None:
         type=int,
         choices=SCALES,
         default=2,
-        help="enlargement along each side; 1 is plain Cycles (default: 2)",
+        help="enlargement along each side; 1 is full size (default: 2)",
     )
     size.add_argument("--plain", action="store_true", help="render with Cycles alone")
     size.add_argument(

@@ -17,6 +17,7 @@ from ..frame.denoisers import load_denoiser
 from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.networks import known_networks, load_upscaler
 from ..frame.rendering import render
+from ..shot.sampling import can_lend
 from ..shot.shot import render_shot
 from . import picture_file
 from .scene_file import open_scene
@@ -95,7 +96,7 @@ def _pictures(
     is_done: Callable[[int], bool],
 ) -> Iterator[tuple[int, Picture]]:
     """Number and picture of every frame that is not done."""
-    if job.temporal_radius and len(numbers) > 1:
+    if job.temporal_radius and len(numbers) > 1 and can_lend(scene):
         yield from render_shot(scene, job, numbers, is_done)
         return
     for number in numbers:

@@ -16,17 +16,14 @@ if TYPE_CHECKING:
 
     from ..cycles.passes import InProcess
 
-# Names of the network's devices -> those of Open Image Denoise.
-_DEVICES = {"mps": "metal"}
-
 
 def load_denoiser(job: RenderJob) -> Denoiser:
     """The denoiser of a job; the last one stays for the next frame.
 
-    Raises XRDSError where the library cannot be loaded.
+    The network's graphics card may be one that this library does not know: it takes
+    the fastest device by itself. Raises XRDSError where it cannot be loaded.
     """
-    device = job.device.partition(":")[0]
-    device = _DEVICES.get(device, device)
+    device = "cpu" if job.device == "cpu" else "auto"
     return _load(job.denoise, device, job.threads or 0, job.memory_limit)
 
 

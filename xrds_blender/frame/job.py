@@ -154,7 +154,7 @@ class Picture:
     `radiance` (H, W, 3) is premultiplied by `alpha` (H, W); `albedo` and `normal`
     (H, W, 3) and `low_resolution` (h, w, 3) are None for a plain render. `seconds` by
     stage: total, sync, beauty, denoise, guides, network, write; Cycles does not tell
-    denoising from sampling, so `beauty` holds both and `denoise` is 0. `peak_memory`
+    its own denoising from sampling, so `beauty` holds both then. `peak_memory`
     is the largest in bytes that the process has taken so far; `device` is what the
     network ran on, empty for a plain render; `job` what was rendered, as a time budget
     chose it.

@@ -117,8 +117,8 @@ def available() -> Torch:
     for name in NEEDED:
         if _where(name) is None:
             raise UsageError(
-                f"{name} is not installed, so XRDS renders plain only; install the "
-                "extension that includes PyTorch, or choose a folder that holds it"
+                f"{name} is not installed, so XRDS renders at full size only: install "
+                "the extension that includes PyTorch, or choose a folder that holds it"
             )
     assert folder is not None
     return inspect(folder)

@@ -23,7 +23,9 @@ CHARACTER = 6.5  # pixels that a letter takes on the average, at an interface sc
 NO_DENOISER = "The denoiser is missing: install XRDS from its zip, or mitsuba-oidn"
 STAGE_NAMES = {
     "sync": "Scene",
-    "beauty": "Low Resolution",
+    "beauty": "Samples",
+    "accumulate": "Accumulation",
+    "denoise": "Denoising",
     "guides": "Guides",
     "network": "Network",
     "write": "Writing",
@@ -102,7 +104,7 @@ class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):
         layout, settings = self.layout, context.scene.xrds
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.active = not settings.plain
+        layout.active = not settings.plain and settings.scale != "1"
         layout.prop(settings, "guides")
         layout.prop(settings, "guide_samples")
 

@@ -22,7 +22,7 @@ _DEVICES = [
         "A graphics card if PyTorch finds one",
         0,
     ),
-    ("cpu", "Processor", "Always the processor", 1),
+    ("cpu", "CPU", "Always the CPU", 1),
     ("mps", "Metal", "The GPU of an Apple chip", 2),
 ]
 _MOST_CARDS = 16
@@ -62,7 +62,7 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
     )
     threads: bpy.props.IntProperty(
         name="Threads",
-        description="Processor threads for the network; 0 uses all cores",
+        description="CPU threads of network and denoiser; 0 uses all cores",
         default=0,
         min=0,
         max=1024,

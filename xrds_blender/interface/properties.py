@@ -46,7 +46,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Scale",
         translation_context=CONTEXT,
         items=_SCALES,
-        default="2",
+        default="1",
         description="Enlargement along each side",
     )
     preset: EnumProperty(

@@ -15,6 +15,9 @@ import bpy
 import numpy as np
 
 from xrds_core.errors import XRDSError
+from xrds_core.version import package_version
+
+from ..frame import torch_folder
 
 SIDE, SAMPLES = 64, 4
 
@@ -52,7 +55,7 @@ def self_test() -> list[str]:
     with _scene() as scene:
         picture = render(
             scene,
-            2,
+            2 if torch_folder.is_there() else 1,
             samples=SAMPLES,
             device=here.device,
             memory_limit=here.memory_limit,
@@ -71,16 +74,15 @@ def _check(radiance: Any) -> None:
 
 
 def _lines(picture: Any) -> list[str]:
-    import torch
-
-    from xrds_core import info
-
+    torch = "no PyTorch: full size alone"
+    if torch_folder.is_there():
+        torch = f"PyTorch {torch_folder.available().version}"
     parts = ", ".join(f"{k} {v:.2f}" for k, v in picture.seconds.items() if v)
     return [
         f"XRDS works: {SIDE} x {SIDE} pixels on {picture.device}",
         f"Seconds: {parts}",
-        f"XRDS {info.package_version()}, Blender {bpy.app.version_string}, "
-        f"Python {platform.python_version()}, PyTorch {torch.__version__}",
+        f"XRDS {package_version()}, Blender {bpy.app.version_string}, "
+        f"Python {platform.python_version()}, {torch}",
     ]
 
 

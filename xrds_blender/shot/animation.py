@@ -8,6 +8,7 @@ so that no edit of the file comes between.
 
 from __future__ import annotations
 
+import sys
 import time
 from dataclasses import dataclass, field
 from typing import Any
@@ -70,8 +71,20 @@ def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
 
 
 def _has_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> bool:
-    wanted = not (job.plain or job.is_picked) and job.scale == 1 and job.temporal_radius
-    return wanted and engine.is_animation and can_lend(depsgraph.scene_eval)
+    if job.plain or job.is_picked or job.scale > 1 or not job.temporal_radius:
+        return False
+    is_animation = engine.is_animation and not _renders_single_frames()
+    return is_animation and can_lend(depsgraph.scene_eval)
+
+
+def _renders_single_frames() -> bool:
+    """Whether Blender was started for frames by number.
+
+    Each is a render job of its own then, which could keep nothing for the next.
+    """
+    import bpy
+
+    return bpy.app.background and bool({"-f", "--render-frame"} & set(sys.argv))
 
 
 def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:

@@ -74,7 +74,7 @@ def explained(device: str, shape: tuple[int, ...]) -> Iterator[None]:
             raise XRDSError(f"Open Image Denoise failed: {_line(error)}") from error
         raise OutOfMemory(
             f"{device} has too little memory to denoise {shape[1]}x{shape[0]} pixels: "
-            "give a memory_limit, end other programs, or take another device"
+            "set a memory_limit, close other programs, or use another device"
         ) from error
 
 
