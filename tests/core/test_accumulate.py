@@ -79,7 +79,7 @@ def test_a_moving_camera_brings_samples_to_their_pixels() -> None:
     # the texture is half a pixel off at most, and weights fall with the distance
     assert alone / mean_square((result.radiance - here.colour)[middle]) > 4.0
     assert np.abs(result.albedo - here.colour)[middle].max() < 0.06
-    assert result.samples[middle].min() > 4.0
+    assert result.samples[middle].min() > 3.5
 
 
 def test_normals_turn_with_the_camera() -> None:
@@ -150,7 +150,7 @@ def test_a_shadow_stays_where_it_is() -> None:
     inner = np.s_[12:28, 22:38]
     ghost = np.abs(result.radiance - frames[1].radiance)[inner].mean()
     assert ghost < 0.03 * frames[1].radiance[inner].mean()
-    assert result.samples[35:, :].min() > 1.5
+    assert result.samples[35:, :].mean() > 2.9
 
 
 def test_rare_bright_samples_are_no_other_light() -> None:
