@@ -1,0 +1,68 @@
+"""Which samples each frame takes, so that no two frames that meet take the same ones.
+
+Where the camera stands still the frames share one sequence and each takes its next
+part: the mean of nine such frames is one render with nine times the samples, and 2 to 3
+dB better than nine renders with seeds of their own. Where the camera moves each frame
+has its own seed and begins its sequence: parts that begin later are worse by themselves
+and gain nothing there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .frame import Camera
+
+_SEEDS = 2**31  # Cycles takes a signed 32-bit integer
+
+
+@dataclass(frozen=True)
+class Portion:
+    """A frame's part of a sample sequence.
+
+    In Cycles: ``seed``; ``whole`` is `samples`, ``offset`` is `sample_offset` and
+    ``length`` is `sample_subset_length`, with `use_sample_subset` on where the part is
+    not the whole. Passes of sample 0 alone (Depth, Position, indices) are empty where
+    ``offset`` is not 0; `Denoising Depth` is not.
+    """
+
+    seed: int
+    whole: int
+    offset: int
+    length: int
+
+
+def portions(
+    cameras: Sequence[Camera], samples: int, radius: int, seed: int = 0
+) -> list[Portion]:
+    """Return the part of each frame of a shot, from the cameras in order of time.
+
+    ``samples`` per pixel and frame; frames up to ``radius`` apart meet. A frame belongs
+    to a still run if the camera before or after it is the same. ``seed`` is the shot's.
+    """
+    runs = 2 * radius + 1
+    return [
+        Portion(seed % _SEEDS, samples * runs, samples * (place % runs), samples)
+        if radius and _stands_still(cameras, place)
+        else Portion((seed + 1 + place) % _SEEDS, samples, 0, samples)
+        for place in range(len(cameras))
+    ]
+
+
+def _stands_still(cameras: Sequence[Camera], place: int) -> bool:
+    beside = [x for x in (place - 1, place + 1) if 0 <= x < len(cameras)]
+    return any(_same(cameras[place], cameras[x]) for x in beside)
+
+
+def _same(one: Camera, two: Camera) -> bool:
+    return (
+        (one.size, one.window) == (two.size, two.window)
+        and np.array_equal(one.view, two.view)
+        and np.array_equal(one.project, two.project)
+    )
