@@ -19,6 +19,7 @@ from ..errors import PictureError
 from .agreement import REACH, agreement, brightness
 from .motion import grid, pair, places, surroundings
 from .moving import Movement
+from .survey import TILE, survey
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -99,11 +100,12 @@ class _Block:
         first, last = max(rows.start - REACH, 0), min(rows.stop + REACH, height)
         self.pixels = slice(rows.start * width, rows.stop * width)
         self.wide = grid(target.shape, first, last)
-        start = self.pixels.start - self.wide.pixels.start
+        start = self.pixels.start - first * width
         self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
         # rows of the margin that lie outside of the picture
         self.outside = (REACH - rows.start + first, REACH - last + rows.stop)
-        self.brightness = brightness(_floats(target.picture[self.wide.pixels, :3]))
+        own = _floats(target.picture[self.wide.pixels, :3])
+        self.brightness = {alike: brightness(own, alike) for alike in (True, False)}
         size = self.pixels.stop - self.pixels.start
         self.sums = np.zeros((size, target.picture.shape[1]), np.float32)
         self.weights = np.zeros(size, np.float32)
@@ -120,18 +122,22 @@ class _Lender:
                 " give alpha for all frames of a shot or for none"
             )
         self._pair = pair
+        self._tiles = survey(pair)
         self._turn = _turn(target.camera, other.camera)
         self._fall = np.float32(-0.5 * target.samples ** (2 / 3) / _SOFTNESS**2)
 
     def add(self, block: _Block) -> float:
         """Add the samples it lends to the pixels of a block; return their sum."""
         other, inner = self._pair.there, block.inner
+        if not self._tiles.any():
+            return 0.0
         found = places(self._pair, block.wide)
         if other.spoilt is not None:
             found.seen[...] &= ~other.spoilt.take(found.pixel)
         picked = _floats(other.picture.take(found.pixel, axis=0))
         weight = self._agreement(block, picked, found.seen)
         weight *= found.seen[inner]
+        weight *= self._of_tiles(block)
         weight *= np.float32(other.samples)
         taken = float(weight.sum(dtype=np.float64))
         weight *= np.exp(found.apart[inner] * self._fall)
@@ -143,13 +149,20 @@ class _Lender:
         block.weights += weight
         return taken
 
+    def _of_tiles(self, block: _Block) -> Array:
+        """Return the weights (n,) of the tiles that the block's pixels lie in."""
+        width = self._pair.here.shape[1]
+        row = np.arange(block.pixels.start, block.pixels.stop, width) // width // TILE
+        return self._tiles[row].repeat(TILE, axis=1)[:, :width].ravel()
+
     def _agreement(self, block: _Block, picked: Array, seen: Mask) -> Array:
         """Return the weights (n,) of the block's inner pixels."""
         target = self._pair.here
         known = seen
         if target.spoilt is not None:
             known = seen & ~target.spoilt[block.wide.pixels]
-        difference = brightness(picked[:, :3]) - block.brightness
+        alike = target.samples == self._pair.there.samples
+        difference = brightness(picked[:, :3], alike) - block.brightness[alike]
         difference *= known
         rows = difference.reshape(-1, target.shape[1])
         return agreement(np.pad(rows, (block.outside, (0, 0)))).ravel()

@@ -25,13 +25,15 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
 _TINY = np.float32(1e-30)
 
 
-def brightness(radiance: Array) -> Array:
+def brightness(radiance: Array, alike: bool = True) -> Array:
     """Return the root of the luminance (..., 3) -> (...).
 
     The root makes the noise of dark and bright pixels alike, so that a few bright ones
-    do not outvote the others.
+    do not outvote the others. Between frames of other sample counts it would lie:
+    less noise has a larger mean root. So those (not ``alike``) keep the luminance.
     """
-    return np.sqrt(np.maximum(radiance @ _LUMINANCE, np.float32(0.0)))
+    light = np.maximum(radiance @ _LUMINANCE, np.float32(0.0))
+    return np.sqrt(light) if alike else light
 
 
 def agreement(difference: Array) -> Array:

@@ -37,9 +37,9 @@ _NEARNESS_SLACK = 0.02
 
 @dataclass(frozen=True)
 class Grid:
-    """The centres of the pixels of some rows: flat, in order, (n,)."""
+    """The centres of some pixels (n,): of whole rows, or of any."""
 
-    pixels: slice
+    pixels: slice | NDArray[np.intp]
     x: Array
     y: Array
 
@@ -198,13 +198,13 @@ def carry(
 
 
 def places(pair: Pair, grid: Grid) -> Places:
-    """Find where the pixels of a grid of ``pair.here`` were in ``pair.there``."""
-    found = _still(pair, grid)
+    """Find where rows of pixels of ``pair.here`` were in ``pair.there``."""
+    found, _ = still_places(pair, grid)
     return found if pair.detour is None else _detoured(found, pair, grid)
 
 
-def _still(pair: Pair, grid: Grid) -> Places:
-    """Find places as if nothing but the camera moved."""
+def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
+    """Find places as if nothing but the camera moved, and which lie in the frame."""
     near = pair.here.nearness[grid.pixels]
     x, y, _ = carry(pair.forth, grid.x, grid.y, near)
     found = nearest(x, y, pair.there.shape)
@@ -218,13 +218,15 @@ def _still(pair: Pair, grid: Grid) -> Places:
     least, most = (part[grid.pixels] for part in pair.around)
     seen = found.seen & (left < _AGREEMENT**2) & (near >= least) & (near <= most)
     left[~seen] = 0.0
-    return Places(found.pixel, found.apart + np.float32(_AS_DISTANCE) * left, seen)
+    apart = found.apart + np.float32(_AS_DISTANCE) * left
+    return Places(found.pixel, apart, seen), found.seen
 
 
 def _detoured(found: Places, pair: Pair, grid: Grid) -> Places:
     """Return places with those of moving things in theirs."""
     detour = pair.detour
     assert detour is not None
+    assert isinstance(grid.pixels, slice)
     found.seen[...] &= ~detour.moving.take(found.pixel)
     part = slice(*detour.pixels.searchsorted((grid.pixels.start, grid.pixels.stop)))
     moved = nearest(detour.x[part], detour.y[part], pair.there.shape)

@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
     Trail = tuple[Array, Array]  # x and y, NaN where lost
 
+# Share of itself by which the nearness of a thing may change from frame to frame.
+_NEARER = 0.1
+
 
 class Trails:
     """Follows the Vector passes of a shot's frames; keeps each frame's moving pixels.
@@ -97,9 +100,9 @@ class Trails:
         flow_x, flow_y = _flow(here, start.pixel, forward)
         found = nearest(x + flow_x, y + flow_y, there.shape)
         back_x, back_y = _flow(there, found.pixel, not forward)
-        agreed = (flow_x + back_x) ** 2 + (
-            flow_y + back_y
-        ) ** 2 < AGREEMENT_OF_MOVING**2
+        left = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2
+        was, near = here.nearness[start.pixel], there.nearness[found.pixel]
+        agreed = (left < AGREEMENT_OF_MOVING**2) & (np.abs(near - was) < _NEARER * was)
         agreed &= self.moving(there, frames)[found.pixel] & found.seen & start.seen
         return known(x + flow_x, y + flow_y, agreed)
 
