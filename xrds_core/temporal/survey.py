@@ -47,7 +47,8 @@ def survey(pair: Pair) -> Array:
     found, landed = still_places(pair, grid)
     still = _still(pair, spots, found.pixel)
     seen = found.seen & still
-    if seen.sum() < _LEAST_SHARE * (landed & still).sum():
+    moved, followed = _moving(pair, step)
+    if seen.sum() + followed < _LEAST_SHARE * ((landed & still).sum() + moved):
         return np.zeros(tiles, np.float32)
     alike = pair.here.samples == pair.there.samples
     own = _brightness(pair.here, spots, alike)
@@ -72,6 +73,14 @@ def _still(pair: Pair, here: NDArray[np.intp], there: NDArray[np.int32]) -> Mask
     if pair.detour is not None:
         result &= ~np.isin(here, pair.detour.pixels) & ~pair.detour.moving[there]
     return result
+
+
+def _moving(pair: Pair, step: int) -> tuple[float, float]:
+    """Return how many spots show what moves by itself, and how many are followed."""
+    if pair.detour is None:
+        return 0.0, 0.0
+    followed = np.count_nonzero(np.isfinite(pair.detour.x))
+    return len(pair.detour.pixels) / step**2, followed / step**2
 
 
 def _brightness(frame: Stored, pixels: NDArray[np.integer], alike: bool) -> Array:
