@@ -19,7 +19,7 @@ from ..errors import PictureError
 from .agreement import REACH, agreement, brightness
 from .motion import grid, pair, places, surroundings
 from .moving import Movement
-from .survey import TILE, survey
+from .survey import spread, survey
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -97,6 +97,7 @@ class _Block:
 
     def __init__(self, target: Stored, rows: slice) -> None:
         height, width = target.shape
+        self.rows = rows
         first, last = max(rows.start - REACH, 0), min(rows.stop + REACH, height)
         self.pixels = slice(rows.start * width, rows.stop * width)
         self.wide = grid(target.shape, first, last)
@@ -137,7 +138,7 @@ class _Lender:
         picked = _floats(other.picture.take(found.pixel, axis=0))
         weight = self._agreement(block, picked, found.seen)
         weight *= found.seen[inner]
-        weight *= self._of_tiles(block)
+        weight *= spread(self._tiles, self._pair.here.shape, block.rows).ravel()
         weight *= np.float32(other.samples)
         taken = float(weight.sum(dtype=np.float64))
         weight *= np.exp(found.apart[inner] * self._fall)
@@ -148,12 +149,6 @@ class _Lender:
         block.sums += picked
         block.weights += weight
         return taken
-
-    def _of_tiles(self, block: _Block) -> Array:
-        """Return the weights (n,) of the tiles that the block's pixels lie in."""
-        width = self._pair.here.shape[1]
-        row = np.arange(block.pixels.start, block.pixels.stop, width) // width // TILE
-        return self._tiles[row].repeat(TILE, axis=1)[:, :width].ravel()
 
     def _agreement(self, block: _Block, picked: Array, seen: Mask) -> Array:
         """Return the weights (n,) of the block's inner pixels."""

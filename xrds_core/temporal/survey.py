@@ -64,6 +64,20 @@ def survey(pair: Pair) -> Array:
     return _weights(sums)
 
 
+def spread(tiles: Array, shape: tuple[int, int], rows: slice) -> Array:
+    """Return the weights (h, W) of some rows: linear between the middles of tiles."""
+    down = _hats(tiles.shape[0], np.arange(rows.start, rows.stop))
+    across = _hats(tiles.shape[1], np.arange(shape[1]))
+    return np.asarray(down.T @ tiles @ across)
+
+
+def _hats(tiles: int, pixels: NDArray[np.integer]) -> Array:
+    """Return (tiles, n): what share each tile has in each pixel, along one axis."""
+    place = np.clip((pixels + 0.5) / TILE - 0.5, 0, tiles - 1)
+    hats = 1 - np.abs(place - np.arange(tiles)[:, None])
+    return np.maximum(hats, 0.0).astype(np.float32)
+
+
 def _still(pair: Pair, here: NDArray[np.intp], there: NDArray[np.int32]) -> Mask:
     """Return where neither frame shows what moves by itself, or is spoilt."""
     result = np.ones(len(here), bool)
