@@ -34,6 +34,7 @@ _OPTIONAL = {"alpha": (), "vector": (4,), "index": ()}
 class Camera:
     """A perspective or orthographic camera and the part of its frame that arrays hold.
 
+    A panoramic camera has no such matrices: its frames cannot lend to each other.
     ``view`` (4, 4) takes world points to the camera's axes, ``project`` (4, 4) those to
     OpenGL clip space (in Blender: `Object.calc_matrix_camera`). ``size`` is (width,
     height) of the whole frame in pixels, ``window`` the (x, y) of the arrays' top-left
