@@ -78,7 +78,7 @@ def test_better_qualities_are_better_and_guides_help() -> None:
 
 
 def by_hand(color: Array, guides: dict[str, Array], quality: str) -> Array:
-    """What a quality promises, in OIDN's own words, with rows as Blender has them."""
+    """What a quality promises, in OIDN's own words."""
 
     def run(images: dict[str, Array], quality: str, is_clean: bool = False) -> Array:
         task, result = oidn.Device().new_filter("RT"), np.empty_like(color)
@@ -89,18 +89,23 @@ def by_hand(color: Array, guides: dict[str, Array], quality: str) -> Array:
         task.execute()
         return result
 
-    images = {k: np.ascontiguousarray(v[::-1]) for k, v in guides.items()}
+    images = dict(guides)
     if quality == "High":
         images = {k: run({k: v}, "Fast") for k, v in images.items()}
-    images["color"] = np.ascontiguousarray(color[::-1])
-    return run(images, quality, quality == "High")[::-1]
+    images["color"] = color
+    return run(images, quality, quality == "High")
+
+
+def turned(*images: Array) -> list[Array]:
+    return [np.ascontiguousarray(x[::-1]) for x in images]
 
 
 def test_qualities_are_what_they_promise(denoiser: Denoiser) -> None:
     _, noisy, albedo, normal = render(101, 90)
     result = denoiser(noisy, albedo, normal)
-    guides = {"albedo": albedo, "normal": normal}
-    expected = by_hand(noisy, guides, denoising.QUALITIES[denoiser.quality])
+    light, *guides = turned(noisy, albedo, normal)  # as Blender has them
+    named = dict(zip(("albedo", "normal"), guides, strict=True))
+    expected = by_hand(light, named, denoising.QUALITIES[denoiser.quality])[::-1]
     if denoiser.quality == "high":
         assert result.prefiltered == ("albedo", "normal")
         np.testing.assert_allclose(result.radiance, expected, rtol=2e-3, atol=2e-3)
@@ -304,12 +309,18 @@ def test_memory_limit_holds() -> None:
     assert free[1] == limited[1]
 
 
+def test_little_memory_takes_rows_as_they_are() -> None:
+    _, noisy, albedo, normal = render(60, 50)
+    result = Denoiser("fast", memory_limit=0)(noisy, albedo, normal).radiance
+    expected = by_hand(noisy, {"albedo": albedo, "normal": normal}, "Fast")
+    np.testing.assert_array_equal(result, expected)
+
+
 def test_tiles_leave_no_seam() -> None:
     given = render(600, 290)[1:]
-    tiled, whole = (
-        Denoiser("fast", memory_limit=limit)(*given).radiance for limit in (0, None)
-    )
-    np.testing.assert_allclose(tiled, whole, atol=1e-4)
+    whole = Denoiser("fast")(*given).radiance
+    few = Denoiser("fast", memory_limit=0)(*turned(*given)).radiance[::-1]
+    np.testing.assert_allclose(few, whole, atol=1e-4)
 
 
 @ON_LINUX

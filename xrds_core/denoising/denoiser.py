@@ -199,20 +199,30 @@ class Denoiser:
     ) -> None:
         """Denoise into ``output``, (H, W, 3)."""
         images: dict[str, Image] = {}
+        turn = self._has_room(pictures)
         total = sum(_SECONDS[stage] for stage in (*prefiltered, "picture"))
         for name, guide in pictures.guides.items():
-            images[name] = _upside_down(guide)
+            images[name] = _rows(guide, turn)
             if name in prefiltered:
                 stages.begin(_SECONDS[name] / total)
                 images[name] = self._prefilter(name, images[name], name, stages)
         if "normal" in images and "albedo" not in images:
             images["albedo"] = np.full_like(images["normal"], _NO_ALBEDO)
-        images["color"] = _upside_down(pictures.radiance)
+        images["color"] = _rows(pictures.radiance, turn)
         stages.begin(_SECONDS["picture"] / total)
         task = self._filter("picture", QUALITIES[self.quality])
-        self._limit(task, sum(image.nbytes for image in images.values()))
+        held = images.values() if turn else (images[name] for name in prefiltered)
+        self._limit(task, sum(image.nbytes for image in held))
         self._execute(task, images, output, stages)
-        _turn(output)
+        if turn:
+            _turn(output)
+
+    def _has_room(self, pictures: Pictures) -> bool:
+        """Tell whether there is memory for copies with the rows as Blender has them."""
+        if self._memory_limit is None:
+            return True
+        copies = pictures.radiance.size * 4 * (1 + len(pictures.guides))
+        return copies <= self._memory_limit // 2
 
     def _prefilter(
         self, name: str, guide: Image, kept_as: str, stages: Stages | None = None
@@ -276,9 +286,14 @@ def _read(buffer: Any, output: Image) -> None:
     output[...] = pixels
 
 
-def _upside_down(image: Array) -> Array:
-    """Return rows as Blender has them: OIDN's picture depends on it by 0.1 dB."""
-    return np.ascontiguousarray(image[::-1])
+def _rows(image: Array, turn: bool) -> Array:
+    """Return rows as OIDN takes them, for ``turn`` in Blender's order, bottom first.
+
+    Its networks are not symmetric: the order changes the picture, by 0.1 dB at times.
+    """
+    image = image[::-1] if turn else image
+    plain = image.strides[2] == image.itemsize and min(image.strides) > 0
+    return image if plain else np.ascontiguousarray(image)
 
 
 def _turn(image: Array) -> None:
