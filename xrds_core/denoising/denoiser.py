@@ -50,7 +50,6 @@ _WITH_PREFILTER = ("best", "high")
 _NO_ALBEDO = 0.5  # what Cycles gives with a normal alone: OIDN wants both
 _MEBIBYTE = 1 << 20
 
-
 _open: WeakSet[Denoiser] = WeakSet()
 
 
@@ -227,8 +226,7 @@ class Denoiser:
             other = np.empty(output.shape, np.float32)
             images = {name: _rows(image, True) for name, image in images.items()}
             self._execute(task, images, other, stages)
-            output += other if turn else other[::-1]
-            output *= 0.5
+            _mix(output, other if turn else other[::-1])
 
     def _has_room(self, pictures: Pictures) -> bool:
         """Tell whether there is memory for copies with the rows as Blender has them."""
@@ -315,6 +313,12 @@ def _turn(image: Array) -> None:
     top = image[:half].copy()
     image[:half] = image[image.shape[0] - half :][::-1]
     image[image.shape[0] - half :] = top[::-1]
+
+
+def _mix(image: Array, other: Array) -> None:
+    """Make ``image`` the mean of both."""
+    image += other
+    image *= 0.5
 
 
 def denoise(
