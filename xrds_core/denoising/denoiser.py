@@ -36,8 +36,8 @@ the mean of two such pictures, one made upside down, in one and a half of the se
 ``balanced`` and ``fast`` are smaller networks on the guides as they are.
 """
 
-# OIDN has no better networks for guides than those of Fast but the large ones, which
-# take twice the seconds for no better picture (within 0.1 dB either way).
+# Of OIDN's networks for guides those of High alone are others. They take twice the
+# seconds, for 0.07 dB on the mean of real scenes; finely textured albedo wins 0.3.
 _PREFILTER = "Fast"
 # A guide is clean where that would change it by no more than this, root mean square:
 # as it is, it then costs the picture less than 0.05 dB.
