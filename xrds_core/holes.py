@@ -12,7 +12,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    Array = NDArray[np.float32]
+    from .arrays import Array
+
 
 BRIGHTEST = 1e12
 """Radiance above it is a renderer's overflow: the sun's is about 1e7 W / (m2 sr)."""
@@ -22,7 +23,7 @@ _LARGEST = np.finfo(np.float32).max
 def clean_radiance(x: Array) -> tuple[Array, int]:
     """Return (x, bad pixels): NaN, infinities and overflows filled in, negative 0.
 
-    ``x`` itself is returned where nothing is wrong with it; else a copy.
+    `x` itself is returned where nothing is wrong with it; else a copy.
     """
     # min and max propagate NaN and need no array of the size of the picture
     if not x.size or (x.min() >= 0.0 and x.max() <= BRIGHTEST):
@@ -37,7 +38,7 @@ def clean_radiance(x: Array) -> tuple[Array, int]:
 def fill_holes(x: Array) -> tuple[Array, int]:
     """Return (x, holes): NaN and infinities get the mean of finite pixels near them.
 
-    ``x`` itself is returned where there are none. A picture without a single finite
+    `x` itself is returned where there are none. A picture without a single finite
     pixel becomes 0.
     """
     if not x.size or (np.isfinite(x.min()) and np.isfinite(x.max())):

@@ -19,7 +19,7 @@ ENGINE = "XRDS"
 SCALES = (1, 2, 4, 8)
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
-QUALITIES = ("high", "balanced", "fast")
+QUALITIES = ("best", "high", "balanced", "fast")
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class RenderJob:
     for guides beside those in memory; each render of the same view adds its samples to
     them until they are `guide_limit`.
     `denoiser` is a mode of Cycles' denoiser or its name, None the scene's own;
-    `denoise` is the quality of ours (high, balanced or fast) at scale 1.
+    `denoise` is the quality of ours, one of QUALITIES.
     `temporal_radius` is how many frames before and after lend their samples, in a shot
     at scale 1. With
     `time_budget` (seconds a frame) or `quality` (PSNR in dB) scale, samples, guides,

@@ -1,7 +1,7 @@
 """A denoiser that is kept between pictures, as Cycles uses OIDN but quicker.
 
 Arrays are float32 (height, width, channels), row 0 on top, scene-linear. Source of how
-guides are treated: Cycles' ``intern/cycles/integrator/denoiser_oidn.cpp``.
+guides are treated: Cycles' `intern/cycles/integrator/denoiser_oidn.cpp`.
 """
 
 from __future__ import annotations
@@ -23,17 +23,18 @@ from .stages import Stages
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..arrays import Array
     from ..progress import Callback
-    from .pictures import Array, Pictures
+    from .pictures import Pictures
 
     Image = NDArray[np.floating[Any]]
 
 QUALITIES = {"best": "High", "high": "High", "balanced": "Balanced", "fast": "Fast"}
 """What we call a quality, and which of OIDN's makes the picture.
 
-``high`` is the large network on guides that a smaller one has denoised first; ``best``
+`high` is the large network on guides that a smaller one has denoised first; `best`
 the mean of two such pictures, one made upside down, in one and a half of the seconds;
-``balanced`` and ``fast`` are smaller networks on the guides as they are.
+`balanced` and `fast` are smaller networks on the guides as they are.
 """
 
 # Of OIDN's networks for guides those of High alone are others. They take twice the
@@ -69,7 +70,7 @@ class Denoised:
     bad_pixels: int
     """Pixels of the inputs that held NaN, infinities, overflows or negative light."""
     prefiltered: tuple[str, ...]
-    """The guides that were denoised first: of ``albedo`` and ``normal``."""
+    """The guides that were denoised first: of `albedo` and `normal`."""
 
 
 class Denoiser:
@@ -79,8 +80,8 @@ class Denoiser:
     threads run one after the other.
 
     Args:
-        quality: ``best``, ``high``, ``balanced`` or ``fast``; see `QUALITIES`.
-        device: ``auto`` (the fastest there is), ``cpu``, ``cuda`` or ``metal``.
+        quality: `best`, `high`, `balanced` or `fast`; see `QUALITIES`.
+        device: `auto` (the fastest there is), `cpu`, `cuda` or `metal`.
         threads: of the CPU; 0 for one per core.
         memory_limit: bytes that a call may take beside the arrays given and returned;
             it works in tiles then. A target, not a bound: a tile has a least size.
@@ -120,7 +121,7 @@ class Denoiser:
 
     @property
     def device(self) -> str:
-        """What it runs on: ``cpu``, ``cuda`` or ``metal``."""
+        """What it runs on: `cpu`, `cuda` or `metal`."""
         return str(self._device.type.name).lower()
 
     def __call__(
@@ -142,8 +143,8 @@ class Denoiser:
             normal: (H, W, 3), means of unit vectors of any space, 0 where nothing is.
             hdr: False for values in [0, 1] that are shown as they are.
             guides_are_clean: True if the picture may take over all that they show,
-                False if not, None to judge each by its own noise, as ``best`` and
-                ``high`` do: the others then take them for noisy.
+                False if not, None to judge each by its own noise, as `best` and
+                `high` do: the others then take them for noisy.
             progress: takes a fraction in [0, 1] that never falls; False as its result
                 cancels.
 
@@ -201,7 +202,7 @@ class Denoiser:
         output: Array,
         stages: Stages,
     ) -> None:
-        """Denoise into ``output``, (H, W, 3)."""
+        """Denoise into `output`, (H, W, 3)."""
         images: dict[str, Image] = {}
         turn = self._has_room(pictures)
         pictures_made = ("picture", "second picture")[: 1 + (self.quality == "best")]
@@ -252,7 +253,7 @@ class Denoiser:
         return self._filters[kept_as]
 
     def _limit(self, task: Any, held: int) -> None:
-        """Leave a filter the memory that the ``held`` bytes of guides do not take."""
+        """Leave a filter the memory that the `held` bytes of guides do not take."""
         if self._memory_limit is not None:
             task.max_memory_mb = max(0, self._memory_limit - held) // _MEBIBYTE
 
@@ -298,7 +299,7 @@ def _read(buffer: Any, output: Image) -> None:
 
 
 def _rows(image: Array, turn: bool) -> Array:
-    """Return rows as OIDN takes them, for ``turn`` in Blender's order, bottom first.
+    """Return rows as OIDN takes them, for `turn` in Blender's order, bottom first.
 
     Its networks are not symmetric: the order changes the picture, by 0.1 dB at times.
     """
@@ -316,7 +317,7 @@ def _turn(image: Array) -> None:
 
 
 def _mix(image: Array, other: Array) -> None:
-    """Make ``image`` the mean of both."""
+    """Make `image` the mean of both."""
     image += other
     image *= 0.5
 

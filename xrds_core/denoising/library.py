@@ -1,6 +1,6 @@
 """Open Image Denoise (OIDN): loading it, its devices, its errors.
 
-It comes with the package ``mitsuba-oidn``. Source: https://www.openimagedenoise.org.
+It comes with the package `mitsuba-oidn`. Source: https://www.openimagedenoise.org.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ DEVICES = {"cpu": "CPU", "cuda": "CUDA", "metal": "Metal"}
 
 
 def load() -> ModuleType:
-    """Return the module ``mitsuba_oidn``; raises XRDSError if it cannot be loaded."""
+    """Return the module `mitsuba_oidn`; raises XRDSError if it cannot be loaded."""
     try:
         return import_module("mitsuba_oidn")
     except (ImportError, OSError, RuntimeError) as error:
@@ -38,9 +38,9 @@ def devices() -> list[str]:
 
 
 def open_device(name: str, threads: int) -> Any:
-    """Return OIDN's device of a name, or the fastest one for ``auto``.
+    """Return OIDN's device of a name, or the fastest one for `auto`.
 
-    ``threads`` are of the CPU, 0 for one per core. Raises UsageError if the device is
+    `threads` are of the CPU, 0 for one per core. Raises UsageError if the device is
     not here, and as `load`.
     """
     oidn = load()
@@ -64,7 +64,7 @@ def open_device(name: str, threads: int) -> Any:
 
 @contextmanager
 def explained(device: str, shape: tuple[int, ...]) -> Iterator[None]:
-    """Turn what OIDN raises over a picture of ``shape`` into one clear line."""
+    """Turn what OIDN raises over a picture of `shape` into one clear line."""
     oidn = load()
     try:
         yield

@@ -14,9 +14,8 @@ from ..errors import PictureError
 from ..holes import clean_radiance, fill_holes
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from ..arrays import Array
 
-    Array = NDArray[np.float32]
 
 _SIDE = 4  # blocks along a side of a sample
 _BLOCK = 64  # pixels along a side of a block
@@ -32,7 +31,7 @@ class Pictures:
     alpha: Array
     """(H, W, 1), or (H, W, 0) where none was given."""
     guides: dict[str, Array]
-    """``albedo`` and ``normal``, those that were given, (H, W, 3)."""
+    """`albedo` and `normal`, those that were given, (H, W, 3)."""
     bad_pixels: int
 
 

@@ -22,7 +22,7 @@ class Stages:
         self._is_cancelled = False
 
     def begin(self, share: float) -> None:
-        """Begin a stage that is ``share`` of all the work."""
+        """Begin a stage that is `share` of all the work."""
         self._start, self._share = self._start + self._share, share
 
     def tell(self, fraction: float) -> None:

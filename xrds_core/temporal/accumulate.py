@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .frame import Array, Camera, Stored
+    from ..arrays import Array
+    from .frame import Camera, Stored
     from .motion import Pair
 
     Mask = NDArray[np.bool_]
@@ -43,9 +44,9 @@ _NORMAL = slice(6, 9)  # of `Stored.picture`
 class Accumulated:
     """A frame with the samples of its neighbours; float32, (H, W, 3) or (H, W).
 
-    ``radiance``, ``albedo``, ``normal`` (in this frame's axes) and ``alpha`` (or None)
-    are means over ``samples`` (H, W) samples per pixel, NaN where no frame has any.
-    ``rejected`` is the share of the neighbours' samples that were left out: pixels that
+    `radiance`, `albedo`, `normal` (in this frame's axes) and `alpha` (or None)
+    are means over `samples` (H, W) samples per pixel, NaN where no frame has any.
+    `rejected` is the share of the neighbours' samples that were left out: pixels that
     no neighbour shows, or that show other light.
     """
 
@@ -63,11 +64,11 @@ def accumulate(
     movement: Movement | None = None,
     threads: int | None = None,
 ) -> Accumulated:
-    """Return ``target`` with the samples of ``others``.
+    """Return `target` with the samples of `others`.
 
-    ``movement`` knows what moved by itself in this shot; without it each call finds it
+    `movement` knows what moved by itself in this shot; without it each call finds it
     anew. Without others the result is the target's own picture to
-    the bit. ``threads``: all processors by default; the result does not depend on it.
+    the bit. `threads`: all processors by default; the result does not depend on it.
     Raises PictureError where the frames hold different passes.
     """
     detours = (movement or Movement()).detours(target, others)
@@ -196,7 +197,7 @@ def _unpacked(
 
 
 def _turn(here: Camera, there: Camera) -> Array | None:
-    """Return (3, 3) that takes normals of ``there`` to ``here``; None if they agree.
+    """Return (3, 3) that takes normals of `there` to `here`; None if they agree.
 
     Z points away from the viewer in both, against what view matrices say.
     """

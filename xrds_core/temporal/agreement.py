@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from .frame import Array
+    from ..arrays import Array
 
 REACH = 3  # pixels to each side that are summed: 7x7
 # z squared is 1 on the mean where frames agree, and above 4 in one pixel of twenty.
@@ -30,7 +30,7 @@ def brightness(radiance: Array, alike: bool = True) -> Array:
 
     The root makes the noise of dark and bright pixels alike, so that a few bright ones
     do not outvote the others. Between frames of other sample counts it would lie:
-    less noise has a larger mean root. So those (not ``alike``) keep the luminance.
+    less noise has a larger mean root. So those (not `alike`) keep the luminance.
     """
     light = np.maximum(radiance @ _LUMINANCE, np.float32(0.0))
     return np.sqrt(light) if alike else light
@@ -39,7 +39,7 @@ def brightness(radiance: Array, alike: bool = True) -> Array:
 def agreement(difference: Array) -> Array:
     """Return the weights (H - 2 REACH, W) in (0, 1] of a neighbour's samples.
 
-    ``difference`` (H, W): brightness of the neighbour minus the frame's own, 0 where
+    `difference` (H, W): brightness of the neighbour minus the frame's own, 0 where
     nothing is lent. The rows at both ends serve those between; beyond the columns at
     both ends nothing is lent.
     """

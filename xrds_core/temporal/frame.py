@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import DTypeLike, NDArray
 
-    Array = NDArray[np.float32]
+    from ..arrays import Array
+
     Matrix = NDArray[np.float64]
 
 # Blender writes 1e10 where no ray hits anything.
@@ -35,9 +36,9 @@ class Camera:
     """A perspective or orthographic camera and the part of its frame that arrays hold.
 
     A panoramic camera has no such matrices: its frames cannot lend to each other.
-    ``view`` (4, 4) takes world points to the camera's axes, ``project`` (4, 4) those to
-    OpenGL clip space (in Blender: `Object.calc_matrix_camera`). ``size`` is (width,
-    height) of the whole frame in pixels, ``window`` the (x, y) of the arrays' top-left
+    `view` (4, 4) takes world points to the camera's axes, `project` (4, 4) those to
+    OpenGL clip space (in Blender: `Object.calc_matrix_camera`). `size` is (width,
+    height) of the whole frame in pixels, `window` the (x, y) of the arrays' top-left
     pixel in it: (0, 0) where no border crops the frame.
     """
 
@@ -65,17 +66,17 @@ class Camera:
 class Frame:
     """What the renderer gives of one frame; arrays are not changed.
 
-    ``number`` is the frame's number: ``vector`` leads to number - 1 and number + 1, and
-    frames of one number show one moment (the views of a stereo pair). ``samples`` per
-    pixel weigh the frame against others. ``normal`` is in the camera's axes, but with Z
-    pointing away from the viewer, as in Cycles' `Denoising Normal`. ``depth`` (H, W) is
+    `number` is the frame's number: `vector` leads to number - 1 and number + 1, and
+    frames of one number show one moment (the views of a stereo pair). `samples` per
+    pixel weigh the frame against others. `normal` is in the camera's axes, but with Z
+    pointing away from the viewer, as in Cycles' `Denoising Normal`. `depth` (H, W) is
     the distance of the first hit from the camera, along the camera's axis, at each
     pixel's centre; infinite, or above 1e9, without a hit.
 
-    Optional: ``alpha`` (H, W); ``vector`` (H, W, 4), Cycles' Vector pass: where the
+    Optional: `alpha` (H, W); `vector` (H, W, 4), Cycles' Vector pass: where the
     surface was one frame before minus where it is, then where it is minus where it will
-    be one frame later, in pixels, y upwards; ``index`` (H, W), integers that name the
-    object at each pixel, and ``matrices``, from such an integer to the object's (4, 4)
+    be one frame later, in pixels, y upwards; `index` (H, W), integers that name the
+    object at each pixel, and `matrices`, from such an integer to the object's (4, 4)
     matrix to world. Without these, whatever is hit is taken to stand still.
     """
 
@@ -116,9 +117,9 @@ class Frame:
 class Stored:
     """A frame as the window keeps it: flat, packed, and free of NaN.
 
-    ``picture`` (H W, 9 or 10) holds radiance, albedo, normal and alpha, in half floats
-    where memory counts. ``nearness`` (H W) is 1 / depth, 0 without a hit; the depth
-    itself for an orthographic camera; NaN where it is not known. ``spoilt`` (H W) says
+    `picture` (H W, 9 or 10) holds radiance, albedo, normal and alpha, in half floats
+    where memory counts. `nearness` (H W) is 1 / depth, 0 without a hit; the depth
+    itself for an orthographic camera; NaN where it is not known. `spoilt` (H W) says
     which pixels held NaN or infinities and are 0 now; None if none did.
     """
 
@@ -143,7 +144,7 @@ class Stored:
 def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
     """Pack a frame; pixels with NaN or infinities in any pass lend nothing.
 
-    ``dtype`` float16 halves the memory; values beyond +-65504 are cut to it.
+    `dtype` float16 halves the memory; values beyond +-65504 are cut to it.
     """
     parts = [frame.radiance, frame.albedo, frame.normal]
     if frame.alpha is not None:

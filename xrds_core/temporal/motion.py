@@ -23,7 +23,8 @@ import numpy as np
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .frame import Array, Camera, Matrix, Stored
+    from ..arrays import Array
+    from .frame import Camera, Matrix, Stored
 
 # Pixels by which motion there and motion back may differ; for things that move by
 # themselves, whose edges are known less well, half as much.
@@ -48,10 +49,10 @@ class Grid:
 class Places:
     """Where pixels were in another frame.
 
-    ``pixel``: flat index of the other frame's nearest pixel, 0 where not seen;
-    ``apart``: squared distance in pixels from the true place to that pixel's centre,
+    `pixel`: flat index of the other frame's nearest pixel, 0 where not seen;
+    `apart`: squared distance in pixels from the true place to that pixel's centre,
     and what motion there and back leave over;
-    ``seen``: where the other frame shows the same. All (n,), in the order of the grid.
+    `seen`: where the other frame shows the same. All (n,), in the order of the grid.
     """
 
     pixel: NDArray[np.int32]
@@ -63,9 +64,9 @@ class Places:
 class Detour:
     """What a pair of frames knows of things that moved by themselves.
 
-    ``pixels``: flat, ascending, those of this frame that show such things; ``x`` and
-    ``y``: where they were in the other frame, NaN where motion there and back does not
-    agree. All (m,). ``moving`` (H W): which pixels of the other frame show such things.
+    `pixels`: flat, ascending, those of this frame that show such things; `x` and
+    `y`: where they were in the other frame, NaN where motion there and back does not
+    agree. All (m,). `moving` (H W): which pixels of the other frame show such things.
     """
 
     pixels: NDArray[np.intp]
@@ -128,7 +129,7 @@ def pixels_of(camera: Camera) -> Matrix:
 def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Array:
     """Return (4, 4): (x, y, 1, nearness) here -> (x w, y w, w, nearness w) there.
 
-    ``moved`` (4, 4) is what the object did to world points in between.
+    `moved` (4, 4) is what the object did to world points in between.
     """
     between = np.eye(4) if moved is None else moved
     return (pixels_of(there) @ between @ world_of(here)).astype(np.float32)
@@ -142,7 +143,7 @@ def pair(
 ) -> Pair:
     """Return what `places` needs to know of two frames.
 
-    ``around`` is `surroundings` of ``here``, for callers with many pairs.
+    `around` is `surroundings` of `here`, for callers with many pairs.
     """
     forth = passage(here.camera, there.camera)
     back = passage(there.camera, here.camera)
@@ -167,7 +168,7 @@ def surroundings(frame: Stored) -> tuple[Array, Array]:
 def extreme(x: Array, smaller: np.ufunc, step: int = 1) -> Array:
     """Return the least (`np.fmin`) or largest (`np.fmax`) value of 3x3 pixels.
 
-    They lie ``step`` pixels apart, the middle one at the pixel itself.
+    They lie `step` pixels apart, the middle one at the pixel itself.
     """
     wide = np.pad(x, step, "edge")
     end = slice(2 * step, None)
@@ -177,7 +178,7 @@ def extreme(x: Array, smaller: np.ufunc, step: int = 1) -> Array:
 
 
 def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Grid:
-    """Return the centres of the pixels of rows ``first`` to ``last`` (excluded)."""
+    """Return the centres of the pixels of rows `first` to `last` (excluded)."""
     height, width = shape
     last = height if last is None else last
     x = np.arange(width, dtype=np.float32) + np.float32(0.5)
@@ -198,7 +199,7 @@ def carry(
 
 
 def places(pair: Pair, grid: Grid) -> Places:
-    """Find where rows of pixels of ``pair.here`` were in ``pair.there``."""
+    """Find where rows of pixels of `pair.here` were in `pair.there`."""
     found, _ = still_places(pair, grid)
     return found if pair.detour is None else _detoured(found, pair, grid)
 
@@ -254,6 +255,6 @@ def centres(pixels: NDArray[np.integer], width: int) -> tuple[Array, Array]:
 
 
 def known(x: Array, y: Array, mask: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return places with NaN outside of ``mask``."""
+    """Return places with NaN outside of `mask`."""
     nan = np.float32(np.nan)
     return np.where(mask, x, nan), np.where(mask, y, nan)

@@ -26,7 +26,7 @@ class Movement:
         self._trails = Trails()
 
     def detours(self, here: Stored, others: Sequence[Stored]) -> list[Detour | None]:
-        """Return for each of ``others`` the places of what moved by itself."""
+        """Return for each of `others` the places of what moved by itself."""
         followed = self._trails.detours(here, others)
         return [
             by_matrices(here, there) if _indexed(here, there) else followed.get(i)

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .frame import Array, Matrix, Stored
+    from ..arrays import Array
+    from .frame import Matrix, Stored
 
 # Of an object's matrix, relative to its largest number: less is no motion.
 _SAME_MATRIX = 1e-6

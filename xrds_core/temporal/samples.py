@@ -26,10 +26,10 @@ _SEEDS = 2**31  # Cycles takes a signed 32-bit integer
 class Portion:
     """A frame's part of a sample sequence.
 
-    In Cycles: ``seed``; ``whole`` is `samples`, ``offset`` is `sample_offset` and
-    ``length`` is `sample_subset_length`, with `use_sample_subset` on where the part is
+    In Cycles: `seed`; `whole` is `samples`, `offset` is `sample_offset` and
+    `length` is `sample_subset_length`, with `use_sample_subset` on where the part is
     not the whole. Passes of sample 0 alone (Depth, Position, indices) are empty where
-    ``offset`` is not 0; `Denoising Depth` is not.
+    `offset` is not 0; `Denoising Depth` is not.
     """
 
     seed: int
@@ -43,8 +43,8 @@ def portions(
 ) -> list[Portion]:
     """Return the part of each frame of a shot, from the cameras in order of time.
 
-    ``samples`` per pixel and frame; frames up to ``radius`` apart meet. A frame belongs
-    to a still run if the camera before or after it is the same. ``seed`` is the shot's.
+    `samples` per pixel and frame; frames up to `radius` apart meet. A frame belongs
+    to a still run if the camera before or after it is the same. `seed` is the shot's.
     """
     runs = 2 * radius + 1
     return [

@@ -18,7 +18,8 @@ from .motion import Grid, still_places
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from .frame import Array, Stored
+    from ..arrays import Array
+    from .frame import Stored
     from .motion import Pair
 
     Mask = NDArray[np.bool_]
@@ -36,7 +37,7 @@ _HARMLESS = 0.01
 
 
 def survey(pair: Pair) -> Array:
-    """Return the weights (rows, columns) of tiles of ``pair.here``, 0 after a cut."""
+    """Return the weights (rows, columns) of tiles of `pair.here`, 0 after a cut."""
     height, width = pair.here.shape
     tiles = -(-height // TILE), -(-width // TILE)
     step = _STRIDES[height * width >= _LARGE]
@@ -116,7 +117,7 @@ def _weights(sums: list[NDArray[np.float64]]) -> Array:
 
 
 def _around(x: NDArray[np.float64], reach: int | None) -> NDArray[np.float64]:
-    """Return the sums over tiles up to ``reach`` away; over all of them for None."""
+    """Return the sums over tiles up to `reach` away; over all of them for None."""
     if reach is None:
         return np.full(x.shape, x.sum())
     wide = np.pad(x, reach)

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from .frame import Array, Camera, Stored
+    from ..arrays import Array
+    from .frame import Camera, Stored
 
     Mask = NDArray[np.bool_]
     Trail = tuple[Array, Array]  # x and y, NaN where lost
@@ -48,9 +49,9 @@ class Trails:
         self._moving: WeakKeyDictionary[Stored, Mask] = WeakKeyDictionary()
 
     def detours(self, here: Stored, others: Sequence[Stored]) -> dict[int, Detour]:
-        """Return, by position in ``others``, the places of what moved by itself.
+        """Return, by position in `others`, the places of what moved by itself.
 
-        Frames of one number as ``here`` show the same moment and need none. Where a
+        Frames of one number as `here` show the same moment and need none. Where a
         frame in between is missing nothing moving is known beyond it.
         """
         frames = {x.number: x for x in (*others, here) if x.vector is not None}
@@ -78,7 +79,7 @@ class Trails:
     def _trail(
         self, here: Stored, frames: Mapping[int, Stored], step: int
     ) -> dict[int, Trail]:
-        """Follow the moving pixels of ``here`` frame by frame; number -> places."""
+        """Follow the moving pixels of `here` frame by frame; number -> places."""
         x, y = centres(np.flatnonzero(self.moving(here, frames)), here.shape[1])
         trail, frame = {}, here
         while (after := frames.get(frame.number + step)) is not None:

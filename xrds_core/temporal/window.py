@@ -1,6 +1,6 @@
 """Which frames lend to which, in what order they are needed, and what they cost.
 
-A frame takes samples from those up to ``radius`` frames before and after it, within
+A frame takes samples from those up to `radius` frames before and after it, within
 one cut of the shot; at the ends it takes what there is. Frames go by in order: each is
 loaded once, kept while a frame to come needs it, and finished when its last neighbour
 is there.
@@ -28,9 +28,9 @@ _VECTOR_BYTES, _ALPHA_BYTES, _INDEX_BYTES = 8, 2, 4
 class Shot:
     """The frames of a shot in order of time, and how far they lend to each other.
 
-    ``frames`` are frame numbers, those that are to be finished; ``radius`` counts in
-    them, so that a shot rendered in steps lends as far. ``cuts`` are the frames that
-    begin something new: nothing is lent across. ``lending`` are frames that only lend,
+    `frames` are frame numbers, those that are to be finished; `radius` counts in
+    them, so that a shot rendered in steps lends as far. `cuts` are the frames that
+    begin something new: nothing is lent across. `lending` are frames that only lend,
     as those that another machine finishes. Raises UsageError for what cannot be.
     """
 
@@ -47,7 +47,7 @@ class Shot:
         object.__setattr__(self, "order", order)
 
     def lenders(self, frame: int) -> tuple[int, ...]:
-        """Return the frames that lend to ``frame``, the nearest ones first."""
+        """Return the frames that lend to `frame`, the nearest ones first."""
         place = self.order.index(frame)
         around = self.order[max(0, place - self.radius) : place + self.radius + 1]
         take = self._take(frame)
@@ -73,9 +73,9 @@ def slide(
 ) -> Iterator[tuple[int, Kept, dict[int, Kept]]]:
     """Yield (number, frame, lenders by number) for each frame of a shot, in order.
 
-    ``load`` gives one frame and is called once for each, in order, and not before it is
+    `load` gives one frame and is called once for each, in order, and not before it is
     needed; None where a frame is missing or damaged: it lends nothing and is left out.
-    At most ``shot.most_kept`` frames are kept; what is yielded is dropped when the next
+    At most `shot.most_kept` frames are kept; what is yielded is dropped when the next
     one is asked for.
     """
     kept: dict[int, Kept | None] = {}
@@ -101,6 +101,6 @@ def bytes_needed(
     vector: bool = False,
     index: bool = False,
 ) -> int:
-    """Return the bytes that ``frames`` frames of half floats take in a window."""
+    """Return the bytes that `frames` frames of half floats take in a window."""
     each = _BYTES + _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha + _INDEX_BYTES * index
     return width * height * each * frames
