@@ -220,6 +220,7 @@ class Without:
 sys.meta_path.insert(0, Without())
 import bpy
 bpy.context.scene.render.engine = "XRDS"
+bpy.context.scene.xrds.scale = "2"
 try:
     bpy.ops.render.render()
 except RuntimeError as error:
@@ -243,7 +244,6 @@ sys.path[:] = [path for path in sys.path if not path.startswith("/usr/local/lib"
 import bpy
 scene = bpy.context.scene
 scene.render.engine = "XRDS"
-scene.xrds.scale = "1"
 scene.cycles.samples = 1
 scene.render.resolution_x = scene.render.resolution_y = 64
 scene.render.resolution_percentage = 100

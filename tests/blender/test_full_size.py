@@ -54,8 +54,8 @@ def test_qualities_differ(life: Any, quality: str) -> None:
 
 
 def test_an_unknown_quality_is_named(life: Any) -> None:
-    with pytest.raises(UsageError, match="denoise 'best' is not one of high"):
-        render(life, 1, denoise="best")
+    with pytest.raises(UsageError, match="denoise 'finest' is not one of best"):
+        render(life, 1, denoise="finest")
 
 
 def channels(scene: Any, engine: str, path: Path) -> dict[str, np.ndarray]:
