@@ -231,7 +231,7 @@ except RuntimeError as error:
     done = bare.run("blender", "-b", "--python", bare.seen(script))
     error = told(done.stdout, "error")
     assert "XRDS needs PyTorch" in error
-    assert "preferences tell where from" in error
+    assert "add-on's preferences" in error
 
 
 def test_the_first_click_renders_at_full_size_without_torch(bare: Program) -> None:

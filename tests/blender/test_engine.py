@@ -61,7 +61,9 @@ def test_a_border_agrees_with_the_whole(
     rows, columns = slice(3, 27), slice(13, 36)
     assert part.shape[:2] == ((24, 23) if crop else (33, 45))
     if not crop:
-        assert part.sum() == part[rows, columns].sum()
+        outside = part.copy()
+        outside[rows, columns] = 0.0
+        assert not outside.any()
         part = part[rows, columns]
     assert np.abs(part - whole[rows, columns]).mean() < 0.05
     exposures = [call["exposure"] for call in (network[0].calls + network[1].calls)]

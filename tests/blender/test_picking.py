@@ -45,6 +45,7 @@ def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         errors = budget.ErrorModel(curves)
         model = replace(budget.shipped(), errors=errors)
         monkeypatch.setattr(budget, "shipped", lambda: model)
+        monkeypatch.setattr(picking, "_denoisers", lambda: tuple(Denoiser))
         monkeypatch.setattr(picking, "probe", lambda *_: COSTS)
 
     return leave
