@@ -246,3 +246,26 @@ def test_a_still_has_no_neighbours(animation: Any, blend: Path) -> None:
     np.testing.assert_allclose(
         ours, picture(blend.parent / "alone" / "3.exr"), atol=2e-3
     )
+
+
+def test_frames_by_number_are_rendered_by_themselves(
+    animation: Any, blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As `blender -b FILE -f 1..5` does: each is a render job of its own there."""
+    monkeypatch.setattr("sys.argv", ["blender", "-b", "shot.blend", "-f", "1..5"])
+    rendered = []
+    monkeypatch.setattr(
+        "xrds_blender.shot.animation.sample_frame", lambda *_: rendered.append(1)
+    )
+    animation.frame_end = 2
+    bpy.ops.render.render(animation=True)
+    assert not rendered
+    assert len(list((blend.parent / "f12").iterdir())) == 2
+
+
+def test_a_panorama_is_rendered_frame_by_frame(blend: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    bpy.context.scene.camera.data.type = "PANO"
+    bpy.ops.wm.save_mainfile()
+    result = render(blend, "pano", frames=[1, 2])
+    assert [frame["temporal"] for frame in result["frames"]] == [None, None]
