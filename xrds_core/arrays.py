@@ -6,7 +6,30 @@ and scene-linear where it holds colour, unless a docstring says otherwise.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import PictureError
+
 Array = NDArray[np.float32]
+
+
+def float_array(name: str, value: Any, channels: tuple[int, ...]) -> Array:
+    """Return `value` as float32 (height, width, channels); PictureError if it is not.
+
+    `channels` are the numbers of them that are taken; `name` stands in the error.
+    """
+    array = np.asarray(value)
+    if array.ndim != 3 or array.shape[-1] not in channels or not array.size:
+        wanted = " or ".join(map(str, channels))
+        raise PictureError(
+            f"{name} has the shape {array.shape}; it must be (height, width, {wanted})"
+        )
+    if array.dtype.kind != "f":
+        raise PictureError(
+            f"{name} holds {array.dtype}; it must hold scene-linear floats"
+        )
+    with np.errstate(over="ignore"):  # what float32 cannot hold is a bad pixel
+        return array.astype(np.float32, copy=False)

@@ -19,6 +19,7 @@ from torch.nn import functional
 
 from .arrays import Array
 from .errors import UsageError
+from .holes import fill_holes
 from .layout import to_picture, to_planes
 from .regression import ALBEDO_EPSILON, explain
 
@@ -71,44 +72,6 @@ def clean_normal(x: Array) -> tuple[Array, int]:
     """
     x, holes = fill_holes(x)
     return np.clip(x, -1.0, 1.0), holes
-
-
-def fill_holes(x: Array) -> tuple[Array, int]:
-    """Replace pixels with NaN or infinities by the mean of finite ones near them.
-
-    Returns (x, holes); `x` itself where there are none. A picture without a
-    single finite pixel becomes 0.
-    """
-    # min and max propagate NaN and need no array of the size of the picture
-    if not x.size or (np.isfinite(x.min()) and np.isfinite(x.max())):
-        return x, 0
-    finite = np.isfinite(x).all(axis=-1)
-    return _pull_push(x, finite), int(finite.size - finite.sum())
-
-
-def _pull_push(x: Array, known: NDArray[np.bool_]) -> Array:
-    """Fill unknown pixels from the means of 2x2 blocks, coarser where need be."""
-    if known.all():
-        return x
-    x = np.where(known[..., None], x, np.float32(0.0))
-    if not known.any():
-        return x
-    height, width = known.shape
-    even = ((0, height % 2), (0, width % 2))
-    blocks = np.pad(x, (*even, (0, 0))) * np.float32(0.25)  # sums stay in range
-    counts = np.pad(known, even).astype(np.float32) * np.float32(0.25)
-    for axis in (0, 1):
-        blocks = _pair_sums(blocks, axis)
-        counts = _pair_sums(counts, axis)
-    means = blocks / np.maximum(counts, np.float32(0.25))[..., None]
-    coarse = _pull_push(np.clip(means, -_LARGEST, _LARGEST), counts > 0.0)
-    fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
-    return np.where(known[..., None], x, fine)
-
-
-def _pair_sums(x: Array, axis: int) -> Array:
-    even, odd = (np.take(x, range(i, x.shape[axis], 2), axis=axis) for i in (0, 1))
-    return np.asarray(even + odd)
 
 
 def auto_exposure(radiance: Array) -> float:

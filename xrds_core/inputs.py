@@ -9,10 +9,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from .arrays import Array
+from .arrays import Array, float_array
 from .errors import PictureError, UsageError
-from .front_end import clean_radiance, fill_holes, pad_guide, transfer
+from .front_end import clean_radiance, pad_guide, transfer
 from .guide_filter import FEW_SAMPLES
+from .holes import fill_holes
 from .layout import to_planes
 from .tiling import Tile
 
@@ -109,17 +110,17 @@ def check(
     """
     if guide_samples is not None and guide_samples < 1:
         raise UsageError(f"guide_samples is {guide_samples}; it must be 1 or more")
-    low = _array("radiance", radiance, (3, 4))
+    low = float_array("radiance", radiance, (3, 4))
     guides = {
-        "albedo": _array("albedo", albedo, (3,)),
-        "normal": _array("normal", normal, (3,)),
+        "albedo": float_array("albedo", albedo, (3,)),
+        "normal": float_array("normal", normal, (3,)),
     }
     if guide_radiance is not None:
-        guides["guide_radiance"] = _array("guide_radiance", guide_radiance, (3,))
+        guides["guide_radiance"] = float_array("guide_radiance", guide_radiance, (3,))
     if guide_alpha is not None:
         plane = np.asarray(guide_alpha)
         plane = plane[..., None] if plane.ndim == 2 else plane
-        guides["guide_alpha"] = _array("guide_alpha", plane, (1,))
+        guides["guide_alpha"] = float_array("guide_alpha", plane, (1,))
     _check_sizes(scale, low, guides)
     cleaned = {
         name: (clean_radiance if name == "guide_radiance" else fill_holes)(guide)
@@ -147,7 +148,7 @@ def check(
 
 def _noisy(value: Any, low: Array) -> tuple[Array, int]:
     """Return the radiance before denoising, cleaned, and its bad pixels."""
-    noisy = _array("noisy", value, (3,))
+    noisy = float_array("noisy", value, (3,))
     if noisy.shape[:2] != low.shape[:2]:
         raise PictureError(
             f"noisy is {_size(noisy)} pixels, but radiance is {_size(low)}: "
@@ -162,21 +163,6 @@ def _low_alpha(cover: Array, low: Array, scale: int) -> Array:
     whole = pad_guide(cover, low, scale)
     blocks = whole.reshape(height, scale, width, scale, 1)
     return np.asarray(blocks.mean(axis=(1, 3)))
-
-
-def _array(name: str, value: Any, channels: tuple[int, ...]) -> Array:
-    array = np.asarray(value)
-    if array.ndim != 3 or array.shape[-1] not in channels or not array.size:
-        wanted = " or ".join(map(str, channels))
-        raise PictureError(
-            f"{name} has the shape {array.shape}; it must be (height, width, {wanted})"
-        )
-    if array.dtype.kind != "f":
-        raise PictureError(
-            f"{name} holds {array.dtype}; it must hold scene-linear floats"
-        )
-    with np.errstate(over="ignore"):  # what float32 cannot hold is a bad pixel
-        return array.astype(np.float32, copy=False)
 
 
 def _check_sizes(scale: int, low: Array, guides: dict[str, Array]) -> None:

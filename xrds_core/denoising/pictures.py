@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import float_array
 from ..errors import PictureError
 from ..holes import clean_radiance, fill_holes
 
@@ -40,9 +41,9 @@ def check(radiance: Any, albedo: Any, normal: Any) -> Pictures:
 
     Raises PictureError, with the sizes and the remedy, for arrays that do not fit.
     """
-    whole = _array("radiance", radiance, (3, 4))
+    whole = float_array("radiance", radiance, (3, 4))
     given = {"albedo": albedo, "normal": normal}
-    guides = {k: _array(k, v, (3,)) for k, v in given.items() if v is not None}
+    guides = {k: float_array(k, v, (3,)) for k, v in given.items() if v is not None}
     for name, guide in guides.items():
         if guide.shape[:2] != whole.shape[:2]:
             raise PictureError(
@@ -83,21 +84,6 @@ def _split(x: Array, rows: int, columns: int) -> Array:
 def _busy(blocks: Array) -> Array:
     """Return how much neighbours differ in each block; one channel tells enough."""
     return np.abs(np.diff(blocks[..., 1], axis=2)).mean(axis=(1, 2))
-
-
-def _array(name: str, value: Any, channels: tuple[int, ...]) -> Array:
-    array = np.asarray(value)
-    if array.ndim != 3 or array.shape[-1] not in channels or not array.size:
-        wanted = " or ".join(map(str, channels))
-        raise PictureError(
-            f"{name} has the shape {array.shape}; it must be (height, width, {wanted})"
-        )
-    if array.dtype.kind != "f":
-        raise PictureError(
-            f"{name} holds {array.dtype}; it must hold scene-linear floats"
-        )
-    with np.errstate(over="ignore"):  # what float32 cannot hold is a bad pixel
-        return array.astype(np.float32, copy=False)
 
 
 def _size(x: Array) -> str:
