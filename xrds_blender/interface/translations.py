@@ -12,6 +12,13 @@ CONTEXT = "XRDS"
 _LANGUAGES = ("de_DE", "ja_JP")
 _WORDS = {
     "Scale": ("Vergrößerung", "拡大率"),
+    "Full Size": ("Volle Größe", "フルサイズ"),
+    "Denoising": ("Entrauschen", "デノイズ"),
+    "High": ("Hoch", "高"),
+    "Best": ("Beste", "最高"),
+    "Temporal Radius": ("Zeitlicher Radius", "時間半径"),
+    "Accumulation": ("Akkumulation", "蓄積"),
+    "Samples": ("Samples", "サンプル"),
     "Quality": ("Qualität", "品質"),
     "Fast": ("Schnell", "高速"),
     "Balanced": ("Ausgewogen", "バランス"),
