@@ -148,5 +148,5 @@ def load(module: str) -> Any:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise XRDSError(
             f"XRDS needs PyTorch, which cannot be loaded ({reason}); check the PyTorch "
-            "folder in the add-on's preferences, or render plain"
+            "folder in the add-on's preferences, or render at full size"
         ) from error
