@@ -314,6 +314,8 @@ def picked_config(job: RenderJob) -> Config:
     samples = job.samples or 0
     if job.plain:
         return Config("oidn", samples, denoiser)
+    if not job.is_enlarged:
+        return Config("full_size", samples, Denoiser(f"XRDS-{job.denoise.upper()}"))
     return Config(
         "xrds",
         samples,

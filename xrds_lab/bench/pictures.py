@@ -12,8 +12,10 @@ import numpy as np
 
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.denoiser import Denoiser as Mode
 from xrds_core import exr, front_end, metrics
 from xrds_core.atomic import replacing
+from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError
 
 from .inputs import Folder, Request, open_scene
@@ -145,6 +147,9 @@ class Pictures:
         """Radiance (H, W, 3) of the window; raises SceneError without its renders."""
         beauty, *rest = (_cleaned(self._read(r)) for r in config.requests())
         radiance = beauty["radiance"]
+        if config.method == "full_size":
+            denoiser = Denoiser(Mode(config.denoiser).quality)
+            return denoiser(radiance, beauty["albedo"], beauty["normal"]).radiance
         if config.scale == 1:
             return radiance
         guide = rest[0] if rest else {}

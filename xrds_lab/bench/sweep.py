@@ -36,7 +36,7 @@ FULL_SAMPLES = (1, 2, 4)
 
 @dataclass(frozen=True)
 class Config:
-    """One way to a picture: Cycles, OIDN, one of `rivals.ENLARGEMENTS` or xrds.
+    """One way to a picture: Cycles, OIDN, `rivals.ENLARGEMENTS`, full_size or xrds.
 
     `samples` are per pixel of the beauty render, at 1/`scale` of the size. `denoiser`
     OFF is none; None is as of `Request`.
@@ -53,6 +53,8 @@ class Config:
     @property
     def label(self) -> str:
         """Name in plots and tables."""
+        if self.method == "full_size":
+            return f"XRDS full size, {self.samples} spp, {self.denoiser}"
         if self.method in {"cycles", "oidn"}:
             name = "Cycles" if self.method == "cycles" else f"OIDN {self.denoiser}"
             return f"{name}, {self.samples} spp"
@@ -82,6 +84,8 @@ class Config:
 
     def beauty(self) -> Request:
         """The render that the picture's light comes from."""
+        if self.method == "full_size":  # our denoiser asks for the guides as well
+            return Request("full", self.samples)
         kind = "plain" if self.scale == 1 else "low"
         return Request(kind, self.samples, self.scale, self.denoiser)
 
