@@ -17,7 +17,7 @@ from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
-from xrds_blender.shot import shot
+from xrds_blender.shot import finishing, shot
 
 FRAMES = [1, 2, 3, 4, 5]
 
@@ -121,6 +121,32 @@ def test_no_two_frames_have_the_same_noise(blend: Path) -> None:
     alone = RenderJob(scale=1, temporal_radius=0)
     first, second = (p for _, p in shot.render_shot(scene, alone, [1, 2]))
     assert np.abs(first.radiance - second.radiance).mean() > 1e-4
+
+
+def test_under_a_still_camera_frames_continue_one_sequence(
+    blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their mean is one render with all the samples, not one of many seeds."""
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    scene.camera.animation_data_clear()
+    gathered = []
+    accumulate = finishing.accumulate
+
+    def keep(*given: Any) -> Any:
+        gathered.append(accumulate(*given))
+        return gathered[-1]
+
+    monkeypatch.setattr(finishing, "accumulate", keep)
+    job = RenderJob(scale=1, temporal_radius=2, seed=4)
+    assert len(list(shot.render_shot(scene, job, FRAMES))) == 5
+    whole = run_job(scene, lambda p: p.beauty(1, 5, denoise=False, seed=4))
+    middle = gathered[2]
+    assert middle.samples.mean() > 4.7
+    difference = np.abs(middle.radiance - whole.radiance)
+    assert np.median(difference) < 1e-3  # half floats
+    own = np.abs(gathered[0].radiance - whole.radiance)  # three frames of five
+    assert np.median(own) > 3 * np.median(difference)
 
 
 def test_a_cancelled_shot_keeps_the_frames_before(

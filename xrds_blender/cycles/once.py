@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+from xrds_core.temporal.samples import Portion
+
 from ..planning.denoiser import Denoiser
 from . import session
 from .borrowed import Borrowed
 from .clock import StageClock
 from .pass_names import GUIDE_PASSES
-from .settings import set_denoising, set_sampling
+from .settings import set_denoising, set_portion, set_sampling
 
 
 def render_once(
@@ -20,12 +22,14 @@ def render_once(
     seed: int | None = None,
     denoiser: Denoiser | None = None,
     noisy: bool = False,
+    portion: Portion | None = None,
 ) -> StageClock:
     """Render into the engine's result, exactly as Cycles' own engine would.
 
     `samples`, `seed` and `denoiser` None leave the scene's own. `noisy` switches
-    Cycles' denoiser off and adds the passes that guide another one. Raises Cancelled
-    when the user stops it.
+    Cycles' denoiser off and adds the passes that guide another one. `portion` is of a
+    longer sequence, in the place of samples and seed. Raises Cancelled when the user
+    stops it.
     """
     keeps_session = engine.path_resolve("render").use_persistent_data
     scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
@@ -33,7 +37,10 @@ def render_once(
         for name, letters, _ in GUIDE_PASSES:
             session.add_pass(engine, layer.name, name, letters)
     with Borrowed() as borrowed:
-        set_sampling(borrowed, scene, samples, seed)
+        if portion is None:
+            set_sampling(borrowed, scene, samples, seed)
+        else:
+            set_portion(borrowed, scene, portion)
         if noisy:
             set_denoising(borrowed, scene, layer, False)
         elif denoiser is not None and session.has_denoiser():

@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.temporal.samples import Portion
 
 from . import session
 from .once import render_once
-from .pass_names import ALBEDO, COMBINED, FIRST_HIT, MOTION, NOISY, NORMAL
+from .pass_names import ALBEDO, COMBINED, DEPTH, FIRST_HIT, MOTION, NOISY, NORMAL
 
 GEOMETRY = ((FIRST_HIT, "Z"), (MOTION, "XYZW"))
 """Passes that tell where a pixel was in another frame."""
+LATE_DEPTH = (DEPTH, "Z")
+"""In the place of the first hit's depth where a sequence is continued: that one is
+written by its first sample alone."""
 
 
 @dataclass(frozen=True)
@@ -40,17 +44,21 @@ def sample_layer(
     *,
     samples: int | None = None,
     seed: int | None = None,
+    portion: Portion | None = None,
     geometry: Sequence[tuple[str, str]] = (),
 ) -> tuple[dict[str, Samples], session.StageClock]:
     """Render without Cycles' denoiser; samples by view, and what it took.
 
-    `geometry` names those of GEOMETRY that are wanted. The result holds Cycles' own
+    `geometry` names those of GEOMETRY that are wanted, or LATE_DEPTH. `portion` is of
+    a longer sequence, in the place of samples and seed. The result holds Cycles' own
     passes. Raises Cancelled when the user stops it.
     """
     layer_name = depsgraph.view_layer_eval.name
     for name, letters in geometry:
         session.add_pass(engine, layer_name, name, letters)
-    clock = render_once(engine, depsgraph, samples=samples, seed=seed, noisy=True)
+    clock = render_once(
+        engine, depsgraph, samples=samples, seed=seed, noisy=True, portion=portion
+    )
     result = engine.get_result()
     views = [view.name for view in result.views] or [""]
     layer, size = result.layers[layer_name], (result.resolution_x, result.resolution_y)
@@ -67,5 +75,8 @@ def _read(layer: Any, view: str, size: tuple[int, int], wanted: set[str]) -> Sam
     # Without its denoiser Cycles leaves Combined black where there is Noisy Image.
     picture = read(NOISY if NOISY in layer.passes else COMBINED)
     depth = read(FIRST_HIT)[..., 0] if FIRST_HIT in wanted else None
+    if DEPTH in wanted:
+        depth = read(DEPTH)[..., 0]
+        depth = np.where(depth > 0.0, depth, np.float32(np.inf))  # 0 is the sky
     vector = read(MOTION) if MOTION in wanted else None
     return Samples(picture, read(ALBEDO), read(NORMAL), depth, vector)

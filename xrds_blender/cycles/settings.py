@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from xrds_core.temporal.samples import Portion
+
 from ..planning.denoiser import Denoiser
 from .borrowed import Borrowed
 
@@ -23,6 +25,18 @@ def set_sampling(
             use_layer_samples="IGNORE",
             sample_offset=0,
             use_sample_subset=False,
+        )
+
+
+def set_portion(borrowed: Borrowed, scene: Any, portion: Portion) -> None:
+    """Take a part of a sample sequence."""
+    set_sampling(borrowed, scene, portion.whole, portion.seed)
+    if portion.length != portion.whole:
+        borrowed.set(
+            scene.cycles,
+            use_sample_subset=True,
+            sample_offset=portion.offset,
+            sample_subset_length=portion.length,
         )
 
 

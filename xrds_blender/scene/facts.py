@@ -189,6 +189,22 @@ def _is_animated(owner: Any) -> bool:
     )
 
 
+def stands_still(camera: Any) -> bool:
+    """Whether no frame can show another view: nothing moves the camera or its lens."""
+    import bpy
+
+    handlers = bpy.app.handlers
+    if handlers.frame_change_pre or handlers.frame_change_post:
+        return False
+    owners = [camera.data]
+    while camera is not None:
+        owners.append(camera)
+        if camera.constraints or camera.rigid_body or camera.parent_bone:
+            return False
+        camera = camera.parent
+    return not any(_is_animated(owner) for owner in owners)
+
+
 def _is_timed(tree: Any) -> bool:
     return any(node.type in _TIMED_NODES for node in tree.nodes)
 

@@ -10,12 +10,13 @@ import numpy as np
 
 from xrds_core.errors import SceneError
 from xrds_core.temporal.frame import Camera, Frame, Stored, store
+from xrds_core.temporal.samples import Portion
 
-from ..cycles.samples import GEOMETRY, Samples, sample_layer
+from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
 from ..cycles.view import camera_of
 from ..frame import progress
 from ..frame.job import RenderJob
-from ..scene.facts import scene_facts
+from ..scene.facts import scene_facts, stands_still
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
@@ -35,11 +36,16 @@ def can_lend(scene: Any) -> bool:
     return scene.camera is not None and scene.camera.data.type in {"PERSP", "ORTHO"}
 
 
-def sample_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Sampled:
+def sample_frame(
+    engine: Any, depsgraph: Any, job: RenderJob, place: int | None = None
+) -> Sampled:
     """Render the frame that the dependency graph is at; the result holds its passes.
 
-    Every frame has a seed of its own, whatever the file says. Raises Cancelled when the
-    user stops it, SceneError under a camera that no matrix describes.
+    Every frame has a seed of its own, whatever the file says. `place`, the frame's in
+    the shot, lets frames under a camera that stands still continue one sequence
+    instead; passes of its first sample alone, as Depth, are empty in the result then.
+    Raises Cancelled when the user stops it, SceneError under a camera that no matrix
+    describes.
     """
     scene = depsgraph.scene_eval
     number, count = scene.frame_current, job.samples or scene.cycles.samples
@@ -47,12 +53,17 @@ def sample_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Sampled:
     camera = camera_of(depsgraph, engine.path_resolve("render"))
     if camera is None:
         raise SceneError("a panorama has no neighbours; set the temporal radius to 0")
+    portion, geometry = None, _geometry(depsgraph)
+    if place is not None and job.temporal_radius and _is_continued(depsgraph):
+        portion = _portion(place, count, job.temporal_radius, seed)
+        geometry = [LATE_DEPTH, *geometry[1:]]
     noisy, clock = sample_layer(
         engine,
         depsgraph,
         samples=job.samples,
         seed=(seed + number * SEED_STEP) % LARGEST_SEED,
-        geometry=_geometry(depsgraph),
+        portion=portion,
+        geometry=geometry,
     )
     views = {
         view: store(_frame(number, camera, samples, count), np.float16)
@@ -60,6 +71,21 @@ def sample_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Sampled:
     }
     seconds = dict.fromkeys(progress.STAGES, 0.0)
     return Sampled(views, seconds | {"sync": clock.sync, "beauty": clock.render})
+
+
+def _is_continued(depsgraph: Any) -> bool:
+    """Whether frames meet pixel on pixel, so that one sequence serves them all."""
+    scene = depsgraph.scene_eval
+    cut = any(marker.camera for marker in scene.timeline_markers)
+    return not cut and stands_still(scene.camera)
+
+
+def _portion(place: int, samples: int, radius: int, seed: int) -> Portion:
+    """The part of the sequence that no frame within the radius takes."""
+    frames = 2 * radius + 1
+    return Portion(
+        seed % LARGEST_SEED, samples * frames, samples * (place % frames), samples
+    )
 
 
 def _geometry(depsgraph: Any) -> Sequence[tuple[str, str]]:

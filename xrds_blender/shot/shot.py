@@ -40,7 +40,8 @@ def render_shot(
 
     def sample(number: int) -> Sampled:
         scene.frame_set(number)
-        return call_engine(scene, lambda *given: _sample(*given, job))
+        place = shot.order.index(number)
+        return call_engine(scene, lambda *given: _sample(*given, job, place))
 
     for number, own, lenders in slide(shot, sample):
         if is_done(number):  # another machine was quicker
@@ -53,10 +54,10 @@ def render_shot(
         yield number, replace(picture, seconds=seconds)
 
 
-def _sample(engine: Any, depsgraph: Any, job: RenderJob) -> Sampled:
+def _sample(engine: Any, depsgraph: Any, job: RenderJob, place: int) -> Sampled:
     frame = depsgraph.scene_eval.frame_current
     progress.begin(engine, f"{progress.SAMPLES} of frame {frame}", 1, 2)
     try:
-        return sample_frame(engine, depsgraph, job)
+        return sample_frame(engine, depsgraph, job, place)
     finally:
         progress.end()
