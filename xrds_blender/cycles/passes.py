@@ -9,7 +9,7 @@ of the render settings, and all of it is given back.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import nullcontext
 from dataclasses import replace
 from typing import Any
@@ -184,18 +184,20 @@ class CyclesPasses:
 
     def data_passes(self) -> dict[tuple[str, str], Array]:
         """All passes by (view, name) but the picture and its light, as they are now."""
-        kept = [n for n in self.pass_names() if n != COMBINED and not is_light(n)]
-        passes = {(view, n): self._read(n, view) for view in self.views for n in kept}
-        return {key: pixels for key, pixels in passes.items() if pixels is not None}
+        return self._passes(
+            n for n in self.pass_names() if n != COMBINED and not is_light(n)
+        )
 
     def all_passes(self) -> dict[tuple[str, str], Array]:
         """Copies of all passes by (view, name), as they are now."""
-        names = self.pass_names()
-        found = {(view, n): self._read(n, view) for view in self.views for n in names}
+        return self._passes(self.pass_names())
+
+    def _passes(self, names: Iterable[str]) -> dict[tuple[str, str], Array]:
+        found = {(view, n): self._read(n, view) for n in names for view in self.views}
         return {key: pixels for key, pixels in found.items() if pixels is not None}
 
     def put_back(self, passes: dict[tuple[str, str], Array]) -> None:
-        """Write passes that `data_passes` gave into the result again."""
+        """Write passes that were read before into the result again."""
         for (view, name), pixels in passes.items():
             session.write_pass(self._layer(), name, view, pixels)
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from xrds_core.errors import Cancelled
 
 from .clock import StageClock
+from .pass_names import COMBINED
 
 if TYPE_CHECKING:
     # numpy is imported where pixels are: Blender starts faster without it.
@@ -118,6 +119,14 @@ def stop_if_cancelled(engine: Any) -> None:
     """Raise Cancelled if the user has stopped the render."""
     if is_stopped(engine):
         raise Cancelled
+
+
+def write_combined(engine: Any, layer_name: str, pictures: dict[str, Array]) -> None:
+    """Make pictures (height, width, 4), by view, the Combined pass of a layer."""
+    result = engine.get_result()
+    for view, picture in pictures.items():
+        write_pass(result.layers[layer_name], COMBINED, view, picture)
+    engine.update_result(result)
 
 
 def free(engine: Any) -> None:

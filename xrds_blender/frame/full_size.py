@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..cycles import session
-from ..cycles.pass_names import COMBINED
-from ..cycles.samples import Samples, sample_layer
+from ..cycles.samples import sample_layer
 from ..planning.plan import Decision
 from . import progress
 from .denoisers import load_denoiser
@@ -17,7 +16,7 @@ from .job import Picture, RenderJob
 from .memory import peak_memory
 
 if TYPE_CHECKING:
-    from xrds_core.denoising import Denoised, Denoiser
+    from xrds_core.denoising import Denoised
 
 
 def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
@@ -32,9 +31,14 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
     noisy, clock = sample_layer(engine, depsgraph, samples=job.samples, seed=job.seed)
     progress.begin(engine, progress.DENOISE, 2, 2)
     started = time.perf_counter()
-    denoised = {view: _denoise(engine, denoiser, noisy[view]) for view in noisy}
+    report = progress.reporter(engine)
+    denoised = {
+        view: denoiser(each.picture, each.albedo, each.normal, progress=report)
+        for view, each in noisy.items()
+    }
     finished = time.perf_counter()
-    _write(engine, layer_name, denoised)
+    pictures = {view: each.radiance for view, each in denoised.items()}
+    session.write_combined(engine, layer_name, pictures)
     stages = {
         "sync": clock.sync,
         "beauty": clock.render,
@@ -53,22 +57,6 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
         peak_memory=peak_memory(),
         device=denoiser.device,
     )
-
-
-def _denoise(engine: Any, denoiser: Denoiser, noisy: Samples) -> Denoised:
-    def report(done: float) -> bool:
-        engine.update_progress(done)
-        return not session.is_stopped(engine)
-
-    return denoiser(noisy.picture, noisy.albedo, noisy.normal, progress=report)
-
-
-def _write(engine: Any, layer_name: str, denoised: dict[str, Denoised]) -> None:
-    result = engine.get_result()
-    layer = result.layers[layer_name]
-    for view, picture in denoised.items():
-        session.write_pass(layer, COMBINED, view, picture.radiance)
-    engine.update_result(result)
 
 
 def prefilter(denoised: Denoised) -> Decision:

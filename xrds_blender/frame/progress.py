@@ -6,7 +6,10 @@ the panel to show.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
+
+from ..cycles import session
 
 LOW, GUIDES, NETWORK = "Low resolution", "Guides", "Network"
 SAMPLES, DENOISE = "Samples", "Denoising"
@@ -31,6 +34,16 @@ def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
     _current = f"XRDS {number}/{of}: {stage}"
     engine.update_stats("XRDS", stage)
     engine.update_progress(0.0)
+
+
+def reporter(engine: Any) -> Callable[[float], bool]:
+    """Shows how far a stage is, from 0 to 1; False once the user has stopped it."""
+
+    def report(done: float) -> bool:
+        engine.update_progress(done)
+        return not session.is_stopped(engine)
+
+    return report
 
 
 def end() -> None:

@@ -19,7 +19,6 @@ from xrds_core.arrays import Array
 from xrds_core.temporal.moving import Movement
 
 from ..cycles import session
-from ..cycles.pass_names import COMBINED
 from ..cycles.passes import CyclesPasses
 from ..frame import progress
 from ..frame.denoisers import load_denoiser
@@ -102,10 +101,7 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
     window.forget_before(needed[0])
     _sample_missing(engine, depsgraph, window, number, needed)
 
-    def report(done: float) -> bool:
-        engine.update_progress(done)
-        return not session.is_stopped(engine)
-
+    report = progress.reporter(engine)
     progress.begin(engine, progress.DENOISE, 2, 2)
     own = window.sampled[number]
     lenders = [window.sampled[n] for n in needed if n != number]
@@ -120,7 +116,8 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
         )
         for view, stored in own.views.items()
     }
-    _write(engine, layer_name, pictures)
+    combined = {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
+    session.write_combined(engine, layer_name, combined)
     first = next(iter(pictures.values()))
     first.seconds.update({**own.seconds, **first.seconds})
     first.seconds["total"] = time.perf_counter() - started
@@ -166,12 +163,3 @@ def _sample_missing(
             window.sampled[number] = sample_frame(engine, depsgraph, window.job)
         else:
             passes.put_back(window.passes.pop(number))
-
-
-def _write(engine: Any, layer_name: str, pictures: dict[str, Picture]) -> None:
-    result = engine.get_result()
-    layer = result.layers[layer_name]
-    for view, picture in pictures.items():
-        pixels = np.dstack((picture.radiance, picture.alpha))
-        session.write_pass(layer, COMBINED, view, pixels)
-    engine.update_result(result)

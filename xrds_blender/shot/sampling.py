@@ -10,7 +10,7 @@ import numpy as np
 
 from xrds_core.errors import SceneError
 from xrds_core.temporal.frame import Camera, Frame, Stored, store
-from xrds_core.temporal.samples import Portion
+from xrds_core.temporal.samples import continued
 
 from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
 from ..cycles.view import camera_of
@@ -55,7 +55,7 @@ def sample_frame(
         raise SceneError("a panorama has no neighbours; set the temporal radius to 0")
     portion, geometry = None, _geometry(depsgraph)
     if place is not None and job.temporal_radius and _is_continued(depsgraph):
-        portion = _portion(place, count, job.temporal_radius, seed)
+        portion = continued(place, count, job.temporal_radius, seed)
         geometry = [LATE_DEPTH, *geometry[1:]]
     noisy, clock = sample_layer(
         engine,
@@ -78,14 +78,6 @@ def _is_continued(depsgraph: Any) -> bool:
     scene = depsgraph.scene_eval
     cut = any(marker.camera for marker in scene.timeline_markers)
     return not cut and stands_still(scene.camera)
-
-
-def _portion(place: int, samples: int, radius: int, seed: int) -> Portion:
-    """The part of the sequence that no frame within the radius takes."""
-    frames = 2 * radius + 1
-    return Portion(
-        seed % LARGEST_SEED, samples * frames, samples * (place % frames), samples
-    )
 
 
 def _geometry(depsgraph: Any) -> Sequence[tuple[str, str]]:

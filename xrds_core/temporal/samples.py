@@ -46,13 +46,22 @@ def portions(
     `samples` per pixel and frame; frames up to `radius` apart meet. A frame belongs
     to a still run if the camera before or after it is the same. `seed` is the shot's.
     """
-    runs = 2 * radius + 1
     return [
-        Portion(seed % _SEEDS, samples * runs, samples * (place % runs), samples)
+        continued(place, samples, radius, seed)
         if radius and _stands_still(cameras, place)
         else Portion((seed + 1 + place) % _SEEDS, samples, 0, samples)
         for place in range(len(cameras))
     ]
+
+
+def continued(place: int, samples: int, radius: int, seed: int = 0) -> Portion:
+    """Return the part of one frame of a still run: no other within `radius` takes it.
+
+    `place` is the frame's in the shot.
+    """
+    frames = 2 * radius + 1
+    offset = samples * (place % frames)
+    return Portion(seed % _SEEDS, samples * frames, offset, samples)
 
 
 def _stands_still(cameras: Sequence[Camera], place: int) -> bool:
