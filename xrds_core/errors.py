@@ -7,8 +7,18 @@ remedy. Whatever else reaches a caller is a bug.
 from __future__ import annotations
 
 
+def printable(text: str) -> str:
+    """The text with all that could steer a terminal or break the line escaped."""
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape").decode() for c in text
+    )
+
+
 class XRDSError(Exception):
     """Base of every error of this project; its text can be shown to a user."""
+
+    def __str__(self) -> str:
+        return printable(super().__str__())  # names in files may hold anything
 
 
 class WeightsError(XRDSError):

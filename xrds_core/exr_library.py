@@ -11,7 +11,6 @@ from __future__ import annotations
 import ctypes
 import json
 import os
-import subprocess
 import sys
 from collections.abc import Mapping
 from contextlib import redirect_stdout
@@ -19,11 +18,12 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from io import StringIO
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
+from .atomic import scratch_folder
+from .children import run_python
 from .errors import PictureError
 
 Pixels = np.ndarray[Any, Any]
@@ -47,8 +47,8 @@ def read(path: str | Path) -> list[Part]:
     """Read all parts of a file; raises PictureError if it is not whole."""
     if not _is_shadowed():
         return _read(path)
-    with TemporaryDirectory() as folder:
-        archive = Path(folder) / "parts.npz"
+    with scratch_folder() as folder:
+        archive = folder / "parts.npz"
         _apart("read", path, archive)
         return _unpack(archive)
 
@@ -61,8 +61,8 @@ def write(path: str | Path, planes: Mapping[str, Pixels]) -> None:
     if not _is_shadowed():
         _write(path, planes)
         return
-    with TemporaryDirectory() as folder:
-        archive = Path(folder) / "parts.npz"
+    with scratch_folder() as folder:
+        archive = folder / "parts.npz"
         window = ((0, 0), (0, 0))  # not read: the planes have their own size
         _pack(archive, [Part("", window, window, dict(planes))])
         _apart("write", path, archive)
@@ -129,11 +129,7 @@ def _check_windows(path: str | Path, header: Any) -> None:
 
 def _apart(task: str, path: str | Path, archive: Path) -> None:
     """Do a task in a process without the program's library."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
-    command = [sys.executable, "-m", __name__, task, os.fspath(path), str(archive)]
-    done = subprocess.run(
-        command, env=environment, capture_output=True, text=True, check=False
-    )
+    done = run_python("-m", __name__, task, os.fspath(path), str(archive))
     if done.returncode:
         lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
         raise PictureError(lines[-1])

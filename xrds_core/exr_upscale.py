@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from .errors import PictureError
 from .exr import CYCLES, Names, read_beauty, read_guides, write_picture
+from .output import check_output
 from .progress import Callback
 from .upscaler import Upscaler
 
@@ -37,7 +36,8 @@ def upscale_file(
         beauty: the low-resolution render, denoised, with alpha or without; the noisy
             picture, where the file has one too, shows what the denoiser took away.
         guide_file: albedo and normal; for `full` guides also a noisy picture.
-        output: gets R, G, B, scene-linear, and A where `beauty` has alpha.
+        output: gets R, G, B, scene-linear, and A where `beauty` has alpha; its folder
+            is made.
         weights: a folder of presets, or a file, in place of the shipped ones.
         names: what the passes are called in both files.
 
@@ -51,7 +51,7 @@ def upscale_file(
         WeightsError, UsageError, Cancelled: as `Upscaler`.
     """
     start = time.perf_counter()
-    _check_output(Path(output))
+    check_output(Path(output), (beauty, guide_file))
     upscaler = Upscaler(preset, scale, guides, device, weights=weights)
     low = read_beauty(beauty, names)
     passes = read_guides(guide_file, full=guides == "full", names=names)
@@ -75,12 +75,3 @@ def upscale_file(
         "bad_pixels": result.bad_pixels,
         "tiles": result.tiles,
     }
-
-
-def _check_output(path: Path) -> None:
-    """Refuse a file that cannot be written now, not after the work."""
-    folder = path.parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK) or path.is_dir():
-        raise PictureError(
-            f"cannot write {path}: name a file in an existing, writable folder"
-        )

@@ -236,15 +236,19 @@ def test_info_json_fields() -> None:
     }
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT to send")
-def test_interrupt_does_not_wait_for_c(tmp_path: Path) -> None:
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("SIGINT", "interrupted"), ("SIGTERM", "terminated"), ("SIGHUP", "hung up")],
+)
+def test_a_signal_does_not_wait_for_c(tmp_path: Path, name: str, told: str) -> None:
     # The C call holds the main thread as a render does, its lock released.
     code = f"""
     import ctypes
     from pathlib import Path
     from xrds_blender.command import console
     from xrds_core.atomic import replacing
-    console.interrupt_at_once()
+    console.end_at_once_by_signals()
     libc = ctypes.CDLL(None)
     with replacing(Path({str(tmp_path)!r}) / "frame.exr") as part:
         part.write_text("half")
@@ -256,9 +260,10 @@ def test_interrupt_does_not_wait_for_c(tmp_path: Path) -> None:
         assert child.stdout is not None
         assert child.stdout.readline() == "ready\n"
         start = time.perf_counter()
-        child.send_signal(signal.SIGINT)
+        number = signal.Signals[name]
+        child.send_signal(number)
         _, err = child.communicate(timeout=20)
-    assert child.returncode == 130
-    assert err == "xrds: interrupted\n"
+    assert child.returncode == 128 + number
+    assert err == f"xrds: {told}\n"
     assert time.perf_counter() - start < 10
     assert not list(tmp_path.iterdir())

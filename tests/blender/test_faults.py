@@ -292,9 +292,8 @@ def test_a_killed_animation_resumes_at_the_first_missing_frame(
     line = [sys.executable, "-c", KILLED, *command(blend, output, "1-4")]
     done = subprocess.run(line, capture_output=True, check=False, timeout=110)
     assert done.returncode == -signal.SIGKILL
-    left = names(folder)
-    assert left[1:] == ["1.exr"]
-    assert left[0].endswith(".unfinished")
+    (left,) = set(names(folder)) - {"1.exr"}
+    assert left.endswith(".unfinished")
     first = (folder / "1.exr").read_bytes()
     (folder / "3.exr").write_bytes(first[: len(first) // 2])  # as another program would
     job = RenderJob(plain=True, samples=1)
@@ -302,6 +301,7 @@ def test_a_killed_animation_resumes_at_the_first_missing_frame(
     assert result["kept"] == [1]
     assert [each["frame"] for each in result["frames"]] == [2, 3, 4]
     assert (folder / "1.exr").read_bytes() == first
+    assert left not in names(folder)
     pictures = [exr.read_beauty(folder / f"{i}.exr").radiance for i in (1, 2, 3, 4)]
     assert all(np.abs(a - b).max() > 0.01 for a, b in pairwise(pictures))
     again = render_file(blend, output, job, frames=(1, 2, 3, 4), resume=True)

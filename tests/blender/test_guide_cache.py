@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -153,10 +155,6 @@ def test_a_folder_serves_another_process(tmp_path: Path) -> None:
     second = shot(scene, guide_cache=tmp_path)
     assert cache_use(second) == "used 2 samples"
     np.testing.assert_array_equal(second.albedo, first.albedo)
-    (file,) = tmp_path.glob("*.npz")
-    file.write_bytes(file.read_bytes()[:1000])  # as a full disk leaves it
-    guide_cache.CACHE.clear()
-    assert cache_use(shot(scene, guide_cache=tmp_path)) == "kept 2 samples"
 
 
 def test_a_folder_that_takes_no_file_costs_no_picture(tmp_path: Path) -> None:
@@ -168,6 +166,10 @@ def test_a_folder_that_takes_no_file_costs_no_picture(tmp_path: Path) -> None:
 
 
 # --- the cache alone ------------------------------------------------------------------
+
+
+def stored(key: str, folder: Path) -> Path:
+    return folder / "xrds-guides" / f"{key}.guides.npz"
 
 
 def some(value: float, samples: int = 1, side: int = 8) -> CachedGuides:
@@ -204,8 +206,118 @@ def test_a_folder_is_bounded(tmp_path: Path) -> None:
     cache = GuideCache(folder_limit=limit)
     for index in range(6):
         cache.put(f"k{index}", some(index), tmp_path)
-        os.utime(tmp_path / f"k{index}.npz", (index, index))
-    files = sorted(path.name for path in tmp_path.iterdir())
-    assert files[-1] == "k5.npz"
-    assert sum(path.stat().st_size for path in tmp_path.iterdir()) <= limit
-    assert "k0.npz" not in files
+        os.utime(stored(f"k{index}", tmp_path), (index, index))
+    files = sorted(stored("", tmp_path).parent.iterdir())
+    assert files[-1] == stored("k5", tmp_path)
+    assert sum(path.stat().st_size for path in files) <= limit
+    assert stored("k0", tmp_path) not in files
+
+
+def test_only_files_of_the_cache_are_removed(tmp_path: Path) -> None:
+    """Whatever their names, and where somebody keeps theirs in its own folder."""
+    from os import utime
+
+    cache = GuideCache(folder_limit=some(0).nbytes + 2000)
+    cache.put("k0", some(0), tmp_path)
+    foreign = [
+        tmp_path / "scan.npz",
+        tmp_path / ".scan.npz.unfinished",
+        stored("mine", tmp_path),
+        stored("mine", tmp_path).with_name("mine.npz"),
+        stored("mine", tmp_path).with_name(".mine.unfinished"),
+    ]
+    for path in foreign:
+        np.savez(path.open("wb"), scan=np.ones(9000))
+        utime(path, (0, 0))
+    cache.put("k1", some(1), tmp_path)
+    assert all(path.exists() for path in foreign)
+    assert stored("k1", tmp_path).exists()
+    assert not stored("k0", tmp_path).exists()
+
+
+def changed(path: Path, change: Callable[[dict[str, Any]], object]) -> None:
+    """Write a file of the cache anew with other arrays."""
+    with np.load(path) as file:
+        arrays = dict(file)
+    change(arrays)
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+
+
+def half(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:1000])  # as a full disk leaves it
+
+
+def flipped_bit(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+
+
+def no_number(path: Path) -> None:
+    changed(path, lambda a: a["/" + ALBEDO].__setitem__((3, 4, 0), np.nan))
+
+
+def of_one_size_more(path: Path) -> None:
+    changed(path, lambda a: a.update({n: np.pad(x, 1) for n, x in a.items() if x.ndim}))
+
+
+def of_another_shape(path: Path) -> None:
+    changed(path, lambda a: a.update({"/" + NORMAL: a["/" + NORMAL][:, :5]}))
+
+
+def without_normals(path: Path) -> None:
+    changed(path, lambda a: a.pop("/" + NORMAL))
+
+
+def of_text(path: Path) -> None:
+    changed(path, lambda a: a.update({"/" + ALBEDO: np.full((8, 8, 3), "a")}))
+
+
+def of_another_key(path: Path) -> None:
+    GuideCache().put("other", some(2.0), path.parents[1])
+    path.write_bytes(stored("other", path.parents[1]).read_bytes())
+
+
+def of_code(path: Path) -> None:
+    path.write_bytes(pickle.dumps({"what": some(1.0)}))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        half,
+        flipped_bit,
+        no_number,
+        of_one_size_more,
+        of_another_shape,
+        without_normals,
+        of_text,
+        of_another_key,
+        of_code,
+    ],
+)
+def test_a_damaged_file_is_named_and_replaced(
+    tmp_path: Path, damage: Callable[[Path], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    GuideCache().put("key", some(1.0), tmp_path)
+    path = stored("key", tmp_path)
+    assert GuideCache().get("key", tmp_path, (8, 8)) is not None
+    damage(path)
+    cache = GuideCache()
+    assert not capsys.readouterr().err
+    assert cache.get("key", tmp_path, (8, 8)) is None
+    told = capsys.readouterr().err
+    assert str(path) in told
+    assert "damaged" in told
+    cache.put("key", some(3.0), tmp_path)
+    found = GuideCache().get("key", tmp_path, (8, 8))
+    assert found is not None
+    assert found.passes["", ALBEDO].mean() == 3.0
+
+
+def test_bad_pixels_are_kept_in_memory_alone(tmp_path: Path) -> None:
+    cache = GuideCache()
+    cache.put("key", some(float("nan")), tmp_path)
+    assert cache.get("key") is not None
+    assert not stored("key", tmp_path).exists()

@@ -31,12 +31,12 @@ def test_frame_numbers(pattern: str, frame: int, name: str) -> None:
 @pytest.mark.parametrize("name", ["out.jpg", "out", "out.exr.tmp"])
 def test_other_formats_are_refused(tmp_path: Path, name: str) -> None:
     with pytest.raises(UsageError, match=r"\.exr or \.png"):
-        picture_file.check_output(str(tmp_path / name), 1)
+        picture_file.check_output(str(tmp_path / name), [1])
 
 
 def test_frames_of_one_name_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="####"):
-        picture_file.check_output(str(tmp_path / "out.exr"), 2)
+        picture_file.check_output(str(tmp_path / "out.exr"), [1, 2])
 
 
 def test_unwritable_places_are_refused(tmp_path: Path) -> None:
@@ -44,11 +44,17 @@ def test_unwritable_places_are_refused(tmp_path: Path) -> None:
     (tmp_path / "folder.exr").mkdir()
     for place in (tmp_path / "file" / "out.exr", tmp_path / "folder.exr"):
         with pytest.raises(PictureError, match=str(place.parent)):
-            picture_file.check_output(str(place), 1)
+            picture_file.check_output(str(place), [1])
+
+
+def test_every_frame_is_looked_at(tmp_path: Path) -> None:
+    (tmp_path / "f_2.exr").mkdir()
+    with pytest.raises(PictureError, match=r"f_2\.exr"):
+        picture_file.check_output(str(tmp_path / "f_#.exr"), [1, 2, 3])
 
 
 def test_checking_makes_the_folder_and_leaves_no_file(tmp_path: Path) -> None:
-    picture_file.check_output(str(tmp_path / "new" / "out_#.png"), 3)
+    picture_file.check_output(str(tmp_path / "new" / "out_#.png"), [1, 2, 3])
     assert [path.name for path in tmp_path.rglob("*")] == ["new"]
 
 

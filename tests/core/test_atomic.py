@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
+import stat
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
@@ -64,26 +67,129 @@ def test_two_may_write_one_file(tmp_path: Path) -> None:
     assert names(tmp_path) == ["frame.exr"]
 
 
-def test_a_killed_writer_leaves_no_frame_and_is_swept_up(tmp_path: Path) -> None:
-    code = f"""
-import os, signal
+# --- links and special files ----------------------------------------------------------
+
+
+def test_a_link_stays_and_its_file_is_replaced(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    real, link = tmp_path / "there" / "real.exr", tmp_path / "link.exr"
+    real.write_text("old")
+    link.symlink_to(real)
+    with replacing(link) as part:
+        part.write_text("new")
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+    assert names(tmp_path / "there") == ["real.exr"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such files")
+def test_pipes_and_devices_are_never_replaced(tmp_path: Path) -> None:
+    pipe, link = tmp_path / "pipe.exr", tmp_path / "null.exr"
+    os.mkfifo(pipe)
+    link.symlink_to(os.devnull)
+    for target in (pipe, link):
+        with pytest.raises(OSError, match="no regular file"), replacing(target) as part:
+            part.write_text("new")
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert stat.S_ISCHR(Path(os.devnull).stat().st_mode)
+
+
+# --- killed ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    monkeypatch.setenv("TMPDIR", str(folder))
+    return folder
+
+
+KILLED = """
+import os, signal, sys
 from pathlib import Path
-from xrds_core.atomic import replacing
-with replacing(Path({str(tmp_path)!r}) / "frame.exr") as part:
+from xrds_core.atomic import replacing, scratch_folder
+with replacing(Path(sys.argv[1]) / "frame.exr") as part, scratch_folder() as folder:
     part.write_text("half")
-    os.kill(os.getpid(), {9})
+    (folder / "archive").write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
 """
-    done = subprocess.run([sys.executable, "-c", code], check=False)
-    assert done.returncode
-    (left,) = names(tmp_path)
-    assert left != "frame.exr"
-    atomic.sweep(tmp_path)
-    assert names(tmp_path) == [left], "it may still be being written"
+
+
+def kill_a_writer(folder: Path) -> Path:
+    """What is left of a frame that was being written in `folder`."""
+    done = subprocess.run([sys.executable, "-c", KILLED, str(folder)], check=False)
+    assert done.returncode == -signal.SIGKILL
+    (left,) = folder.glob(".*")
+    return left
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_what_a_killed_process_left_is_swept_up_wherever_it_lies(
+    tmp_path: Path, temporary: Path
+) -> None:
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    (folder / "1.exr").write_text("a frame")
+    kill_a_writer(folder)
+    assert names(temporary)
+    atomic.sweep()
+    assert not names(temporary)
+    assert names(folder) == ["1.exr"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_a_folder_is_swept_without_links(tmp_path: Path, temporary: Path) -> None:
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    kill_a_writer(folder)
+    atomic.sweep(folder)
+    assert not names(folder)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_another_machine_may_still_be_writing_for_an_hour(
+    tmp_path: Path, temporary: Path
+) -> None:
+    folder = tmp_path / "frames"
+    folder.mkdir()
+    left = kill_a_writer(folder)
+    elsewhere = left.rename(left.with_name(".xrds-" + "0" * 8 + left.name[14:]))
+    atomic.sweep(folder)
+    assert names(folder) == [elsewhere.name]
     day_before = time.time() - 86400
-    os.utime(tmp_path / left, (day_before, day_before))
-    (tmp_path / "frame.exr").write_text("a frame")
-    atomic.sweep(tmp_path)
-    assert names(tmp_path) == ["frame.exr"]
+    os.utime(elsewhere, (day_before, day_before))
+    atomic.sweep(folder)
+    assert not names(folder)
+
+
+def test_what_is_being_written_and_what_others_left_stays(tmp_path: Path) -> None:
+    day_before = time.time() - 86400
+    others = [".work.unfinished", ".xrds-mine.unfinished", ".xrds-1.unfinished"]
+    for name in others:
+        (tmp_path / name).write_text("somebody's")
+        os.utime(tmp_path / name, (day_before, day_before))
+    with replacing(tmp_path / "frame.exr") as part:
+        part.write_text("half")
+        atomic.sweep(tmp_path)
+        atomic.sweep()
+        part.write_text("whole")
+    assert names(tmp_path) == sorted([*others, "frame.exr"])
+
+
+def test_a_link_that_leads_to_a_foreign_file_takes_nothing_along(
+    tmp_path: Path, temporary: Path
+) -> None:
+    precious = tmp_path / "precious"
+    precious.write_text("somebody's")
+    link = temporary / f".xrds-{'0' * 8}-1-abc.unfinished"
+    link.symlink_to(precious)
+    day_before = time.time() - 86400
+    os.utime(link, (day_before, day_before), follow_symlinks=False)
+    atomic.sweep()
+    assert not names(temporary)
+    assert precious.exists()
 
 
 def test_a_process_that_ends_on_the_spot_leaves_nothing(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def test_files_in_a_file_out(
 
 
 @pytest.mark.parametrize("guides", ["fast"])
-@pytest.mark.parametrize("output", ["nowhere/out.exr", "."])
+@pytest.mark.parametrize("output", ["low.exr/out.exr", ".", "low.exr"])
 def test_an_output_that_cannot_be_is_told_before_the_work(
     folder: Path, output: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

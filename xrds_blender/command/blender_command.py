@@ -24,6 +24,8 @@ def unregister() -> None:
 
 
 def _run(argv: list[str]) -> int:
+    from . import console
     from .main import main
 
+    console.end_at_once_by_signals()
     return main(argv)

@@ -10,7 +10,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -18,6 +18,7 @@ from xrds_core import atomic
 from xrds_core.errors import Cancelled, UsageError, XRDSError
 
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
+_SIGNALS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 
 
 def flush_all() -> None:
@@ -95,24 +96,31 @@ def status_of(work: Callable[[], None]) -> int:
     return status
 
 
-def interrupt_at_once() -> None:
-    """End with status 130 on Ctrl-C even while Cycles or torch compute in C.
+def end_at_once_by_signals() -> None:
+    """End on Ctrl-C and the like even while Cycles or torch compute in C.
 
     Python runs its own signal handlers only between bytecodes of the main thread,
     which a render keeps waiting for minutes; a thread that reads the wake-up pipe
-    does not wait. Files that are being written are removed.
+    does not wait. Files that are being written are removed. The exit status is 128
+    and the signal's number, as a shell's: 130 on Ctrl-C.
     """
     woken, wake = os.pipe()
     os.set_blocking(wake, False)
-    signal.signal(signal.SIGINT, lambda *_: None)
+    heeded = {}
+    for name, told in _SIGNALS.items():
+        number = getattr(signal, name, None)  # Windows has not all
+        if number and signal.getsignal(number) != signal.SIG_IGN:  # as nohup asks
+            signal.signal(number, lambda *_: None)
+            heeded[int(number)] = told
     signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
 
     def wait() -> None:
-        while os.read(woken, 1) != bytes([signal.SIGINT]):
+        while (number := os.read(woken, 1)[0]) not in heeded:
             pass
         atomic.abandon()
-        os.write(2, b"xrds: interrupted\n")
-        os._exit(INTERRUPTED)
+        with suppress(OSError):  # stderr may be gone, as the terminal is
+            os.write(2, f"xrds: {heeded[number]}\n".encode())
+        os._exit(128 + number)
 
     threading.Thread(target=wait, daemon=True).start()
 

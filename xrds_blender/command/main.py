@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
+from xrds_core import atomic
+
 from . import console, info, render, upscale
 
 AddCommand = Callable[[Any], argparse.ArgumentParser]
@@ -33,6 +35,7 @@ LABORATORY = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
+    atomic.sweep()
     words = sys.argv[1:] if argv is None else list(argv)
     try:
         options = _parser(words).parse_args(words)
@@ -46,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def program() -> NoReturn:
     """Run the console script `xrds`."""
-    console.interrupt_at_once()
+    console.end_at_once_by_signals()
     console.leave(main())
 
 

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from xrds_core import output
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
@@ -34,32 +34,23 @@ def frame_path(pattern: str, frame: int) -> Path:
     return Path(pattern).with_name(f"{name[:first]}{frame:0{width}d}{name[last:]}")
 
 
-def check_output(pattern: str, frames: int) -> None:
+def check_output(pattern: str, frames: Sequence[int]) -> None:
     """Refuse, before anything is rendered, an output that could not be written.
 
     Makes the folder. Raises UsageError for a suffix that is neither .exr nor .png and
-    for several frames of one name, PictureError for a folder that takes no file.
+    for several frames of one name, PictureError as `xrds_core.output.check_output`.
     """
     path = Path(pattern)
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"output {pattern!r} must end in .exr or .png")
-    if frames > 1 and "#" not in path.name:
+    if len(frames) > 1 and "#" not in path.name:
         raise UsageError(
-            f"all {frames} frames would be written to {pattern!r}; add #### for the "
-            f"frame number, such as {path.stem}_####{path.suffix}"
+            f"all {len(frames)} frames would be written to {pattern!r}; add #### for "
+            f"the frame number, such as {path.stem}_####{path.suffix}"
         )
-    if path.is_dir():
-        raise PictureError(f"output {path} is a folder; name a file")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        # one of its own: several processes may begin one shot together
-        probe = path.with_name(f".{path.name}.{os.getpid()}.probe")
-        probe.touch()
-        probe.unlink()
-    except OSError as error:
-        raise PictureError(
-            f"cannot write into {path.parent} ({error.strerror}); choose another output"
-        ) from error
+    for number in frames:
+        output.check_place(frame_path(pattern, number))
+    output.check_folder(path.parent)
 
 
 def save(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:

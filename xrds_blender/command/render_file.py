@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from xrds_core.atomic import sweep
 from xrds_core.errors import PictureError, XRDSError
 
 from ..cycles.size import picture_size
@@ -49,12 +48,10 @@ def render_file(
             cannot be written, NetworkFailed; both name the file that holds what was
             rendered, and the frames before are complete.
     """
-    picture_file.check_output(output, len(frames or [0]))
+    picture_file.check_output(output, frames or [0])
     scene = open_scene(path, resolution)
     _check_libraries(job)
     numbers = list(frames or [scene.frame_current])
-    if resume:
-        sweep(Path(output).parent)
     size = picture_size(scene.render)
 
     def is_done(number: int) -> bool:

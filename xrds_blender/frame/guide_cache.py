@@ -1,11 +1,16 @@
 """Guides kept from earlier renders, in memory and on request in a folder.
 
-Both are bounded: what was not used for the longest time goes first.
+Both are bounded: what was not used for the longest time goes first. In the folder only
+files that were written here are touched: they lie in a folder of their own and are
+known by their names and by what they begin with.
 """
 
 from __future__ import annotations
 
+import struct
+import tokenize
 import zipfile
+import zlib
 from collections import OrderedDict
 from contextlib import suppress
 from dataclasses import dataclass
@@ -15,12 +20,15 @@ import numpy as np
 
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing, sweep
+from xrds_core.notices import warn
 
 from ..cycles.pass_names import ALBEDO, NORMAL
 
 MEMORY_LIMIT = 1 << 30  # bytes
 FOLDER_LIMIT = 8 << 30
 _SAMPLES, _ALPHA = "samples", "alpha"
+_SUBFOLDER, _SUFFIX = "xrds-guides", ".guides.npz"
+_MARK = "xrds guides 1"  # the first array of each file, which holds its key
 
 
 @dataclass(frozen=True)
@@ -72,15 +80,21 @@ class GuideCache:
         self.memory_limit, self.folder_limit = memory_limit, folder_limit
         self._kept: OrderedDict[str, CachedGuides] = OrderedDict()
 
-    def get(self, key: str, folder: Path | None = None) -> CachedGuides | None:
+    def get(
+        self,
+        key: str,
+        folder: Path | None = None,
+        size: tuple[int, int] | None = None,
+    ) -> CachedGuides | None:
         """The guides of a key, from memory or from the folder; None if there are none.
 
-        A file that cannot be read counts as none.
+        A damaged file, or one of another `size` (height, width), counts as none and is
+        told of on stderr.
         """
         if key in self._kept:
             self._kept.move_to_end(key)
             return self._kept[key].copy()
-        stored = None if folder is None else _read(folder / f"{key}.npz")
+        stored = None if folder is None else _find(key, folder, size)
         if stored is not None:
             self._keep(key, stored)
             return stored.copy()
@@ -89,13 +103,19 @@ class GuideCache:
     def put(self, key: str, guides: CachedGuides, folder: Path | None = None) -> None:
         """Keep guides in place of what the key had.
 
-        Raises OSError where the folder does not take them; memory then has them.
+        Guides with bad pixels go into memory alone. Raises OSError where the folder
+        does not take them; memory then has them.
         """
         self._keep(key, guides.copy())
-        if folder is not None and guides.nbytes <= self.folder_limit:
-            folder.mkdir(parents=True, exist_ok=True)
-            _make_room(folder, self.folder_limit - guides.nbytes)
-            _write(folder / f"{key}.npz", guides)
+        if (
+            folder is not None
+            and guides.nbytes <= self.folder_limit
+            and _is_sound(guides)
+        ):
+            path = _path(key, folder)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            _make_room(path.parent, self.folder_limit - guides.nbytes)
+            _write(path, key, guides)
 
     def clear(self) -> None:
         """Forget what is in memory."""
@@ -114,38 +134,112 @@ class GuideCache:
 CACHE = GuideCache()
 
 
-def _write(path: Path, guides: CachedGuides) -> None:
-    arrays = {f"{view}/{name}": array for (view, name), array in guides.passes.items()}
+def _path(key: str, folder: Path) -> Path:
+    return folder / _SUBFOLDER / f"{key}{_SUFFIX}"
+
+
+def _write(path: Path, key: str, guides: CachedGuides) -> None:
+    arrays = {_MARK: np.array(key), _SAMPLES: np.array(guides.samples)}
+    arrays |= {f"{view}/{name}": array for (view, name), array in guides.passes.items()}
     arrays |= {f"{view}/{_ALPHA}": array for view, array in guides.alphas.items()}
-    arrays[_SAMPLES] = np.array(guides.samples)
     with replacing(path) as part, part.open("wb") as file:
         np.savez(file, **arrays)
 
 
-def _read(path: Path) -> CachedGuides | None:
+def _find(key: str, folder: Path, size: tuple[int, int] | None) -> CachedGuides | None:
+    path = _path(key, folder)
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = dict(file)
-        path.touch()  # it was of use
-        samples = int(arrays.pop(_SAMPLES))
-    except (OSError, ValueError, EOFError, KeyError, zipfile.BadZipFile):
+        guides = _read(path, key, size)
+        with suppress(OSError):  # a folder that can only be read
+            path.touch()  # it was of use
+    except FileNotFoundError:
         return None
+    except OSError as error:
+        warn(f"cannot read kept guides {path} ({error.strerror})")
+        return None
+    except _FAULTS as error:
+        reason = str(error) or type(error).__name__
+        warn(f"kept guides {path} are damaged ({reason}) and are rendered anew")
+        return None
+    return guides
+
+
+# What NumPy and zipfile raise on damaged files, beside OSError.
+_FAULTS = (
+    ValueError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    TypeError,
+    SyntaxError,
+    RuntimeError,  # encrypted, as a flipped bit says
+    struct.error,
+    tokenize.TokenError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+
+def _read(path: Path, key: str, size: tuple[int, int] | None) -> CachedGuides:
+    """The guides that a file holds; raises OSError or one of _FAULTS."""
+    with np.load(path, allow_pickle=False) as file:
+        arrays = dict(file)
+    if str(arrays.pop(_MARK)) != key:
+        raise ValueError("of another key")
+    samples = int(arrays.pop(_SAMPLES))
     named = {tuple(name.split("/", 1)): array for name, array in arrays.items()}
     alphas = {view: array for (view, name), array in named.items() if name == _ALPHA}
     passes = {key: array for key, array in named.items() if key[1] != _ALPHA}
-    return CachedGuides(samples, passes, alphas)
+    guides = CachedGuides(samples, passes, alphas)
+    _check(guides, size)
+    return guides
+
+
+def _check(guides: CachedGuides, size: tuple[int, int] | None) -> None:
+    """Raise ValueError where the arrays are not such as a render leaves."""
+    if guides.samples < 1 or not guides.alphas:
+        raise ValueError("without samples or views")
+    for view, alpha in guides.alphas.items():
+        size = size or alpha.shape[:2]
+        used = [guides.passes[view, ALBEDO], guides.passes[view, NORMAL], alpha]
+        if not all(np.isfinite(array).all() for array in used):
+            raise ValueError("it holds NaN or infinity")
+    for array in (
+        *guides.passes.values(),
+        *(a[..., None] for a in guides.alphas.values()),
+    ):
+        if array.dtype != np.float32 or array.ndim != 3 or array.shape[:2] != size:
+            raise ValueError(f"{array.dtype} of the shape {array.shape}")
+
+
+def _is_sound(guides: CachedGuides) -> bool:
+    try:
+        _check(guides, None)
+    except ValueError:
+        return False
+    return True
 
 
 def _make_room(folder: Path, limit: int) -> None:
     """Remove the files that were used longest ago until at most `limit` bytes stay."""
     sweep(folder)
     files = []
-    for path in folder.glob("*.npz"):
-        with suppress(FileNotFoundError):  # another render has made room too
-            files.append((path.stat(), path))
+    for path in folder.glob(f"*{_SUFFIX}"):
+        with suppress(OSError):  # another render has made room too
+            if _is_ours(path):
+                files.append((path.stat(), path))
     files.sort(key=lambda each: each[0].st_mtime_ns, reverse=True)
     total = 0
     for status, path in files:
         total += status.st_size
         if total > limit:
             path.unlink(missing_ok=True)
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file begins as those written here: a zip whose first member is ours."""
+    name = f"{_MARK}.npy".encode()
+    with path.open("rb") as file:
+        head = file.read(30 + len(name))
+    return head.startswith(b"PK\x03\x04") and head.endswith(name)

@@ -58,7 +58,9 @@ class GuideSource:
                 _NAME, "not used", f"the cache cannot track {reason}"
             )
             return self._render(self._chosen.guide_samples)
-        kept = guide_cache.CACHE.get(key, self._folder)
+        region = self._passes.region
+        size = region.height, region.width
+        kept = guide_cache.CACHE.get(key, self._folder, size)
         looked = time.perf_counter() - started
         missing = self._missing(0 if kept is None else kept.samples)
         if not missing:

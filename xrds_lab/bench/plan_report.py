@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import json
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
 from dataclasses import dataclass, field
@@ -21,6 +19,7 @@ import numpy as np
 from xrds_blender.planning.plan import SAVINGS
 from xrds_core import metrics
 from xrds_core.atomic import replacing, write_json
+from xrds_core.children import run_python
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -78,9 +77,8 @@ def run(
             "seed": seed,
             "out": folder,
         }
-        command = [sys.executable, "-m", f"{__package__}.plan_run", json.dumps(request)]
         start = time.perf_counter()
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = run_python("-m", f"{__package__}.plan_run", json.dumps(request))
         wall = time.perf_counter() - start
         answer = Path(folder) / "frames.json"
         if done.returncode or not answer.is_file():

@@ -127,6 +127,6 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    console.interrupt_at_once()
+    console.end_at_once_by_signals()
     sys.stderr.reconfigure(line_buffering=True)  # type: ignore[union-attr]
     console.leave(main())

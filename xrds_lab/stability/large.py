@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from xrds_core.children import run_python
 from xrds_core.errors import XRDSError
 
 from .measured import Measured
@@ -60,13 +58,7 @@ def large(subject: Subject) -> Iterator[Measured]:
     if subject.precision != "fp32":
         return
     words = [subject.preset, subject.scale, subject.precision, SIDE, LIMIT]
-    done = subprocess.run(
-        [sys.executable, "-c", _PROGRAM, *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=Path(__file__).parents[2],
-    )
+    done = run_python("-c", _PROGRAM, *map(str, words))
     if done.returncode:
         raise XRDSError(
             f"{subject.name} ended with {done.returncode} on {SIDE}x{SIDE} pixels: "

@@ -1,0 +1,47 @@
+"""Python processes of our own: they run nothing of the working folder, and end with us.
+
+`python -m` and `python -c` look for modules in the working folder first, where anything
+may lie. `-P` forbids it.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+_running: set[subprocess.Popen[str]] = set()
+
+
+def run_python(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run `python ARGUMENTS` where this process finds its modules; what it printed.
+
+    It is killed where this process is interrupted, also by `kill_all`.
+    """
+    # "" stands for the working folder
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    command = [sys.executable, "-P", *arguments]
+    with subprocess.Popen(
+        command,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        errors="backslashreplace",
+    ) as child:
+        _running.add(child)
+        try:
+            output, errors = child.communicate()
+        except BaseException:
+            child.kill()
+            raise
+        finally:
+            _running.discard(child)
+    return subprocess.CompletedProcess(command, child.returncode, output, errors)
+
+
+def kill_all() -> None:
+    """Kill those that run: this process is about to end on the spot."""
+    for child in list(_running):
+        child.kill()

@@ -1,0 +1,14 @@
+"""Lines on stderr about what does not stop the work."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+
+from .errors import printable
+
+
+def warn(text: str) -> None:
+    """Tell the user one line; lost where there is no stderr to take it."""
+    with suppress(OSError, ValueError):  # full, or closed
+        print(f"xrds: {printable(text)}", file=sys.stderr, flush=True)
