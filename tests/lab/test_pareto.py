@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from xrds_blender.planning.budget import Network
+from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import Cancelled
 from xrds_lab.bench import growth, machine, pareto
 from xrds_lab.bench.inputs import OFF
@@ -18,7 +19,7 @@ from xrds_lab.bench.stages import (
     PLAIN_FRAME,
     XRDS_FRAME,
     StageTimes,
-    network_name,
+    in_process_name,
     task_name,
 )
 from xrds_lab.bench.sweep import Config, Sweep, anchor, anchors, xrds
@@ -77,6 +78,14 @@ def test_cached_guides_cost_nothing() -> None:
     assert "bicubic" not in groups
 
 
+def test_full_size_is_one_of_our_ways() -> None:
+    ours = point(7, 24, "full_size", denoiser="XRDS-HIGH")
+    groups = pareto.groups([*OIDN, *XRDS, ours])
+    assert groups["XRDS"] == [*XRDS, ours]
+    assert groups["XRDS x1"] == [ours]
+    assert ours in groups[pareto.CACHED]
+
+
 def test_sets_of_guides_are_apart_where_there_are_two() -> None:
     full = point(9, 27, "xrds", scale=2, guides="full")
     assert "XRDS, fast guides" not in pareto.groups(XRDS)
@@ -96,6 +105,7 @@ def test_mean_curve_is_over_all_scenes_alike() -> None:
 
 NETWORK = Network("fast", 2, "fast")
 SWEEP = Sweep((NETWORK,))
+FULL_SIZE = Config("full_size", 4, Denoiser.XRDS_HIGH)
 
 
 def timed(tmp_path: Path) -> StageTimes:
@@ -104,7 +114,7 @@ def timed(tmp_path: Path) -> StageTimes:
     denoise = {"HIGH-ACCURATE": 5.0, "HIGH-FAST": 1.0}
     for slow in (1.0, 1.5, 1.0):
         for request in anchors(SWEEP.configurations()):
-            each = {"plain": 2.0, "low": 0.5, "guides": 1.0}[request.kind]
+            each = {"plain": 2.0, "low": 0.5, "guides": 1.0, "full": 2.5}[request.kind]
             seconds = 0.1 + each * request.samples
             if request.denoiser not in {None, OFF}:
                 part = denoise.get(request.denoiser, 3.0) / request.scale**2
@@ -114,8 +124,10 @@ def timed(tmp_path: Path) -> StageTimes:
         for name in (PLAIN_FRAME, XRDS_FRAME):
             times.add(name, {"seconds": 9.0, "cpu": 9.0, "peak": 50, "other": 0.25})
         times.add("sync", {"seconds": 0.5, "cpu": 0.5, "peak": 10})
-        name = network_name(xrds(NETWORK))
+        name = in_process_name(xrds(NETWORK))
         times.add(name, {"seconds": 4.0, "cpu": 8.0, "peak": 300})
+        ours = in_process_name(FULL_SIZE)
+        times.add(ours, {"seconds": 3.0, "cpu": 6.0, "peak": 200})
         times.add(GUIDE_FILTER, {"seconds": 0.5, "cpu": 1.0, "peak": 300})
     return times
 
@@ -145,6 +157,14 @@ def test_seconds_are_sums_of_the_stages_medians(tmp_path: Path) -> None:
     assert own.seconds["network"] == 4.0
     assert own.cpu_seconds == pytest.approx(0.5 + 0.25 + 2 * (4.1 + 0.25 + 4.1) + 8)
     assert own.peak_memory == 300
+
+
+def test_full_size_pays_for_its_guides_and_for_our_denoiser(tmp_path: Path) -> None:
+    cost = timed(tmp_path).cost(FULL_SIZE)
+    assert cost.seconds["beauty"] == pytest.approx(10.1)
+    assert cost.seconds["denoise"] == 3.0
+    assert cost.total == pytest.approx(0.5 + 10.1 + 3.0 + 0.25)
+    assert cost.peak_memory == 200
 
 
 def test_runs_are_kept(tmp_path: Path) -> None:

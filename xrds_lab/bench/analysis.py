@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Curve
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 
-from . import ours, pareto
-from .stages import PLAIN_FRAME, XRDS_FRAME, network_name
-from .sweep import DENOISERS, xrds
+from . import pareto
+from .stages import PLAIN_FRAME, XRDS_FRAME, in_process_name
+from .sweep import DENOISERS, Config, xrds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -178,7 +178,7 @@ def fitted(scenes: Sequence[SceneBench], points: Sequence[Point]) -> budget.Mode
     """
     errors: dict[tuple[Choice, int], list[float]] = {}
     for point in points:
-        if point["method"] in {"oidn", "xrds"}:
+        if point["method"] in {"oidn", "full_size", "xrds"}:
             fields = dict(point["settings"])
             samples = fields.pop("samples")
             key = Choice(samples=0, **fields), samples
@@ -217,10 +217,11 @@ def _speeds(
         )
     denoisers = {mode: _ratio(timed, lambda s, m=mode: s.times.denoising(m))
                  for mode in DENOISERS}  # fmt: skip
-    denoisers |= ours.speeds_of(budget.shipped())
+    denoisers |= {mode: _ratio(timed, lambda s, m=mode: s.times.median(_ours(m)))
+                  for mode in OUR_DENOISERS}  # fmt: skip
     networks = {
         network: _ratio(
-            timed, lambda s, n=network: s.times.median(network_name(xrds(n)))
+            timed, lambda s, n=network: s.times.median(in_process_name(xrds(n)))
         )
         for network in timed[0].settings.sweep.networks
     }
@@ -230,6 +231,10 @@ def _speeds(
         for name in (PLAIN_FRAME, XRDS_FRAME)
     )
     return budget.Model(errors, denoisers, networks, other, source)
+
+
+def _ours(mode: Denoiser) -> str:
+    return in_process_name(Config("full_size", 1, mode))
 
 
 def _ratio(scenes: Sequence[SceneBench], seconds: Any) -> float:

@@ -21,7 +21,7 @@ from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
 from . import machine, tasks
 from .inputs import Request
-from .stages import PLAIN_FRAME, StageTimes, Stopwatch, clocked, network_name
+from .stages import PLAIN_FRAME, StageTimes, Stopwatch, clocked, in_process_name
 from .sweep import anchor, xrds
 from .windows import Window
 
@@ -129,7 +129,7 @@ def _renders() -> list[Request]:
 def _tasks(shot: Shot, settings: Settings) -> dict[str, Task]:
     """Networks alone, without and with a memory limit, and whole frames by each."""
     sweep, networks = settings.sweep, settings.networks
-    configs = {network_name(xrds(n)): xrds(n) for n in sweep.networks}
+    configs = {in_process_name(xrds(n)): xrds(n) for n in sweep.networks}
     known = tasks.tasks(shot, configs.values(), networks)
     timed = {name: known[name] for name in [PLAIN_FRAME, *configs]}
     for name, config in configs.items():
@@ -193,7 +193,7 @@ def _rows(
     if times.count(PLAIN_FRAME):
         yield PLAIN_FRAME, times.median(PLAIN_FRAME), times.peak(PLAIN_FRAME)
     for network in settings.sweep.networks:
-        name = network_name(xrds(network))
+        name = in_process_name(xrds(network))
         for task in (name, _limited(name), _frame(name)):
             if times.count(task):
                 yield task, times.median(task), times.peak(task)
@@ -242,7 +242,7 @@ def break_even(rows: Sequence[Row], networks: Sequence[Network]) -> list[Row]:
     known = sorted({row["cores"] for row in rows})
     results = []
     for network, size in product(networks, sizes):
-        name = network_name(xrds(network))
+        name = in_process_name(xrds(network))
         here = [row for row in rows if tuple(row["size"]) == size]
         for cores in [*known, *(c for c in MORE_CORES if c > max(known))]:
             balance = _balance(here, name, cores)

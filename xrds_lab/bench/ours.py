@@ -164,10 +164,5 @@ def _seconds(work: Callable[[], object]) -> float:
     return time.process_time() - started
 
 
-def speeds_of(model: Model) -> dict[Denoiser, float]:
-    """Our speeds in a model, to be carried over into another."""
-    return {m: s for m, s in model.denoiser_speed.items() if m.is_ours}
-
-
 if __name__ == "__main__":
     main()

@@ -38,7 +38,7 @@ GROUPS: dict[str, Callable[[Point], bool]] = {
     "OIDN, best mode": lambda p: p["method"] == "oidn",
     "bicubic": lambda p: p["method"] == "bicubic",
     "demodulated bilinear": lambda p: p["method"] == "demodulated_bilinear",
-    "XRDS": lambda p: p["method"] == "xrds",
+    "XRDS": lambda p: p["method"] in {"xrds", "full_size"},
 }
 
 
@@ -53,7 +53,11 @@ def groups(points: Sequence[Point]) -> dict[str, list[Point]]:
         f"XRDS, {kind} guides": [p for p in ours if p["settings"]["guides"] == kind]
         for kind in ("fast", "full")
     }
-    members[CACHED] = [without_guides(p) for p in guides["XRDS, fast guides"]]
+    members[CACHED] = [
+        p if p["method"] == "full_size" else without_guides(p)
+        for p in ours
+        if p["settings"]["guides"] != "full"
+    ]
     if all(guides.values()):  # one alone is all of XRDS
         members |= guides
     return {name: group for name, group in members.items() if group}

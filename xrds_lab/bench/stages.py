@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 ROUNDS = 3
 PLAIN_FRAME, XRDS_FRAME = "whole frame, plain", "whole frame, XRDS"
 GUIDE_FILTER = "filter of guides of few samples"
+CYCLES = ("cycles", "oidn")
 STAGES = ("sync", "beauty", "denoise", "guides", "network", "other")
 
 
@@ -100,7 +101,7 @@ class StageTimes:
         beauty, *guide = config.requests()
         names = [task_name(anchor(beauty.kind, beauty.scale, beauty.denoiser))]
         names += [task_name(anchor(request.kind, more=True)) for request in guide]
-        names += [network_name(config)] * (config.scale > 1)
+        names += [in_process_name(config)] * (config.method not in CYCLES)
         total = sum(wall.values())
         return Cost(wall | {"total": total}, sum(cpu.values()), self.peak(*names))
 
@@ -114,12 +115,14 @@ class StageTimes:
         stages["other"] = self.median(frame, "other")
         beauty, *guide = config.requests()
         stages["beauty"] = self._line(beauty, key)
-        if config.denoiser != OFF:
+        if config.method == "full_size":
+            stages["denoise"] = self.median(in_process_name(config), key)
+        elif config.denoiser != OFF:
             stages["denoise"] = self.denoising(config.denoiser, config.scale, key)
         if guide:
             stages["guides"] = self._line(guide[0], key)
         if not plain:
-            stages["network"] = self.median(network_name(config), key)
+            stages["network"] = self.median(in_process_name(config), key)
         if config.has_noisy_guides:
             stages["network"] += self.median(GUIDE_FILTER, key)
         return stages
@@ -153,8 +156,10 @@ def task_name(request: Request) -> str:
     return f"{request.kind} x{request.scale}, {request.samples} spp{denoiser}"
 
 
-def network_name(config: Config) -> str:
-    """Name of an enlargement in the file of runs."""
+def in_process_name(config: Config) -> str:
+    """Name of what this process makes of the samples, in the file of runs."""
+    if config.method == "full_size":
+        return f"denoising at full size, {config.denoiser}"
     if config.method != "xrds":
         return f"{config.method} x{config.scale}"
     full = " full" if config.guides == "full" else ""

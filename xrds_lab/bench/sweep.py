@@ -11,6 +11,7 @@ from xrds_blender.planning.denoiser import (
     CYCLES_DENOISERS,
     DEFAULT_DENOISER,
     LOW_DENOISERS,
+    OUR_DENOISERS,
     Denoiser,
 )
 
@@ -128,6 +129,11 @@ class Sweep:
             for n in self.plain_samples
             for denoiser in DENOISERS
             if n <= FEW_SAMPLES or denoiser in MANY_DENOISERS
+        ]
+        configs += [
+            Config("full_size", n, denoiser)
+            for n in self.plain_samples
+            for denoiser in OUR_DENOISERS
         ]
         for scale in self.scales:
             configs += self._baselines(scale)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,17 +11,25 @@ from xrds_blender.frame.job import RenderJob
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_blender.planning.plan import savings_but
 
-from .inputs import open_scene
+from .inputs import Request, open_scene
 from .rivals import ENLARGEMENTS
-from .stages import GUIDE_FILTER, PLAIN_FRAME, XRDS_FRAME, clocked, network_name
+from .stages import (
+    CYCLES,
+    GUIDE_FILTER,
+    PLAIN_FRAME,
+    XRDS_FRAME,
+    clocked,
+    in_process_name,
+)
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Callable, Iterable
 
     from xrds_blender.frame.job import Picture
     from xrds_blender.planning.budget import Network
     from xrds_core.arrays import Array
 
+    from .inputs import Arrays
     from .pictures import Networks
     from .rivals import Enlargement
     from .stages import Run, Task
@@ -33,11 +42,14 @@ def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str
     window = shot.window.whole
     timed: dict[str, Task] = {}
     used: list[Network] = []
+    noisy = cache(lambda: _noisy_frame(shot))
     for config in configs:
-        name = network_name(config)
-        if config.scale == 1 or name in timed:
+        name = in_process_name(config)
+        if config.method in CYCLES or name in timed:
             continue
-        if config.method == "xrds":
+        if config.method == "full_size":
+            timed[name] = _our_denoiser(Denoiser(config.denoiser), noisy)
+        elif config.method == "xrds":
             used.append(config.network)
             timed[name] = _network(networks, config.network, window)
         else:
@@ -86,6 +98,34 @@ def _baseline(enlarge: Enlargement, window: Window, scale: int) -> Task:
     def task() -> Run:
         low, full = noise(window, scale)
         return clocked(lambda: enlarge(low, low, full, full, scale))
+
+    return task
+
+
+def _noisy_frame(shot: Shot) -> Arrays:
+    """A whole frame of one sample with its guides: what our denoiser is timed on."""
+    from xrds_blender import run_job
+
+    scene = open_scene(shot.path, shot.window.whole)
+    return run_job(scene, lambda passes: Request("full", 1).render(passes)[0])
+
+
+def _our_denoiser(mode: Denoiser, noisy: Callable[[], Arrays]) -> Task:
+    """Time our denoiser; building its filters, once a session, does not count."""
+    from xrds_core.denoising import Denoiser as OurDenoiser
+
+    built: list[OurDenoiser] = []
+
+    def task() -> Run:
+        frame = noisy()
+
+        def run() -> Any:
+            return built[0](frame["radiance"], frame["albedo"], frame["normal"])
+
+        if not built:
+            built.append(OurDenoiser(mode.quality))
+            run()
+        return clocked(run)
 
     return task
 

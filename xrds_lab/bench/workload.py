@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Any
 
+from xrds_blender.planning.denoiser import Denoiser
+
 from .inputs import OFF
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ def config_seconds(config: Config, costs: Costs) -> float:
     seconds += sum(render_seconds(request, costs) for request in config.requests())
     if config.method == "xrds":
         seconds += costs.network[config.network]
+    elif config.method == "full_size":
+        seconds += costs.denoise[Denoiser(config.denoiser)]
     return seconds
 
 
