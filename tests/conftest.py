@@ -172,7 +172,7 @@ def life(still_life: Callable[..., Any]) -> Any:
     ensure_registered()
     scene = still_life(45, 33)
     scene.cycles.seed = 1
-    scene.xrds.scale = "2"
+    scene.xrds.way = "x2"
     return scene
 
 

@@ -31,7 +31,7 @@ def low_picture(scene: Any, scale: int = 2) -> np.ndarray:
 def test_a_still_is_the_enlarged_picture(
     life: Any, network: Any, written: Any, scale: str
 ) -> None:
-    life.xrds.scale = scale
+    life.xrds.way = f"x{scale}"
     picture = written(life)
     np.testing.assert_array_equal(picture[..., :3], low_picture(life, int(scale)))
     np.testing.assert_array_equal(picture[..., 3], 1.0)
@@ -43,7 +43,7 @@ def test_plain_is_cycles_bit_for_bit(life: Any, written: Any) -> None:
     picture = render(life, 2, plain=True)
     np.testing.assert_array_equal(picture.radiance, expected[..., :3])
     np.testing.assert_array_equal(picture.alpha, expected[..., 3])
-    life.xrds.plain = True
+    life.xrds.way = "plain"
     np.testing.assert_array_equal(written(life), expected)
 
 
@@ -230,7 +230,7 @@ def test_the_compositor_gets_the_guides(life: Any, network: Any, written: Any) -
     picture = written(life)
     call = network[0].calls[0]
     np.testing.assert_allclose(picture[..., :3], call["albedo"], atol=1e-6)
-    life.xrds.plain = True
+    life.xrds.way = "plain"
     sockets = [socket.name for socket in layers.outputs if socket.enabled]
     assert "Denoising Normal" not in sockets
 

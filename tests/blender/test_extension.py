@@ -64,6 +64,7 @@ def test_wheel_holds_what_renders(unpacked: Path) -> None:
     assert {f"xrds_core/weights/{name}" for name in weights} <= names
     presets = "xrds_blender/interface/shipped/presets/xrds/render"
     assert f"{presets}/Draft.py" in names
+    assert "xrds_blender/interface/languages/ja_JP.json" in names
 
 
 def test_wheel_holds_core_and_add_on_alone(unpacked: Path) -> None:

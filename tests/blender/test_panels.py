@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -9,18 +10,24 @@ import bpy
 import pytest
 
 import xrds_blender
-from xrds_blender.frame import denoisers, progress, torch_folder
+from xrds_blender.frame import history, progress
 from xrds_blender.interface import (
     cycles_panels,
     machine,
     operators,
     panels,
+    paragraph,
     preferences,
     properties,
     registration,
+    remarks,
     status_bar,
+    summary,
     translations,
 )
+from xrds_blender.planning import ways
+from xrds_blender.planning.budget import Network
+from xrds_blender.planning.ways import Means, Way
 
 
 @pytest.fixture(autouse=True)
@@ -47,77 +54,199 @@ def test_unregister_takes_everything_back() -> None:
     assert hasattr(bpy.types, "XRDS_PT_settings")
 
 
-def test_panel_draws_every_property_it_names() -> None:
-    """Draw into a layout that refuses names the settings do not have."""
+class Layout:
+    """A layout that refuses names the settings do not have."""
 
-    class Layout:
-        def __init__(self) -> None:
-            self.drawn: list[str] = []
+    def __init__(self) -> None:
+        self.drawn: list[str] = []
 
-        def prop(self, owner: object, name: str, **_: object) -> None:
-            assert name in owner.bl_rna.properties
-            self.drawn.append(name)
+    def prop(self, owner: object, name: str, text: str = "", **_: object) -> None:
+        assert name in owner.bl_rna.properties
+        self.drawn.append(text or name)
 
-        def label(self, text: str, **_: object) -> None:
-            self.drawn.append(text)
+    def prop_enum(
+        self, owner: object, name: str, value: str, text: str = "", **_: object
+    ) -> None:
+        assert value in owner.bl_rna.properties[name].enum_items
+        self.drawn.append(text or value)
 
-        def column(self, **_: object) -> Layout:
-            return self
+    def label(self, text: str, **_: object) -> None:
+        self.drawn.append(text)
 
-        row = split = column
+    def column(self, **_: object) -> Layout:
+        return self
 
-    class Drawn:
-        layout = Layout()
+    row = split = column
 
-    class Context:
-        scene = bpy.context.scene
-        region = SimpleNamespace(width=300)
-        preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
 
-    progress.keep({**dict.fromkeys(panels.STAGE_NAMES, 0.0), "network": 12.34})
-    for scale in ("1", "2"):
-        Context.scene.xrds.scale = scale
-        for panel in panels.CLASSES:
-            panel.draw(Drawn, Context)
-    drawn = set(Drawn.layout.drawn)
-    assert {"denoise", "temporal_radius"} <= drawn
-    assert {"scale", "preset", "samples", "guide_samples", "guides"} <= drawn
-    assert {"use_exposure", "exposure", "plain"} <= drawn
-    assert {"12.3 s", "960 × 540, 4096 spp"} <= drawn
-    assert "0.0 s" not in drawn
+class Context:
+    region = SimpleNamespace(width=300)
+
+    def __init__(self) -> None:
+        self.scene = bpy.context.scene
+        self.engine = "XRDS"
+        self.preferences = bpy.context.preferences
+
+
+def drawn(*which: object) -> list[str]:
+    """What the panels draw, those that show."""
+    layout, context = Layout(), Context()
+    for panel in which or panels.CLASSES:
+        if panel.poll(context):
+            panel.draw(SimpleNamespace(layout=layout), context)
+    return layout.drawn
+
+
+def test_a_new_scene_says_which_way_it_takes() -> None:
+    pytest.importorskip("mitsuba_oidn")
+    told = drawn(panels.XRDS_PT_settings)
+    assert told[0] == "Automatic (Full Size)"
+    assert {"full_size", "x2", "x4", "x8", "plain"} <= set(told)
+    assert "best" in told
+    assert "About" not in told  # no seconds are known before the first render
+    assert {"use_time_budget", "Samples", "temporal_radius"} <= set(told)
+    assert not {"denoise", "guide_samples", "use_exposure"} & set(drawn())
+
+
+@pytest.mark.parametrize(
+    ("way", "named"),
+    [
+        ("full_size", {"denoise", "temporal_radius", "Samples"}),
+        ("x2", {"Samples per Small Pixel", "guide_samples", "use_exposure"}),
+        ("plain", {"Samples", "plain"}),
+    ],
+)
+def test_each_way_shows_its_own_settings(way: str, named: set[str]) -> None:
+    bpy.context.scene.xrds.way = way
+    told = set(drawn())
+    assert named <= told
+    assert "use_time_budget" not in told
+    assert not {"preset", "guides", "balanced", "paper", "full"} & told
+
+
+def test_other_networks_are_offered_where_their_weights_are(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    settings = bpy.context.scene.xrds
+    settings.way = "x2"
+    known = [Network("fast", 2, "fast"), Network("paper", 2, "fast")]
+    known.append(Network("fast", 2, "full"))
+    at_hand = Means(True, True, True, frozenset(known))
+    monkeypatch.setattr(panels, "means", lambda _: at_hand)
+    told = drawn(panels.XRDS_PT_settings, panels.XRDS_PT_guides)
+    assert {"fast", "paper", "full"} <= set(told)
+    assert "balanced" not in told
+    assert "x4" not in told  # no weights
+
+
+def test_a_time_budget_leaves_way_and_samples_open() -> None:
+    settings = bpy.context.scene.xrds
+    settings.use_time_budget, settings.time_budget = True, 90.0
+    assert drawn(panels.XRDS_PT_settings)[0] == "Automatic (within 90 s)"
+    settings.way = "full_size"
+    assert "within" not in " ".join(drawn(panels.XRDS_PT_settings)[1:])
+
+
+def test_the_table_tells_seconds_after_a_render() -> None:
+    pytest.importorskip("mitsuba_oidn")
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    scene.cycles.samples = 1
+    history.forget()
+    scene.render.engine = "XRDS"
+    bpy.ops.render.render()
+    told = drawn(panels.XRDS_PT_settings)
+    assert "About" in told
+    row = told.index("full_size")
+    assert told[row + 1].endswith(" s")
+    last = dict(summary.last_render(history.last(scene)))
+    assert last["Way"] == "Full Size, 1 sample"
+    assert "Total" in last
+    assert "Samples and Denoising" not in last
+    bpy.ops.wm.read_factory_settings()
+    assert history.last(bpy.context.scene) is None
+
+
+def rows(scene: object) -> dict[str, str]:
+    return dict(summary.next_render(scene, properties.job_of(scene.xrds)))
 
 
 @pytest.mark.parametrize(("scale", "low"), [("2", "683x384"), ("8", "171x96")])
-def test_summary_tells_the_low_size(scale: str, low: str) -> None:
+def test_summary_tells_the_small_size(scale: str, low: str) -> None:
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 1366, 768
     scene.render.resolution_percentage = 100
-    scene.xrds.scale = scale
-    told = dict(panels.summary(scene))
-    assert told["Small Render"].startswith(low.replace("x", " × "))
-    assert told["Guide bounces"] == "0"
+    scene.xrds.way = f"x{scale}"
+    told = rows(scene)
+    assert told["Small Picture"].startswith(low.replace("x", " × "))
+    assert told["Guides"] == "1366 × 768, 2 samples"
+    assert "mirrors in the guides" in told["Left Out"]
     assert told["Memory"].endswith(" MB")
     scene.render.resolution_x, scene.render.resolution_y = 3840, 2160
-    large = dict(panels.summary(scene))["Memory"]
+    large = rows(scene)["Memory"]
     assert float(large.removeprefix("≤ ").removesuffix(" GB")) >= 1.0
-    scene.xrds.plain = True
-    assert "no network" in panels.remarks(scene)[0][1]
 
 
-def test_panel_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_way_takes_more_than_five_rows() -> None:
     scene = bpy.context.scene
-    scene.xrds.scale = "2"
-    monkeypatch.setattr(panels.session, "has_denoiser", lambda: True)
-    assert panels.remarks(scene) == []
-    monkeypatch.setattr(torch_folder, "is_there", lambda: False)
-    monkeypatch.setattr(panels.session, "has_denoiser", lambda: False)
-    monkeypatch.setattr(denoisers, "is_there", lambda: False)
+    scene.render.use_motion_blur = True
+    for way in Way:
+        scene.xrds.way = way
+        assert 2 <= len(rows(scene)) <= summary.MOST_ROWS
+    assert "DEFAULT_CLOSED" in panels.XRDS_PT_forecast.bl_options
+
+
+ALL = Means(True, True, True, frozenset({Network("fast", 2, "fast")}))
+
+
+def remarks_of(at_hand: Means) -> list[tuple[str, str]]:
+    scene = bpy.context.scene
+    return remarks.remarks(scene, properties.job_of(scene.xrds), at_hand)
+
+
+def test_panel_says_what_is_missing() -> None:
+    scene = bpy.context.scene
+    scene.xrds.way = "x2"
+    assert ("ERROR", ways.TORCH_IS_MISSING) in remarks_of(replace(ALL, torch=False))
     scene.view_layers[0].use_pass_glossy_direct = True
-    told = " ".join(text for _, text in panels.remarks(scene))
-    for word in ("PyTorch is missing", "no denoiser", "Light passes"):
-        assert word in told
-    scene.xrds.scale = "1"
-    assert panels.remarks(scene) == [("ERROR", panels.NO_DENOISER)]
+    noisy = replace(ALL, denoiser=False, cycles_denoiser=False)
+    told = remarks_of(noisy)
+    assert ("ERROR", remarks.NOISY_INPUT) in told
+    assert any("Light passes" in text for _, text in told)
+    scene.xrds.way = "x4"
+    assert ("ERROR", ways.WEIGHTS_ARE_MISSING) in remarks_of(ALL)
+    scene.xrds.way = "full_size"
+    assert remarks_of(noisy)[0] == ("ERROR", ways.LIBRARY_IS_MISSING)
+    scene.xrds.way, scene.cycles.use_denoising = "plain", True
+    assert remarks_of(noisy)[0] == ("ERROR", remarks.CYCLES_CANNOT_DENOISE)
+    scene.xrds.way, scene.xrds.use_time_budget = "automatic", True
+    assert remarks_of(noisy)[0] == ("ERROR", remarks.NO_BUDGET)
+
+
+@pytest.mark.parametrize(("version", "warns"), [((4, 5, 3), False), ((5, 2, 2), True)])
+def test_other_denoising_passes_are_warned_of_above_scale_one(
+    monkeypatch: pytest.MonkeyPatch, version: tuple[int, ...], warns: bool
+) -> None:
+    monkeypatch.setattr(
+        remarks, "bpy", SimpleNamespace(app=SimpleNamespace(version=version))
+    )
+    settings = bpy.context.scene.xrds
+    for way in ("x2", "full_size", "plain"):
+        settings.way = way
+        told = ("INFO", remarks.OTHER_PASSES) in remarks_of(ALL)
+        assert told == (warns and way == "x2")
+
+
+def test_sentences_are_never_cut_off() -> None:
+    text = "A sentence of some words that no panel has the width for"
+    found = paragraph.lines(text, 20, len)
+    assert " ".join(found) == text
+    assert max(map(len, found)) <= 20
+    japanese = "レンダリングには雑音除去が必要です"
+    found = paragraph.lines(japanese, 6, len)
+    assert "".join(found) == japanese
+    assert max(map(len, found)) <= 6
+    assert paragraph.lines("", 6, len) == []
 
 
 def test_operator_needs_a_camera() -> None:
@@ -147,7 +276,7 @@ def test_operator_keeps_the_engine() -> None:
     scene.render.resolution_x = scene.render.resolution_y = 16
     scene.cycles.samples = 1
     scene.cycles.use_denoising = False  # plain fails as Cycles does without OIDN
-    scene.xrds.plain = True
+    scene.xrds.way = "plain"
     used: list[str] = []
     bpy.app.handlers.render_init.append(lambda s, *_: used.append(s.render.engine))
     assert bpy.ops.xrds.render() == {"FINISHED"}
@@ -239,3 +368,11 @@ def test_settings_are_never_translated_as_blenders_own_words() -> None:
     settings = bpy.context.scene.xrds.bl_rna.properties
     for name in set(settings.keys()) - {"rna_type", "name"}:
         assert settings[name].translation_context == translations.CONTEXT
+
+
+def test_presets_hold_all_settings() -> None:
+    from xrds_blender.interface import presets
+
+    held = set(presets.XRDS_OT_preset_add.preset_values) - {"scene.cycles.samples"}
+    names = set(properties.XRDSSettings.bl_rna.properties.keys()) - {"rna_type", "name"}
+    assert held == {f"scene.xrds.{name}" for name in names}

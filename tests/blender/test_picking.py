@@ -15,7 +15,7 @@ from xrds_blender.frame import picking
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.planning import budget
 from xrds_blender.planning.denoiser import Denoiser
-from xrds_core.errors import UsageError
+from xrds_core.errors import UsageError, XRDSError
 
 XRDS = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 1)
 PLAIN = budget.Choice(Denoiser.FAST_FAST, 0)
@@ -129,6 +129,15 @@ def test_full_size_is_denoised_by_ours_in_any_blender(
     assert picture.seconds["denoise"] > 0.0
 
 
+def test_nothing_is_promised_where_nothing_denoises(
+    still_life: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(picking, "has_denoiser", lambda: False)
+    monkeypatch.setattr(picking.denoisers, "is_there", lambda: False)
+    with pytest.raises(XRDSError, match=r"has Open Image Denoise.*install XRDS"):
+        render(still_life(64, 48), time_budget=5.0)
+
+
 def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(
     still_life: Callable[..., Any], only: Callable[..., None]
 ) -> None:
@@ -157,6 +166,9 @@ def test_panel_setting_reaches_the_job(still_life: Callable[..., Any]) -> None:
     assert job_of(scene.xrds).time_budget is None
     scene.xrds.use_time_budget = True
     assert job_of(scene.xrds).time_budget == 12.5
+    scene.xrds.way = "x2"  # a way of one's own: nothing is left to choose
+    job = job_of(scene.xrds)
+    assert (job.time_budget, job.scale) == (None, 2)
 
 
 @pytest.mark.parametrize(

@@ -198,7 +198,7 @@ def animation(blend: Path) -> Any:
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     scene = bpy.context.scene
     scene.render.engine = "XRDS"
-    scene.xrds.scale, scene.xrds.temporal_radius = "1", 2
+    scene.xrds.way, scene.xrds.temporal_radius = "full_size", 2
     scene.frame_start, scene.frame_end = 1, 5
     scene.view_layers[0].use_pass_normal = True
     settings = scene.render.image_settings

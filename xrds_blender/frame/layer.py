@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..cycles.passes import CyclesPasses
-from . import progress
+from . import history, progress
 from .full_size import render_full_size
 from .job import Picture, RenderJob
 from .networks import load_upscaler
@@ -29,6 +29,7 @@ def render_layer(
     start = time.perf_counter() if start is None else start
     if job.is_picked:
         return _render_picked(engine, depsgraph, job, start)
+    place = history.place_of(depsgraph)
     try:
         if job.plain:
             picture = render_plain(engine, depsgraph, job)
@@ -41,7 +42,7 @@ def render_layer(
     finally:
         progress.end()
     picture.seconds["total"] = time.perf_counter() - start
-    progress.keep(picture.seconds)
+    history.keep(place, job, picture)
     return picture
 
 
@@ -49,10 +50,13 @@ def _render_picked(
     engine: Any, depsgraph: Any, job: RenderJob, start: float
 ) -> Picture:
     """Probe the scene, choose what a time budget or a quality asks for, render it."""
+    place = history.place_of(depsgraph)
     with CyclesPasses(engine, depsgraph) as passes:
         picked, decision = pick(passes, job, start)
         engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
         picture = render_layer(engine, depsgraph, picked)
     seconds = picture.seconds | {"total": time.perf_counter() - start}
     rest = () if picked.plain else picture.plan  # its reason stands above
-    return replace(picture, seconds=seconds, plan=(decision, *rest), job=picked)
+    picture = replace(picture, seconds=seconds, plan=(decision, *rest), job=picked)
+    history.keep(place, picked, picture)
+    return picture

@@ -11,6 +11,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+from xrds_core.errors import XRDSError
+
 from ..cycles.passes import CyclesPasses
 from ..cycles.rendered import InProcess
 from ..cycles.session import has_denoiser
@@ -55,9 +57,18 @@ def pick(
 
 
 def _denoisers() -> tuple[Denoiser, ...]:
-    """Those that can denoise here; all of Cycles' where nothing can."""
+    """Those that can denoise here.
+
+    Raises XRDSError where nothing can: every expected error is of a denoised picture.
+    """
     ours = OUR_DENOISERS if denoisers.is_there() else ()
-    cycles = CYCLES_DENOISERS if has_denoiser() or not ours else ()
+    cycles = CYCLES_DENOISERS if has_denoiser() else ()
+    if not (ours or cycles):
+        raise XRDSError(
+            "neither this Blender nor its Python has Open Image Denoise, without which "
+            "nothing is known of a picture's quality: install XRDS from its zip, or "
+            "choose the settings yourself in place of a time budget or a quality"
+        )
     return (*cycles, *ours)
 
 

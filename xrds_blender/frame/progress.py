@@ -1,7 +1,7 @@
-"""What a running render is doing now, and how long the last one took.
+"""What a running render is doing now.
 
-Blender asks an engine for nothing like this, so it is kept here for the status bar and
-the panel to show.
+Blender asks an engine for nothing like this, so it is kept here for the status bar to
+show.
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ STAGES = (
 )
 
 _current: str | None = None
-_last_seconds: dict[str, float] = {}
 
 
 def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
@@ -55,14 +54,3 @@ def end() -> None:
 def current() -> str | None:
     """What is being done, None between renders."""
     return _current
-
-
-def keep(seconds: dict[str, float]) -> None:
-    """Remember the seconds by stage of a finished render."""
-    global _last_seconds
-    _last_seconds = dict(seconds)
-
-
-def last_seconds() -> dict[str, float]:
-    """Seconds by stage of the last render since Blender started."""
-    return _last_seconds

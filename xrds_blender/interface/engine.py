@@ -39,12 +39,14 @@ class XRDSRender(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene: Any, layer: Any) -> None:
         from ..cycles.pass_names import GUIDE_PASSES
+        from .properties import job_of
 
         cycles = session.functions()
         cycles.register_passes(self, scene, layer)
         known = {name for name, *_ in cycles.list_render_passes(scene, layer)}
+        plain = job_of(scene.xrds).plain
         for name, letters, kind in GUIDE_PASSES:
-            if not scene.xrds.plain and name not in known:
+            if not plain and name not in known:
                 self.register_pass(scene, layer, name, len(letters), letters, kind)
 
     def update(self, data: Any, depsgraph: Any) -> None:

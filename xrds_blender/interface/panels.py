@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
-import textwrap
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..cycles import session
-from ..frame import denoisers, progress, torch_folder
-from ..frame.job import ENGINE
-from ..planning import forecast
-from . import cycles_panels, presets, status_bar, support, translations
+from ..frame import history
+from ..frame.job import ENGINE, GUIDES, PRESETS, RenderJob
+from ..frame.means import means
+from ..frame.ways import best_way, outlooks
+from ..planning.budget import Network
+from ..planning.ways import Means, Way
+from . import (
+    cycles_panels,
+    paragraph,
+    presets,
+    status_bar,
+    summary,
+    translations,
+    ways_table,
+)
+from .properties import job_of
+from .remarks import remarks
 from .translations import CONTEXT
-
-if TYPE_CHECKING:
-    from .facts_cache import FactsCache
-
-CHARACTER = 6.5  # pixels that a letter takes on the average, at an interface scale of 1
-NO_DENOISER = "The denoiser is missing: install XRDS from its zip, or mitsuba-oidn"
-STAGE_NAMES = {
-    "sync": "Scene",
-    "beauty": "Samples",
-    "accumulate": "Accumulation",
-    "denoise": "Denoising",
-    "guides": "Guides",
-    "network": "Network",
-    "write": "Writing",
-    "total": "Total",
-}
 
 
 class _RenderPanel:
@@ -48,9 +42,9 @@ class _RenderPanel:
 
 
 class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
-    """Scale, quality and samples of the XRDS engine."""
+    """The way to render, and what it asks for."""
 
-    bl_label = "Super-Resolution"
+    bl_label = "XRDS"
     # Below the choice of the engine: Blender puts panels of add-ons last otherwise.
     bl_parent_id = "RENDER_PT_context"
 
@@ -59,38 +53,33 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
-        settings = scene.xrds
+        settings, job = scene.xrds, job_of(scene.xrds)
+        at_hand = means(job.weights)
+        looks = outlooks(scene, job, at_hand)
+        ways_table.draw(layout, settings, best_way(scene, job), looks)
         layout.use_property_split = True
         layout.use_property_decorate = False
+        _draw_choices(layout, scene, job, at_hand)
+        for icon, text in remarks(scene, job, at_hand):
+            paragraph.draw(layout, context, paragraph.translated(text), icon)
+
+
+def _draw_choices(layout: Any, scene: Any, job: RenderJob, at_hand: Means) -> None:
+    """What the way that is taken can be told."""
+    settings = scene.xrds
+    if settings.way == Way.AUTOMATIC and at_hand.any_denoiser:
         _switched(layout, settings, "use_time_budget", "time_budget")
-        column = layout.column()
-        column.active = not (settings.plain or settings.use_time_budget)
-        column.prop(settings, "scale")
-        if settings.scale == "1":
-            column.prop(settings, "denoise")
-            column.prop(settings, "temporal_radius")
-        else:
-            column.prop(settings, "preset")
-        layout.prop(scene.cycles, "samples")
-        layout.prop(settings, "plain")
-        width = context.region.width / context.preferences.system.ui_scale
-        for icon, text in remarks(scene):
-            _paragraph(layout, icon, text, width)
-
-
-class XRDS_PT_forecast(_RenderPanel, bpy.types.Panel):
-    """What the next render will do."""
-
-    bl_label = "What Will Be Rendered"
-    bl_parent_id = "XRDS_PT_settings"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return super().poll(context) and not context.scene.xrds.plain
-
-    def draw(self, context: bpy.types.Context) -> None:
-        for name, value in summary(context.scene):
-            _row(self.layout, name, value)
+    column = layout.column()
+    column.active = not settings.is_timed
+    name = "Samples per Small Pixel" if job.is_enlarged else "Samples"
+    column.prop(scene.cycles, "samples", text=name, text_ctxt=CONTEXT)
+    if settings.way == Way.FULL_SIZE:
+        column.prop(settings, "denoise")
+    if job.is_enlarged:
+        offered = [p for p in PRESETS if _network(job, preset=p) in at_hand.networks]
+        _offer(column, settings, "preset", offered)
+    elif not (job.plain or job.is_picked):
+        column.prop(settings, "temporal_radius")
 
 
 class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):
@@ -100,12 +89,18 @@ class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):
     bl_parent_id = "XRDS_PT_settings"
     bl_options = {"DEFAULT_CLOSED"}
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return super().poll(context) and Way(context.scene.xrds.way).is_enlarged
+
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.xrds
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.active = not settings.plain and settings.scale != "1"
-        layout.prop(settings, "guides")
+        job = job_of(settings)
+        networks = means(job.weights).networks
+        offered = [g for g in GUIDES if _network(job, guides=g) in networks]
+        _offer(layout, settings, "guides", offered)
         layout.prop(settings, "guide_samples")
 
 
@@ -116,12 +111,30 @@ class XRDS_PT_advanced(_RenderPanel, bpy.types.Panel):
     bl_parent_id = "XRDS_PT_settings"
     bl_options = {"DEFAULT_CLOSED"}
 
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        settings = context.scene.xrds
+        may_enlarge = Way(settings.way).is_enlarged or settings.is_timed
+        return super().poll(context) and may_enlarge
+
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.xrds
         layout.use_property_split = True
         layout.use_property_decorate = False
-        layout.active = not settings.plain
         _switched(layout, settings, "use_exposure", "exposure")
+
+
+class XRDS_PT_forecast(_RenderPanel, bpy.types.Panel):
+    """What the next render will do."""
+
+    bl_label = "What Will Be Rendered"
+    bl_parent_id = "XRDS_PT_settings"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        scene = context.scene
+        for name, value in summary.next_render(scene, job_of(scene.xrds)):
+            _row(self.layout, name, value)
 
 
 class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
@@ -129,16 +142,32 @@ class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
 
     bl_label = "Last Render"
     bl_parent_id = "XRDS_PT_settings"
+    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return super().poll(context) and bool(progress.last_seconds())
+        return super().poll(context) and history.last(context.scene) is not None
 
     def draw(self, context: bpy.types.Context) -> None:
-        seconds = progress.last_seconds()
-        for stage, name in STAGE_NAMES.items():
-            if seconds[stage] > 0.0:
-                _row(self.layout, name, f"{seconds[stage]:.1f} s")
+        last = history.last(context.scene)
+        assert last is not None
+        for name, value in summary.last_render(last):
+            _row(self.layout, name, value)
+
+
+def _network(job: RenderJob, **other: str) -> Network:
+    """The weights of a job, with another preset or other guides."""
+    return Network(job.preset, job.scale, job.guides)._replace(**other)
+
+
+def _offer(layout: Any, settings: Any, name: str, offered: list[str]) -> None:
+    """A choice of what is there; none to make where there is only one."""
+    if len(offered) < 2:
+        return
+    heading = settings.bl_rna.properties[name].name
+    row = layout.row(heading=heading, heading_ctxt=CONTEXT, align=True)
+    for value in offered:
+        row.prop_enum(settings, name, value)
 
 
 def _switched(layout: Any, settings: Any, switch: str, name: str) -> None:
@@ -161,94 +190,48 @@ def _row(layout: Any, name: str, value: str) -> None:
     split.label(text=value, translate=False)
 
 
-def _paragraph(layout: Any, icon: str, text: str, width: float) -> None:
-    """Lines as long as the panel is wide: a label alone would be cut off."""
-    translated = bpy.app.translations.pgettext_iface(text)
-    letters = max(int((width - 60) / CHARACTER), 20)
-    column = layout.column(align=True)
-    column.scale_y = 0.8
-    for line in textwrap.wrap(translated, letters):
-        column.label(text=line, icon=icon, translate=False)
-        icon = "BLANK1"
-
-
-def remarks(scene: bpy.types.Scene) -> list[tuple[str, str]]:
-    """Icon and sentence of all that is missing or otherwise than under Cycles."""
-    if scene.xrds.plain:
-        return [("INFO", "Plain: one full-resolution Cycles render, no network")]
-    if scene.xrds.scale == "1":
-        return [] if denoisers.is_there() else [("ERROR", NO_DENOISER)]
-    lines = []
-    if not torch_folder.is_there():
-        lines.append(("ERROR", "PyTorch is missing: see the add-on's preferences"))
-    if not (session.has_denoiser() or denoisers.is_there()):
-        sentence = (
-            "There is no denoiser: the network gets the noisy picture. "
-            "Use more samples, or install mitsuba-oidn"
-        )
-        lines.append(("INFO", sentence))
-    return lines + [("INFO", sentence) for sentence in support.notes(scene)]
-
-
-@lru_cache(maxsize=1)
-def _facts_cache() -> FactsCache:
-    """Made when a panel is first drawn: Blender starts faster without its modules."""
-    from .facts_cache import FactsCache
-
-    return FactsCache()
-
-
-def summary(scene: bpy.types.Scene) -> list[tuple[str, str]]:
-    """Name and value of what the render will do, take and leave out."""
-    from .machine import machine
-    from .properties import job_of
-
-    job = job_of(scene.xrds)
-    if job.is_picked:
-        return [("Settings", "chosen when rendering")]
-    if not job.is_enlarged:
-        return [(d.decision.capitalize(), d.value) for d in job.plan().decisions]
-    facts = _facts_cache().facts(scene, bpy.context.view_layer, job)
-    chosen = job.plan(facts)
-    width, height = forecast.low_size(facts.width, facts.height, job.scale)
-    light, guide = forecast.rays(scene.cycles.samples, chosen.guide_samples, job.scale)
-    limit = machine().memory_limit
-    bytes_taken = forecast.memory(
-        facts.width, facts.height, job.preset, job.scale, limit
-    )
-    rows = [
-        ("Small Render", f"{width} × {height}, {scene.cycles.samples} spp"),
-        ("Guides", f"{facts.width} × {facts.height}, {chosen.guide_samples} spp"),
-        ("Rays per Pixel", f"{light:.3g} + {guide:.3g}"),
-        ("Memory", f"≤ {_amount(bytes_taken)}"),
-    ]
-    decisions = [d for d in chosen.decisions if d.decision != "low frame"]
-    return rows + [(d.decision.capitalize(), d.value) for d in decisions]
-
-
-def _amount(size: float) -> str:
-    """Bytes as a person reads them."""
-    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{max(size / 1e6, 1):.0f} MB"
-
-
 CLASSES = (
     XRDS_PT_settings,
-    XRDS_PT_forecast,
     XRDS_PT_guides,
     XRDS_PT_advanced,
+    XRDS_PT_forecast,
     XRDS_PT_last_render,
 )
 
 
 @persistent
-def _forget(*_: object) -> None:
-    if _facts_cache.cache_info().currsize:
-        _facts_cache().forget()
+def _forget_facts(*_: object) -> None:
+    summary.forget()
 
 
-def _changes() -> tuple[Any, ...]:
+@persistent
+def _forget_file(*_: object) -> None:
+    summary.forget()
+    history.forget()
+
+
+@persistent
+def _draw_again(*_: object) -> None:
+    """Seconds are known after a render; Blender draws the panel when told alone."""
+    if not bpy.app.background:
+        bpy.app.timers.register(_tag_redraw, first_interval=0.1)
+
+
+def _tag_redraw() -> None:
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "PROPERTIES":
+                area.tag_redraw()
+
+
+def _handlers() -> tuple[tuple[Any, Any], ...]:
     handlers = bpy.app.handlers
-    return handlers.depsgraph_update_post, handlers.load_post
+    return (
+        (handlers.depsgraph_update_post, _forget_facts),
+        (handlers.load_post, _forget_file),
+        (handlers.render_complete, _draw_again),
+        (handlers.render_cancel, _draw_again),
+    )
 
 
 def register() -> None:
@@ -259,14 +242,14 @@ def register() -> None:
         bpy.utils.register_class(panel)
     cycles_panels.register()
     bpy.types.STATUSBAR_HT_header.append(status_bar.draw)
-    for changes in _changes():
-        changes.append(_forget)
+    for event, handler in _handlers():
+        event.append(handler)
 
 
 def unregister() -> None:
     """Take all of it back."""
-    for changes in _changes():
-        changes.remove(_forget)
+    for event, handler in _handlers():
+        event.remove(handler)
     bpy.types.STATUSBAR_HT_header.remove(status_bar.draw)
     cycles_panels.unregister()
     for panel in reversed(CLASSES):

@@ -31,11 +31,16 @@ class XRDS_OT_preset_add(AddPresetBase, bpy.types.Operator):
     preset_subdir = FOLDER
     preset_defines = ["scene = bpy.context.scene"]
     preset_values = [
-        "scene.xrds.plain",
-        "scene.xrds.scale",
+        "scene.xrds.way",
+        "scene.xrds.use_time_budget",
+        "scene.xrds.time_budget",
+        "scene.xrds.denoise",
+        "scene.xrds.temporal_radius",
         "scene.xrds.preset",
         "scene.xrds.guides",
         "scene.xrds.guide_samples",
+        "scene.xrds.use_exposure",
+        "scene.xrds.exposure",
         "scene.cycles.samples",
     ]
 

@@ -7,30 +7,105 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from ..frame import ways
 from ..frame.job import RenderJob
+from ..planning.ways import Way
 from .machine import machine
 from .translations import CONTEXT
 
-_SCALES = [
-    ("1", "Full Size", "Every pixel is path traced, and denoised by XRDS"),
-    ("2", "2×", "A quarter of the pixels are path traced"),
-    ("4", "4×", "A sixteenth of the pixels are path traced"),
-    ("8", "8×", "One pixel in 64 is path traced"),
+_WAYS = [
+    (
+        Way.AUTOMATIC,
+        "Automatic",
+        "XRDS takes the way that gives the best picture at the present samples. "
+        "With a time budget it chooses the samples as well",
+    ),
+    (
+        Way.FULL_SIZE,
+        "Full Size",
+        "Cycles renders every pixel and XRDS denoises the picture. The best choice for "
+        "final frames, and the only one whose animation frames help each other",
+    ),
+    (
+        Way.X2,
+        "Super-Resolution 2×",
+        "Cycles renders a quarter of the pixels and a network adds the detail. Quicker "
+        "than full size at the same samples; small reflections and sharp shadows get "
+        "softer",
+    ),
+    (
+        Way.X4,
+        "Super-Resolution 4×",
+        "Cycles renders one pixel in 16 and a network adds the detail. For tests and "
+        "look development; print and fine patterns get soft",
+    ),
+    (
+        Way.X8,
+        "Super-Resolution 8×",
+        "Cycles renders one pixel in 64 and a network adds the detail. For thumbnails "
+        "and first looks",
+    ),
+    (
+        Way.PLAIN,
+        "Plain",
+        "Cycles renders alone, with its own denoiser, exactly as if it were the "
+        "render engine",
+    ),
 ]
 _PRESETS = [
-    ("fast", "Fast", "The fastest network"),
-    ("balanced", "Balanced", "A larger network, better at gloss and fine detail"),
-    ("paper", "Paper", "The network from the paper; far slower"),
+    (
+        "fast",
+        "Fast",
+        "The small network: it takes a few seconds for a frame of full HD",
+    ),
+    (
+        "balanced",
+        "Balanced",
+        "A larger network, slower, made for more detail in glossy and finely "
+        "patterned things",
+    ),
+    (
+        "paper",
+        "Paper",
+        "The large network exactly as its inventors, Hou and Liu, published it; far "
+        "slower than the others",
+    ),
 ]
 _DENOISE = [
-    ("high", "High", "The picture of Blender's own default, in 0.6 of its time"),
-    ("best", "Best", "The mean of two such pictures; a little better, in its time"),
-    ("balanced", "Balanced", "Quicker; a little less detail"),
-    ("fast", "Fast", "Quickest, for previews"),
+    (
+        "best",
+        "Best",
+        "Two pictures like High are made and mixed. A little less noise where there "
+        "are one or two samples; takes as long as Blender's own denoiser",
+    ),
+    (
+        "high",
+        "High",
+        "The picture of Blender's own denoiser in a little more than half of its time",
+    ),
+    (
+        "balanced",
+        "Balanced",
+        "A smaller network: quicker, with less detail in fine texture",
+    ),
+    (
+        "fast",
+        "Fast",
+        "The smallest network, for previews: the quickest, and the softest picture",
+    ),
 ]
 _GUIDES = [
-    ("fast", "Fast", "Albedo and normal, rendered without diffuse light"),
-    ("full", "Full", "Also a noisy full-size picture; slower, but sharper light"),
+    (
+        "fast",
+        "Fast",
+        "Colour and direction of the surfaces, rendered at full size without light",
+    ),
+    (
+        "full",
+        "Full",
+        "A noisy full-size picture as well: slower, but shadows and reflections get "
+        "sharper",
+    ),
 ]
 
 
@@ -43,24 +118,29 @@ def _ask_for_passes(settings: bpy.types.PropertyGroup, _: Any) -> None:
 class XRDSSettings(bpy.types.PropertyGroup):
     """How the engine XRDS renders a scene."""
 
-    scale: EnumProperty(
-        name="Scale",
+    way: EnumProperty(
+        name="Way",
         translation_context=CONTEXT,
-        items=_SCALES,
-        default="1",
-        description="Enlargement along each side",
+        items=_WAYS,
+        default=Way.AUTOMATIC,
+        description="How XRDS makes the picture: this decides how long a frame takes "
+        "and how good it gets",
+        update=_ask_for_passes,
     )
     preset: EnumProperty(
-        name="Quality",
+        name="Network",
         translation_context=CONTEXT,
         items=_PRESETS,
-        description="The network that enlarges the picture",
+        description="The network that adds detail to the small picture; a larger one "
+        "takes longer",
     )
     denoise: EnumProperty(
         name="Denoising",
         translation_context=CONTEXT,
         items=_DENOISE,
-        description="How carefully a full-size picture is denoised",
+        default="high",
+        description="How carefully noise is taken out of the picture. It takes as long "
+        "for one sample as for a thousand",
     )
     temporal_radius: IntProperty(
         name="Temporal Radius",
@@ -69,26 +149,31 @@ class XRDSSettings(bpy.types.PropertyGroup):
         min=0,
         soft_max=8,
         max=32,
-        description="Frames before and after that lend their samples in an animation",
+        description="In an animation, how many frames before and after lend their "
+        "samples to each frame. More give less noise and flicker and take more memory; "
+        "0 renders every frame by itself",
     )
     guides: EnumProperty(
         name="Guides",
         translation_context=CONTEXT,
         items=_GUIDES,
-        description="What is rendered at full size",
+        description="What is rendered at full size to show the network where edges "
+        "and textures are",
     )
     guide_samples: IntProperty(
-        name="Guide Samples",
+        name="Samples per Pixel",
         translation_context=CONTEXT,
         default=4,
         min=1,
         soft_max=64,
-        description="Samples per pixel of albedo and normal",
+        description="Samples of the guides. More make metal, glass and blurred things "
+        "cleaner; each takes about two thirds of a full-size sample's time",
     )
     use_exposure: BoolProperty(
         name="Fixed Exposure",
         translation_context=CONTEXT,
-        description="Fix the network's exposure, for animations and border renders",
+        description="Use one brightness factor for all frames, so that super-resolved "
+        "animations do not flicker. The brightness of the picture stays as it is",
     )
     exposure: FloatProperty(
         name="Exposure",
@@ -97,18 +182,15 @@ class XRDSSettings(bpy.types.PropertyGroup):
         min=1e-12,
         soft_min=1e-3,
         soft_max=1e3,
-        description="Factor that brings the radiance to about 0.18",
-    )
-    plain: BoolProperty(
-        name="Plain Cycles",
-        translation_context=CONTEXT,
-        description="Render with Cycles alone, as if the engine were Cycles",
-        update=_ask_for_passes,
+        description="The network works on a picture of middle brightness: 1 suits a "
+        "scene that looks right without Cycles' exposure, 2 one that is half as bright",
     )
     use_time_budget: BoolProperty(
         name="Time Budget",
         translation_context=CONTEXT,
-        description="Let XRDS choose scale, samples, guides, network and denoiser",
+        description="Give each frame a number of seconds: XRDS tries the scene out "
+        "and takes the way, the samples and the denoiser that give the best picture "
+        "in that time",
     )
     time_budget: FloatProperty(
         name="Time Budget",
@@ -117,25 +199,31 @@ class XRDSSettings(bpy.types.PropertyGroup):
         min=0.1,
         soft_max=3600.0,
         subtype="TIME_ABSOLUTE",
-        description="Seconds that a frame may take; least expected error wins",
+        description="Seconds that a frame may take, trying out included",
     )
+
+    @property
+    def is_timed(self) -> bool:
+        """Whether a time budget chooses way and samples."""
+        return self.way == Way.AUTOMATIC and self.use_time_budget
 
 
 def job_of(settings: XRDSSettings) -> RenderJob:
     """The job that a scene's settings and the preferences describe."""
     here = machine()
-    return RenderJob(
-        scale=int(settings.scale),
+    job = RenderJob(
+        scale=1,
         guide_samples=settings.guide_samples,
         guides=settings.guides,
         preset=settings.preset,
         denoise=settings.denoise,
-        temporal_radius=settings.temporal_radius if settings.scale == "1" else 0,
         device=here.device,
         exposure=settings.exposure if settings.use_exposure else None,
-        plain=settings.plain,
-        time_budget=settings.time_budget if settings.use_time_budget else None,
+        time_budget=settings.time_budget if settings.is_timed else None,
         memory_limit=here.memory_limit,
         weights=here.weights,
         threads=here.threads,
+    )
+    return ways.on_the_way(
+        job, Way(settings.way), settings.id_data, settings.temporal_radius
     )

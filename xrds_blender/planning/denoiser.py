@@ -17,6 +17,7 @@ class Denoiser(StrEnum):
     FAST_ACCURATE = "FAST-ACCURATE"
     FAST_FAST = "FAST-FAST"
     FAST_NONE = "FAST-NONE"
+    XRDS_BEST = "XRDS-BEST"
     XRDS_HIGH = "XRDS-HIGH"
     XRDS_BALANCED = "XRDS-BALANCED"
     XRDS_FAST = "XRDS-FAST"
@@ -28,7 +29,7 @@ class Denoiser(StrEnum):
 
     @property
     def quality(self) -> str:
-        """HIGH, BALANCED or FAST, as Cycles says it; high, balanced or fast of ours."""
+        """HIGH, BALANCED or FAST, as Cycles says it; best to fast of ours."""
         first, _, second = self.value.partition("-")
         return second.lower() if self.is_ours else first
 

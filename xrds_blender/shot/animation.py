@@ -20,7 +20,7 @@ from xrds_core.temporal.moving import Movement
 
 from ..cycles import session
 from ..cycles.passes import CyclesPasses
-from ..frame import progress
+from ..frame import history, progress
 from ..frame.denoisers import load_denoiser
 from ..frame.job import Picture, RenderJob
 from ..frame.layer import render_layer
@@ -61,11 +61,12 @@ def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
     """
     if not _has_neighbours(engine, depsgraph, job):
         return render_layer(engine, depsgraph, job)
+    place = history.place_of(depsgraph)
     try:
         picture = _render_among_neighbours(engine, depsgraph, job)
     finally:
         progress.end()
-    progress.keep(picture.seconds)
+    history.keep(place, job, picture)
     return picture
 
 

@@ -1,12 +1,17 @@
-"""Quick pictures at x4."""
+"""Quick pictures: few samples at full size, denoised quickly."""
 
 import bpy
 
 scene = bpy.context.scene
 
-scene.xrds.plain = False
-scene.xrds.scale = "4"
+scene.xrds.way = "full_size"
+scene.xrds.use_time_budget = False
+scene.xrds.time_budget = 60.0
+scene.xrds.denoise = "balanced"
+scene.xrds.temporal_radius = 4
 scene.xrds.preset = "fast"
 scene.xrds.guides = "fast"
-scene.xrds.guide_samples = 2
-scene.cycles.samples = 16
+scene.xrds.guide_samples = 4
+scene.xrds.use_exposure = False
+scene.xrds.exposure = 1.0
+scene.cycles.samples = 4

@@ -1,12 +1,17 @@
-"""Final frames at x2."""
+"""Final frames and shots at full size."""
 
 import bpy
 
 scene = bpy.context.scene
 
-scene.xrds.plain = False
-scene.xrds.scale = "2"
+scene.xrds.way = "full_size"
+scene.xrds.use_time_budget = False
+scene.xrds.time_budget = 60.0
+scene.xrds.denoise = "high"
+scene.xrds.temporal_radius = 4
 scene.xrds.preset = "fast"
 scene.xrds.guides = "fast"
 scene.xrds.guide_samples = 4
-scene.cycles.samples = 64
+scene.xrds.use_exposure = False
+scene.xrds.exposure = 1.0
+scene.cycles.samples = 128

@@ -1,12 +1,17 @@
-"""Look development: x4 with guides that are sharper on gloss."""
+"""The same view again and again at 2×: its guides are rendered once."""
 
 import bpy
 
 scene = bpy.context.scene
 
-scene.xrds.plain = False
-scene.xrds.scale = "4"
+scene.xrds.way = "x2"
+scene.xrds.use_time_budget = False
+scene.xrds.time_budget = 60.0
+scene.xrds.denoise = "high"
+scene.xrds.temporal_radius = 4
 scene.xrds.preset = "fast"
 scene.xrds.guides = "fast"
 scene.xrds.guide_samples = 4
-scene.cycles.samples = 32
+scene.xrds.use_exposure = False
+scene.xrds.exposure = 1.0
+scene.cycles.samples = 16

@@ -1,0 +1,36 @@
+"""What can render here: denoisers, PyTorch, weights. Cheap enough for a panel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from xrds_core.weights_header import WeightsHeader, headers, read_header
+
+from ..cycles import session
+from ..planning.budget import Network
+from ..planning.ways import Means
+from . import denoisers, torch_folder
+
+
+def means(weights: str | Path | None = None) -> Means:
+    """What is installed; nothing of it is loaded. `weights` as in a RenderJob."""
+    return Means(
+        denoiser=denoisers.is_there(),
+        cycles_denoiser=session.has_denoiser(),
+        torch=torch_folder.is_there(),
+        networks=frozenset(
+            Network(each.preset, each.scale, each.guides)
+            for each in weights_headers(weights)
+        ),
+    )
+
+
+def weights_headers(weights: str | Path | None = None) -> list[WeightsHeader]:
+    """What the weights at hand are for; of the shipped ones by default."""
+    if weights is None:
+        return headers()
+    path = Path(weights)
+    if path.is_dir():
+        return headers(path)
+    header = read_header(path)
+    return [] if header is None else [header]
