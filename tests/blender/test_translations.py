@@ -1,4 +1,4 @@
-"""Every word that the interface shows, found in the source and in Blender's own data."""
+"""Every word that the interface shows, as the source and Blender tell it."""
 
 from __future__ import annotations
 

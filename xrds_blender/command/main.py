@@ -67,17 +67,46 @@ class _Parser(argparse.ArgumentParser):
         self.exit(console.WRONG_USAGE, line)
 
 
+class _Apart:
+    """Adds commands that the help lists below the others: those that measure XRDS."""
+
+    def __init__(self, commands: Any) -> None:
+        self._commands = commands
+        self._lines: list[str] = []
+
+    def add_parser(self, name: str, *, help: str, **more: Any) -> Any:  # noqa: A002  # argparse's
+        """As argparse does, without a line in its own list."""
+        self._lines.append(f"  {name:<14}{help}")
+        return self._commands.add_parser(name, **more)
+
+    def listing(self) -> str | None:
+        """The list, None where there are no such commands."""
+        heading = "laboratory, for those who develop XRDS:"
+        return "\n".join([heading, *self._lines]) if self._lines else None
+
+
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    parser = _Parser("xrds", description="Guided super-resolution of Cycles renders.")
-    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    added = (info.add_info, render.add_render, render.add_plan, upscale.add_upscale)
-    for add in (*added, *_laboratory()):
-        command = add(commands)
+    parser = _Parser(
+        "xrds",
+        description="Final frames of Cycles scenes: denoised at full size,\n"
+        "accumulated in shots, or enlarged by a network.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    commands = parser.add_subparsers(
+        dest="command", required=True, metavar="COMMAND", title="commands"
+    )
+    apart = _Apart(commands)
+    added = (render.add_render, render.add_plan, upscale.add_upscale, info.add_info)
+    for command in (
+        *(add(commands) for add in added),
+        *(add(apart) for add in _laboratory()),
+    ):
         command.add_argument(
             "--json",
             action="store_true",
             help="print JSON on stdout and everything else on stderr",
         )
+    parser.epilog = apart.listing()
     asked = words[0] if words else ""
     if asked in LABORATORY and asked not in commands.choices:
         parser.error(
