@@ -54,6 +54,9 @@ def test_unregister_takes_everything_back() -> None:
     assert hasattr(bpy.types, "XRDS_PT_settings")
 
 
+ALL = Means(True, True, True, frozenset({Network("fast", 2, "fast")}))
+
+
 class Layout:
     """A layout that refuses names the settings do not have."""
 
@@ -143,6 +146,7 @@ def test_a_time_budget_leaves_way_and_samples_open() -> None:
     settings = bpy.context.scene.xrds
     settings.use_time_budget, settings.time_budget = True, 90.0
     assert drawn(panels.XRDS_PT_settings)[0] == "Automatic (within 90 s)"
+    assert rows(bpy.context.scene)["About"] == "known after a first render"
     settings.way = "full_size"
     assert "within" not in " ".join(drawn(panels.XRDS_PT_settings)[1:])
 
@@ -163,12 +167,16 @@ def test_the_table_tells_seconds_after_a_render() -> None:
     assert last["Way"] == "Full Size, 1 sample"
     assert "Total" in last
     assert "Samples and Denoising" not in last
+    settings = scene.xrds
+    settings.way, settings.use_time_budget = "automatic", True
+    settings.time_budget = 1e5
+    assert rows(scene)["About"].endswith("16384 samples")
     bpy.ops.wm.read_factory_settings()
     assert history.last(bpy.context.scene) is None
 
 
 def rows(scene: object) -> dict[str, str]:
-    return dict(summary.next_render(scene, properties.job_of(scene.xrds)))
+    return dict(summary.next_render(scene, properties.job_of(scene.xrds), ALL))
 
 
 @pytest.mark.parametrize(("scale", "low"), [("2", "683x384"), ("8", "171x96")])
@@ -194,9 +202,6 @@ def test_no_way_takes_more_than_five_rows() -> None:
         scene.xrds.way = way
         assert 2 <= len(rows(scene)) <= summary.MOST_ROWS
     assert "DEFAULT_CLOSED" in panels.XRDS_PT_forecast.bl_options
-
-
-ALL = Means(True, True, True, frozenset({Network("fast", 2, "fast")}))
 
 
 def remarks_of(at_hand: Means) -> list[tuple[str, str]]:

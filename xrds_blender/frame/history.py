@@ -12,6 +12,7 @@ from typing import Any
 from ..cycles import session
 from ..cycles.size import picture_size
 from ..planning import budget
+from ..planning.budget import Costs
 from ..planning.denoiser import Denoiser
 from ..planning.measured import Measured, learn
 from ..planning.plan import Decision
@@ -113,6 +114,16 @@ def seconds(scene: Any, way: Way, asked: Asked) -> float | None:
             return None
         total += spent
     return total
+
+
+def costs(scene: Any) -> Costs | None:
+    """Costs of a frame's parts; None where unknown, or for several layers."""
+    names = [layer.name for layer in scene.view_layers if layer.use]
+    known = _measured.get(scene.name, {})
+    if len(names) != 1 or names[0] not in known:
+        return None
+    width, height = picture_size(scene.render)
+    return known[names[0]].costs(width * height, budget.shipped())
 
 
 def forget(*_: Any) -> None:

@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from xrds_core.errors import XRDSError
 
@@ -25,7 +26,7 @@ from ..planning.denoiser import (
     Denoiser,
 )
 from ..planning.plan import Decision
-from . import denoisers
+from . import denoisers, history
 from .denoisers import in_process
 from .job import RenderJob
 from .networks import known_networks, load_upscaler
@@ -54,6 +55,20 @@ def pick(
     goal = job.time_budget or job.quality
     assert goal is not None
     return _job(job, picked), picked.decision(goal, job.time_budget is not None)
+
+
+def foresee(scene: Any, job: RenderJob, networks: Sequence[Network]) -> Picked | None:
+    """What will about be picked, by the scene's last renders; None without any.
+
+    `networks` are those whose weights are there.
+    """
+    costs = history.costs(scene)
+    if costs is None:
+        return None
+    model = budget.shipped()
+    model = replace(model, errors=model.errors.limited(_denoisers()))
+    known = [n for n in networks if n in costs.network]
+    return _choose(job, costs, model, known)
 
 
 def _denoisers() -> tuple[Denoiser, ...]:

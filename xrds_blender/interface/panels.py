@@ -132,8 +132,8 @@ class XRDS_PT_forecast(_RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        scene = context.scene
-        for name, value in summary.next_render(scene, job_of(scene.xrds)):
+        scene, job = context.scene, job_of(context.scene.xrds)
+        for name, value in summary.next_render(scene, job, means(job.weights)):
             _row(self.layout, name, value)
 
 

@@ -12,7 +12,7 @@ from ..frame.history import LastRender, plain_denoiser
 from ..frame.job import RenderJob
 from ..planning import forecast
 from ..planning.plan import Plan
-from ..planning.ways import Way
+from ..planning.ways import Means, Way
 from .machine import machine
 from .paragraph import translated
 from .ways_table import NAMES
@@ -50,11 +50,11 @@ def forget() -> None:
         _facts_cache().forget()
 
 
-def next_render(scene: Any, job: RenderJob) -> list[Row]:
+def next_render(scene: Any, job: RenderJob, at_hand: Means) -> list[Row]:
     """Name and value of what the render will do, take and leave out; five at most."""
     size = frame_size(scene.render)
     if job.is_picked:
-        return [("Picture", _size(*size)), ("Settings", translated("as time allows"))]
+        return [("Picture", _size(*size)), ("About", _foreseen(scene, job, at_hand))]
     if job.is_enlarged:
         return _enlarged(scene, job)
     rows = [("Picture", _sampled(*size, scene.cycles.samples))]
@@ -68,6 +68,20 @@ def next_render(scene: Any, job: RenderJob) -> list[Row]:
         neighbours = translated(text, radius=job.temporal_radius)
         rows.append(("Neighbouring Frames", neighbours))
     return rows
+
+
+def _foreseen(scene: Any, job: RenderJob, at_hand: Means) -> str:
+    """What a time budget will about choose."""
+    from ..frame.picking import foresee
+
+    networks = sorted(at_hand.networks) if at_hand.torch else []
+    picked = foresee(scene, job, networks) if at_hand.any_denoiser else None
+    if picked is None:
+        return translated("known after a first render")
+    choice = picked.choice
+    is_plain = choice.scale == 1 and not choice.denoiser.is_ours
+    way = Way.of(choice.scale, is_plain)
+    return f"{translated(NAMES[way])}, {_samples(choice.samples)}"
 
 
 def _enlarged(scene: Any, job: RenderJob) -> list[Row]:

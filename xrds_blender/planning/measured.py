@@ -47,26 +47,27 @@ class Measured:
             return None
         if choice is None:
             return here.fixed + asked.samples * here.beauty
-        if here.denoise is None:
-            return None
+        costs = here.costs(pixels, model)
         try:
-            return here.costs(model).seconds(_in_process(choice))
+            return costs and costs.seconds(_in_process(choice))
         except KeyError:  # a network of which nothing is known
             return None
 
-    def costs(self, model: Model) -> Costs:
-        """Costs of every choice; what has not run yet is taken from the model."""
-        assert self.beauty is not None
-        assert self.denoise is not None
+    def costs(self, pixels: int, model: Model) -> Costs | None:
+        """Costs of every choice at a number of pixels; None where too little is known.
+
+        What has not run yet is taken from the model.
+        """
+        here = _resized(self, pixels)
+        if here.beauty is None or here.denoise is None:
+            return None
+        networks = {n: here.denoise * x for n, x in model.network_speed.items()}
         return Costs(
-            fixed=self.fixed,
-            beauty=self.beauty,
-            guide=GUIDE_SHARE * self.beauty if self.guide is None else self.guide,
-            denoise={m: self.denoise * x for m, x in model.denoiser_speed.items()},
-            network={
-                **{n: self.denoise * x for n, x in model.network_speed.items()},
-                **self.networks,
-            },
+            fixed=here.fixed,
+            beauty=here.beauty,
+            guide=GUIDE_SHARE * here.beauty if here.guide is None else here.guide,
+            denoise={m: here.denoise * x for m, x in model.denoiser_speed.items()},
+            network={**networks, **here.networks},
         )
 
 
