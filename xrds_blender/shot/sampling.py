@@ -39,11 +39,21 @@ def can_lend(scene: Any) -> bool:
 def sample_frame(
     engine: Any, depsgraph: Any, job: RenderJob, place: int | None = None
 ) -> Sampled:
+    """Render a frame as `noisy_frame` does and pack it for the window."""
+    frames, seconds = noisy_frame(engine, depsgraph, job, place)
+    views = {view: store(frame, np.float16) for view, frame in frames.items()}
+    return Sampled(views, dict.fromkeys(progress.STAGES, 0.0) | seconds)
+
+
+def noisy_frame(
+    engine: Any, depsgraph: Any, job: RenderJob, place: int | None = None
+) -> tuple[dict[str, Frame], dict[str, float]]:
     """Render the frame that the dependency graph is at; the result holds its passes.
 
-    Every frame has a seed of its own, whatever the file says. `place`, the frame's in
-    the shot, lets frames under a camera that stands still continue one sequence
-    instead; passes of its first sample alone, as Depth, are empty in the result then.
+    Returns its samples by view, and the seconds of the stages. Every frame has a seed
+    of its own, whatever the file says. `place`, the frame's in the shot, lets frames
+    under a camera that stands still continue one sequence instead; passes of its first
+    sample alone, as Depth, are empty in the result then.
     Raises Cancelled when the user stops it, SceneError under a camera that no matrix
     describes.
     """
@@ -65,12 +75,10 @@ def sample_frame(
         portion=portion,
         geometry=geometry,
     )
-    views = {
-        view: store(_frame(number, camera, samples, count), np.float16)
-        for view, samples in noisy.items()
+    frames = {
+        view: _frame(number, camera, samples, count) for view, samples in noisy.items()
     }
-    seconds = dict.fromkeys(progress.STAGES, 0.0)
-    return Sampled(views, seconds | {"sync": clock.sync, "beauty": clock.render})
+    return frames, {"sync": clock.sync, "beauty": clock.render}
 
 
 def _is_continued(depsgraph: Any) -> bool:

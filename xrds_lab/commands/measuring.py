@@ -13,6 +13,7 @@ from xrds_core.errors import XRDSError
 
 from ..progress import report_line
 
+MOTIONS = ("pan", "fast", "still", "objects", "both")
 STABILITY = ("arrays", "large", "scenes", "shots", "load")
 
 
@@ -152,7 +153,9 @@ def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
 
 def add_bench(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds bench`."""
-    command = commands.add_parser("bench", help="error against run time, a report")
+    command = commands.add_parser(
+        "bench", help="error against run time, of frames or of shots; a report"
+    )
     add = command.add_argument
     add("scenes", type=Path, nargs="+", metavar="SCENE.blend")
     add("--out", type=Path, required=True, help="folder; an unfinished run resumes")
@@ -190,12 +193,46 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     add("--model", type=Path, help="where to write what --time-budget goes by")
     add("--device", default="auto", help=DEVICE_HELP)
     add("--weights", type=Path, help="folder of weights files")
+    _add_shots(command.add_argument_group("shots, instead of single frames"))
     command.set_defaults(work=_bench, lines=_bench_lines)
     return command
 
 
+def _add_shots(group: Any) -> None:
+    add = group.add_argument
+    add("--shots", action="store_true", help="make a shot of each scene and measure it")
+    add(
+        "--motions",
+        type=arguments.names(MOTIONS),
+        default=MOTIONS,
+        help=f"of {', '.join(MOTIONS)}",
+    )
+    add("--samples", type=arguments.integers, default=(2,), help="per frame, as 2,16")
+    add(
+        "--radii",
+        type=arguments.integers,
+        default=(0, 1, 2, 4),
+        help="temporal radii, as 0,4; more than 4 asks for more frames",
+    )
+    add(
+        "--pair-samples",
+        type=int,
+        default=64,
+        help="of the frame that flicker under a moving camera is judged by; 0: none",
+    )
+    add(
+        "--equal",
+        action="store_true",
+        help="find the samples with which Cycles + OIDN is as good under pan",
+    )
+    add("--seconds", action="store_true", help="time whole frames; on a quiet machine")
+    add("--films", action="store_true", help="also the best and the worst shot as WebP")
+
+
 def _bench(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("bench")
+    if options.shots:
+        return _bench_shots(options)
     from ..bench.bench import bench
 
     return bench(
@@ -218,6 +255,31 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
     )
 
 
+def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
+    from ..shots.bench import Measure, bench_shots
+
+    return bench_shots(
+        options.scenes,
+        options.out,
+        Measure(
+            options.motions,
+            options.samples,
+            options.radii,
+            options.pair_samples,
+            equal_quality=options.equal,
+            seconds=options.seconds,
+            films=options.films,
+            rounds=options.rounds,
+        ),
+        windows=options.windows,
+        references=options.references,
+        resolution=options.resolution,
+        cache=options.cache,
+        reference_samples=options.reference_samples,
+    )
+
+
 def _bench_lines(result: dict[str, Any]) -> list[str]:
     failed = [f"left out: {name}: {why}" for name, why in result["failures"].items()]
-    return [f"{len(result['points'])} points", *failed]
+    points = result.get("points") or result["shots"]
+    return [f"{len(points)} points", *failed]

@@ -1,0 +1,1 @@
+"""Measures shots: what neighbouring frames' samples gain, and what they spoil."""

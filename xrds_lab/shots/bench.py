@@ -1,0 +1,236 @@
+"""`xrds bench --shots`: the standard measure for shots, on this machine.
+
+One call measures, resumes and reports. Whatever earlier calls with the same cache have
+measured is in the report too, so that a long measure can be made in parts.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from xrds_blender.command import console
+from xrds_core.atomic import replacing, write_json
+from xrds_core.errors import UsageError
+
+from ..bench import machine, workload
+from ..bench.inputs import Folder
+from ..bench.journal import Journal
+from ..bench.pictures import Networks, Pictures
+from ..bench.windows import find_shots
+from ..progress import report_line
+from . import equal, film, report
+from .figures import REACH, Clip, SceneFigures
+from .frames import ShotFrames
+from .motions import MOTIONS
+from .seconds import SceneSeconds
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from ..bench.windows import Shot
+    from .frames import FrameRequest
+
+    Report = dict[str, Any]
+
+SAMPLES = (2,)
+RADII = (0, 1, 2, 4)
+PAIR_SAMPLES = 64
+REFERENCE_SAMPLES = 128
+ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What is measured of each scene."""
+
+    motions: tuple[str, ...] = tuple(MOTIONS)
+    samples: tuple[int, ...] = SAMPLES
+    radii: tuple[int, ...] = RADII
+    pair_samples: int = PAIR_SAMPLES
+    equal_quality: bool = False
+    seconds: bool = False
+    films: bool = False
+    rounds: int = ROUNDS
+
+    def __post_init__(self) -> None:
+        for name, least in (("samples", 1), ("radii", 0)):
+            if min(getattr(self, name)) < least:
+                raise UsageError(f"{name} {getattr(self, name)}: give {least} or more")
+
+
+def bench_shots(
+    scenes: Sequence[Path],
+    out: Path,
+    measure: Measure,
+    *,
+    windows: Path | None = None,
+    references: Path | None = None,
+    resolution: tuple[int, int] | None = None,
+    cache: Path | None = None,
+    reference_samples: int = REFERENCE_SAMPLES,
+) -> Report:
+    """Measure shots of scene files and write the report into `out`; returns it.
+
+    `windows` (a file) and `references` (a folder of NAME.exr) are as for `bench`;
+    without them errors are of the whole frame, against the mean of two renders of
+    `reference_samples` each. `resolution` replaces the files' own. Raises UsageError
+    for missing files, before anything is rendered.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    folder = Folder(cache or out / "cache")
+    journal = Journal(folder.directory / "journal-shots.json", report_line)
+    with console.stdout_to(folder.directory / "blender.log"):
+        shots = find_shots(scenes, windows, references, resolution)
+        networks = Networks(None, "cpu")
+        parts = [
+            _Scene(shot, folder, journal, networks, reference_samples, measure)
+            for shot in shots
+        ]
+        return _measured(parts, measure, journal, out)
+
+
+@dataclass
+class _Scene:
+    """One scene of the report."""
+
+    shot: Shot
+    folder: Folder
+    journal: Journal
+    networks: Networks
+    reference_samples: int
+    measure: Measure
+    equals: list[dict[str, Any]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.pictures = Pictures(
+            self.shot, self.folder, self.networks, self.reference_samples
+        )
+        self.frames = ShotFrames(self.shot, self.folder)
+        self.figures = SceneFigures(
+            self.frames, self.pictures.reference, self.measure.pair_samples
+        )
+        self.seconds = SceneSeconds(self.shot, self.folder.directory)
+
+    def wanted(self, motion: str, samples: int) -> list[FrameRequest]:
+        """The frames of one shot that are still to be rendered."""
+        needed = self.figures.requests(motion, samples, self.measure.radii)
+        return [r for r in needed if not self.frames.has(r)]
+
+    def cost(self, cases: Sequence[tuple[str, int]]) -> float:
+        """What the missing frames of all shots take, in the unit of `cost`."""
+        missing = {
+            r.file_name(self.shot): cost(r)
+            for case in cases
+            for r in self.wanted(*case)
+        }
+        return sum(missing.values())
+
+    def shoot(self, motion: str, samples: int, meter: workload.Meter) -> None:
+        """Render and measure one shot."""
+        what = f"{self.shot.name}: {motion}, {samples} spp"
+
+        def done(request: FrameRequest) -> None:
+            meter.done(cost(request), f"{what}, frame {request.number}")
+
+        halves = self.pictures.missing([])
+        self.pictures.render(halves, self.journal, lambda _: None)
+        self.frames.render(self.wanted(motion, samples), self.journal, done)
+        with self.journal.attempt(f"{what}, figures"):
+            self.figures.measure(motion, samples, self.measure.radii)
+
+    def compare(self) -> None:
+        """Find the samples at which Cycles gives pictures as good."""
+        targets = equal.targets(self.figures.points())
+        if targets and self.measure.equal_quality:
+            best = max(point["psnr"] for point in targets)
+            known = equal.curve(self.pictures, self.journal, best)
+            self.equals = equal.comparisons(targets, known)
+
+    def time(self) -> None:
+        """Time whole frames at every number of samples."""
+        for samples in self.measure.samples:
+            with self.journal.attempt(f"{self.shot.name}: seconds, {samples} spp"):
+                self.seconds.measure(samples, self.measure.radii, self.measure.rounds)
+
+    def points(self) -> list[dict[str, Any]]:
+        """All figures, each with its seconds per frame where they are known."""
+        points = self.figures.points()
+        for point in points:
+            point["seconds_per_frame"] = self.seconds.per_frame(
+                point["method"], point["samples"], point["radius"]
+            )
+        return points
+
+
+def cost(request: FrameRequest) -> float:
+    """What a frame takes beside others: samples, and what every render takes."""
+    return request.samples + 3.0
+
+
+def _measured(
+    parts: Sequence[_Scene], measure: Measure, journal: Journal, out: Path
+) -> Report:
+    """Shot by shot, each of all scenes, with a report of what is done after each."""
+    cases = [(m, n) for m in measure.motions for n in measure.samples]
+    meter = workload.Meter(sum(part.cost(cases) for part in parts))
+    journal.progress = meter.write
+    try:
+        for case in cases:
+            for part in parts:
+                part.shoot(*case, meter)
+            _written(parts, journal, out)
+        for part in parts:
+            part.compare()
+            if measure.seconds:
+                part.time()
+        results = _written(parts, journal, out)
+        if measure.films:
+            _films(parts, results["shots"], out)
+    finally:
+        meter.close()
+    return results
+
+
+def _films(parts: Sequence[_Scene], points: Sequence[Any], out: Path) -> None:
+    """Films of the best and the worst shot at each number of samples asked for."""
+    by_name = {part.shot.name: part for part in parts}
+    for samples in parts[0].measure.samples:
+        for rank, (scene, motion) in film.chosen(points, samples).items():
+            clip = Clip(by_name[scene].frames, motion, samples, REACH)
+            film.write(out / f"{rank}-{scene}-{motion}-{samples}spp.webp", clip)
+
+
+def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
+    results = {
+        "settings": {
+            "middle": "the file's own view",
+            "pair_samples": parts[0].measure.pair_samples,
+            "radius": REACH,
+        },
+        "machine": machine.describe(),
+        "scenes": [
+            {"scene": part.shot.name, "reference_psnr_floor": part.pictures.floor()}
+            for part in parts
+        ],
+        "shots": [point for part in parts for point in part.points()],
+        "equal_quality": [entry for part in parts for entry in part.equals],
+        "failures": journal.failures,
+    }
+    write_json(out / "results.json", results)
+    _write_table(out / "results.csv", results["shots"])
+    report.write(out / "report.md", results)
+    return results
+
+
+def _write_table(path: Path, points: Sequence[dict[str, Any]]) -> None:
+    columns = list(dict.fromkeys(key for point in points for key in point))
+    with (
+        replacing(path) as part,
+        part.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.DictWriter(file, columns)
+        writer.writeheader()
+        writer.writerows(points)

@@ -1,0 +1,224 @@
+"""Figures of a scene's shots: errors of the middle frame, and flicker.
+
+Figures are kept in a file and hold as long as the code that they judge is the same.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import xrds_core
+from xrds_blender.frame.denoisers import load_denoiser
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.shot import finishing
+from xrds_core.atomic import write_json
+from xrds_core.metrics import all_metrics, to_srgb
+from xrds_core.temporal.frame import Stored, store
+from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.window import Shot
+
+from . import rivals
+from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
+
+if TYPE_CHECKING:
+    from xrds_blender.planning.denoiser import Denoiser
+    from xrds_core.arrays import Array
+    from xrds_core.temporal.frame import Frame
+
+    Figures = dict[str, Any]
+    Paint = Callable[[int], Array]
+
+GENERATION = 1  # counts up whenever this file makes other figures
+DEFAULT, BEST, MEDIAN = "cycles_oidn_default", "cycles_oidn_best", "median_of_three"
+XRDS = "xrds"
+RIVALS = {DEFAULT: 0, BEST: 0, MEDIAN: 1}
+"""Each rival, and how many frames before and after it looks at."""
+STEADY = range(MIDDLE - 2, MIDDLE + 3)
+"""Frames whose spread is the flicker where nothing moves: the 3rd to 7th of nine."""
+
+
+def reach_of(radius: int) -> int:
+    """Frames to each side of the middle one in the shot that judges a radius."""
+    return max(radius, REACH)
+
+
+class Clip:
+    """One shot of one scene: the pictures that each method makes of its frames."""
+
+    def __init__(
+        self, frames: ShotFrames, motion: str, samples: int, reach: int
+    ) -> None:
+        wanted = {r.number: r for r in requests(motion, samples, reach)}
+        self.stops = frames.stops(wanted[MIDDLE])
+        self.samples = samples
+        self.frames: dict[int, Frame] = {n: frames.frame(r) for n, r in wanted.items()}
+        self._stored: dict[int, Stored] = {}
+        self._movement = Movement()
+
+    def xrds(self, number: int, radius: int) -> Array:
+        """A frame as `xrds render` finishes it, (H, W, 3)."""
+        job = RenderJob(
+            scale=1, samples=self.samples, temporal_radius=radius, device="cpu"
+        )
+        numbers = Shot(tuple(self.frames), radius).lenders(number)
+        lenders = [self._packed(n) for n in numbers]
+        own = self._packed(number)
+        made = finishing.finish(own, lenders, job, load_denoiser(job), self._movement)
+        return made.radiance
+
+    def _packed(self, number: int) -> Stored:
+        if number not in self._stored:
+            self._stored[number] = store(self.frames[number], np.float16)
+        return self._stored[number]
+
+    def oidn(self, number: int, mode: Denoiser) -> Array:
+        """A frame by itself, denoised by Cycles."""
+        return rivals.cycles_oidn(self.frames[number], mode)
+
+    def median(self, number: int) -> Array:
+        """A frame denoised by Cycles, then the median with its neighbours."""
+        return rivals.median_of_three(self.frames, number)
+
+
+def flicker(
+    paint: Paint, motion: str, stops: float, pair: tuple[Array, Array] | None
+) -> float | None:
+    """How much the picture changes that should not, in sRGB, mean over the pixels.
+
+    Where nothing moves: the standard deviation over five frames. Elsewhere the mean
+    absolute error of the difference between the middle frame and the next, against the
+    difference of the `pair` of references; None without one.
+    """
+    if motion == "still":
+        shown = [to_srgb(paint(number), stops) for number in STEADY]
+        return float(np.std(np.stack(shown), axis=0, dtype=np.float64).mean())
+    if pair is None:
+        return None
+    shown = [to_srgb(paint(number), stops) for number in (MIDDLE, MIDDLE + 1)]
+    true = [to_srgb(picture, stops) for picture in pair]
+    error = (shown[1] - shown[0]) - (true[1] - true[0])
+    return float(np.abs(error).mean(dtype=np.float64))
+
+
+class SceneFigures:
+    """All figures of one scene; those known are not computed again."""
+
+    def __init__(
+        self, frames: ShotFrames, reference: Callable[[], Array], pair_samples: int
+    ) -> None:
+        self.frames, self._reference = frames, reference
+        self.pair_samples = pair_samples
+        shot = frames.shot
+        own = "own" if shot.reference is None else shot.reference.stem
+        name = f"{shot.name}-{shot.digest}-{shot.window.label}-{own}-shots.json"
+        self._path = frames.folder.directory / name
+        self._known: dict[str, Figures] = _stored(self._path)
+
+    def points(self) -> list[Figures]:
+        """Every figure that the present code gave, in order of the cases."""
+        known = [(k, v) for k, v in self._known.items() if k.endswith(_code())]
+        return [dict(point) for _, point in known]
+
+    def requests(self, motion: str, samples: int, radii: list[int]) -> list[Any]:
+        """The frames that these figures need."""
+        reaches = sorted({reach_of(radius) for radius in radii} | {REACH})
+        wanted = [r for reach in reaches for r in requests(motion, samples, reach)]
+        return wanted + ([] if self._truth(motion) is None else [self._truth(motion)])
+
+    def _truth(self, motion: str) -> FrameRequest | None:
+        if motion == "still" or not self.pair_samples:
+            return None
+        return truth(motion, self.pair_samples)
+
+    def measure(self, motion: str, samples: int, radii: list[int]) -> None:
+        """Measure whatever is missing of one shot, and keep it."""
+        for reach in sorted({reach_of(radius) for radius in radii} | {REACH}):
+            methods = [(XRDS, r) for r in radii if reach_of(r) == reach]
+            if reach == REACH:
+                methods = [*RIVALS.items(), *methods]
+            left = [
+                m for m in methods if self._key(motion, samples, *m) not in self._known
+            ]
+            if left:
+                clip = Clip(self.frames, motion, samples, reach)
+                for method, radius in left:
+                    self._measure(clip, motion, method, radius)
+
+    def _measure(self, clip: Clip, motion: str, method: str, radius: int) -> None:
+        paint, more = self._paint(clip, method, radius)
+        reference = self._reference()
+        pair = None
+        request = self._truth(motion)
+        if request is not None:
+            pair = reference, self.frames.picture(request)
+        made: dict[int, Array] = {}
+
+        def once(number: int) -> Array:
+            if number not in made:
+                made[number] = paint(number)
+            return made[number]
+
+        point = {
+            "scene": self.frames.shot.name,
+            "motion": motion,
+            "method": method,
+            "samples": clip.samples,
+            "radius": radius,
+            "scale": 1,
+            "seconds_per_frame": None,
+            **all_metrics(once(MIDDLE), reference, clip.stops),
+            "flicker": flicker(once, motion, clip.stops, pair),
+        }
+        self._known[self._key(motion, clip.samples, method, radius)] = point | more
+        write_json(self._path, self._known)
+
+    def _paint(self, clip: Clip, method: str, radius: int) -> tuple[Paint, Figures]:
+        """What makes the picture of a frame by its number, and what it is named by."""
+        if method == XRDS:
+            return lambda number: clip.xrds(number, radius), {}
+        if method == MEDIAN:
+            return clip.median, {}
+        mode = rivals.DEFAULT_DENOISER
+        if method == BEST:
+            mode = best_mode(clip, self._reference())
+        return lambda number: clip.oidn(number, mode), {"mode": str(mode)}
+
+    def _key(self, motion: str, samples: int, method: str, radius: int) -> str:
+        pair = self.pair_samples if motion != "still" else 0
+        return f"{motion}-{samples}-{method}-{radius}-pair{pair}-{_code()}"
+
+
+def best_mode(clip: Clip, reference: Array) -> Denoiser:
+    """The mode of Cycles' denoiser with the highest PSNR on the middle frame."""
+    from xrds_core.metrics import psnr
+
+    return max(
+        rivals.MODES,
+        key=lambda mode: psnr(clip.oidn(MIDDLE, mode), reference, clip.stops),
+    )
+
+
+@lru_cache(maxsize=1)
+def _code() -> str:
+    """A checksum of the code that the figures judge."""
+    package = Path(xrds_core.__file__).parent
+    sources = [*package.glob("temporal/*.py"), *package.glob("denoising/*.py")]
+    sources += [Path(finishing.__file__), Path(rivals.__file__)]
+    whole = hashlib.sha256(bytes([GENERATION]))
+    for path in sorted(sources):
+        whole.update(path.read_bytes())
+    return whole.hexdigest()[:12]
+
+
+def _stored(path: Path) -> dict[str, Figures]:
+    try:
+        return dict(json.loads(path.read_text("utf-8")))
+    except (OSError, ValueError):
+        return {}

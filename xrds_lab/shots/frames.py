@@ -1,0 +1,195 @@
+"""The frames of a shot: rendered once by the product's code, kept in a folder."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_core.errors import SceneError
+from xrds_core.temporal.frame import Camera, Frame
+
+from ..bench.inputs import Arrays, Folder, open_scene
+from .motions import animate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from xrds_core.arrays import Array
+
+    from ..bench.journal import Journal
+    from ..bench.windows import Shot
+
+GENERATION = 1  # counts up whenever the same request is rendered otherwise
+MIDDLE = 9
+"""The number of the frame that shows the file's own view."""
+REACH = 4
+"""Frames to each side of it in a shot of nine, the standard."""
+_STILL_CAMERA = ("still", "objects")
+_PAIR_SEED = 21
+_OPTIONAL = ("alpha", "vector")
+
+
+@dataclass(frozen=True)
+class FrameRequest:
+    """One frame of one shot.
+
+    `reach` is how many frames the shot has on each side of the middle one: under a
+    camera that stands still the part of the sample sequence depends on it. With
+    `is_truth` it is rendered to be compared with: by many samples, denoised by Cycles.
+    """
+
+    motion: str
+    samples: int
+    number: int
+    reach: int = REACH
+    is_truth: bool = False
+
+    def file_name(self, shot: Shot) -> str:
+        """A name that depends on everything the pixels depend on."""
+        import bpy
+
+        kind = "truth" if self.is_truth else "noisy"
+        length = 2 * self.reach + 1
+        of = f"of{length}" if self.motion in _STILL_CAMERA and not self.is_truth else ""
+        what = f"{self.motion}-{kind}-{self.samples}spp-{self.number:02}{of}"
+        version = bpy.app.version_string.replace(" ", "")
+        scene = f"{shot.name}-{shot.digest}-{shot.window.label}"
+        return f"{scene}-{what}-v{GENERATION}-blender{version}.npz"
+
+
+def requests(motion: str, samples: int, reach: int) -> list[FrameRequest]:
+    """All noisy frames of a shot, the middle ones first: they count most."""
+    numbers = sorted(
+        range(MIDDLE - reach, MIDDLE + reach + 1), key=lambda n: abs(n - MIDDLE)
+    )
+    return [FrameRequest(motion, samples, number, reach) for number in numbers]
+
+
+def truth(motion: str, samples: int) -> FrameRequest:
+    """The reference of the frame after the middle one, whose own is the scene's."""
+    return FrameRequest(motion, samples, MIDDLE + 1, is_truth=True)
+
+
+class ShotFrames:
+    """The frames of one scene, in memory once they are read."""
+
+    def __init__(self, shot: Shot, folder: Folder) -> None:
+        self.shot, self.folder = shot, folder
+
+    def has(self, request: FrameRequest) -> bool:
+        """Whether it was rendered."""
+        return self.folder.has(request.file_name(self.shot))
+
+    def frame(self, request: FrameRequest) -> Frame:
+        """A noisy frame as the renderer gave it; raises SceneError without one."""
+        arrays = self._read(request)
+        camera = Camera(
+            view=arrays["view"].astype(np.float64),
+            project=arrays["project"].astype(np.float64),
+            size=_pair(arrays["size"]),
+            window=_pair(arrays["corner"]),
+        )
+        return Frame(
+            number=request.number,
+            camera=camera,
+            samples=request.samples,
+            **{name: arrays[name] for name in ("radiance", "albedo", "normal")},
+            depth=arrays["depth"],
+            **{name: arrays.get(name) for name in _OPTIONAL},
+        )
+
+    def picture(self, request: FrameRequest) -> Array:
+        """The radiance (H, W, 3) of a frame; raises SceneError without one."""
+        return np.asarray(self._read(request)["radiance"])
+
+    def stops(self, request: FrameRequest) -> float:
+        """The exposure of the scene's view."""
+        return float(self._read(request)["view_exposure"])
+
+    def _read(self, request: FrameRequest) -> Arrays:
+        name = request.file_name(self.shot)
+        arrays = self.folder.read(name)
+        if arrays is None:
+            path = self.folder.directory / name
+            raise SceneError(f"{path} cannot be read: delete it and run again")
+        return arrays
+
+    def render(
+        self,
+        wanted: Sequence[FrameRequest],
+        journal: Journal,
+        done: Callable[[FrameRequest], object],
+    ) -> None:
+        """Render what is missing of `wanted`; failures go into the journal."""
+        for motion, reach in dict.fromkeys((r.motion, r.reach) for r in wanted):
+            part = [r for r in wanted if (r.motion, r.reach) == (motion, reach)]
+            left = [r for r in part if not self.has(r)]
+            left = [r for r in left if not journal.gives_up(self._named(r))]
+            if not left:
+                continue
+            with journal.attempt(f"{self.shot.name}: {motion}"):
+                self._render(left, motion, reach, journal, done)
+
+    def _named(self, request: FrameRequest) -> str:
+        return f"{self.shot.name}: {request.file_name(self.shot)}"
+
+    def _render(
+        self,
+        wanted: Sequence[FrameRequest],
+        motion: str,
+        reach: int,
+        journal: Journal,
+        done: Callable[[FrameRequest], object],
+    ) -> None:
+        scene = open_scene(self.shot.path, self.shot.window)
+        animate(scene, self.shot.window, motion, MIDDLE, reach)
+        scene.render.use_persistent_data = True  # one sync of the scene for all frames
+        exposure = np.float32(scene.view_settings.exposure)
+        for request in wanted:
+            with journal.attempt(self._named(request)):
+                scene.frame_set(request.number)
+                made = _truth if request.is_truth else _noisy
+                arrays, seconds = made(scene, request)
+                arrays["view_exposure"] = exposure
+                self.folder.write(request.file_name(self.shot), arrays, seconds)
+            done(request)
+
+
+def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
+    """One frame's samples, exactly as `xrds render` takes them for a shot."""
+    from xrds_blender.frame.job import RenderJob
+    from xrds_blender.frame.rendering import call_engine
+    from xrds_blender.shot.sampling import noisy_frame
+
+    job = RenderJob(scale=1, samples=request.samples, temporal_radius=request.reach)
+    place = request.number - (MIDDLE - request.reach)
+    frames, seconds = call_engine(scene, lambda *given: noisy_frame(*given, job, place))
+    frame = next(iter(frames.values()))
+    arrays = {
+        name: getattr(frame, name)
+        for name in ("radiance", "albedo", "normal", "depth", *_OPTIONAL)
+    }
+    camera = frame.camera
+    arrays |= {"view": camera.view, "project": camera.project}
+    arrays |= {"size": np.array(camera.size), "corner": np.array(camera.window)}
+    return {name: x for name, x in arrays.items() if x is not None}, seconds
+
+
+def _truth(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
+    from xrds_blender import run_job
+
+    made = run_job(
+        scene,
+        lambda passes: passes.beauty(
+            1, request.samples, seed=_PAIR_SEED, denoiser=DEFAULT_DENOISER
+        ),
+    )
+    return {"radiance": made.radiance}, made.seconds
+
+
+def _pair(array: Array) -> tuple[int, int]:
+    first, second = array.tolist()
+    return int(first), int(second)

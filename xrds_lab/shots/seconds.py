@@ -1,0 +1,126 @@
+"""Seconds per frame of whole frames: a shot by XRDS beside Cycles + OIDN.
+
+To be run on a quiet machine. The runs of both take turns; each figure is a median.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_core.atomic import write_json
+
+from ..bench.inputs import open_scene
+from .figures import DEFAULT, XRDS
+from .frames import MIDDLE
+from .motions import animate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from xrds_blender.frame.job import RenderJob
+    from xrds_core.temporal.frame import Stored
+
+    from ..bench.windows import Shot
+
+    Timed = dict[str, dict[str, float]]
+
+T = TypeVar("T")
+
+
+class SceneSeconds:
+    """Seconds by method, samples and radius of one scene, kept in a file."""
+
+    def __init__(self, shot: Shot, directory: Path) -> None:
+        self.shot = shot
+        self._path = directory / f"{shot.identity}-shot-seconds.json"
+        self.known: dict[str, Timed] = {}
+        if self._path.is_file():
+            self.known = json.loads(self._path.read_text("utf-8"))
+
+    def per_frame(self, method: str, samples: int, radius: int) -> float | None:
+        """Seconds of all that the user waits for, per frame; None if not timed."""
+        timed = self.known.get(str(samples), {}).get(_name(method, radius))
+        return None if timed is None else timed["total"]
+
+    def measure(self, samples: int, radii: Sequence[int], rounds: int) -> None:
+        """Time what is missing: a frame's samples, finishing it, and the rival."""
+        known = self.known.setdefault(str(samples), {})
+        left = [r for r in radii if _name(XRDS, r) not in known]
+        if left or _name(DEFAULT, 0) not in known:
+            known |= timed(self.shot, samples, left, rounds)
+            write_json(self._path, self.known)
+
+
+def timed(shot: Shot, samples: int, radii: Sequence[int], rounds: int) -> Timed:
+    """Time a panning shot of whole frames: seconds by stage, `total` and `cpu`."""
+    from xrds_blender import render
+    from xrds_blender.frame.job import RenderJob
+
+    reach = max(*radii, rounds // 2, 1)
+    scene = open_scene(shot.path, shot.window.whole)
+    animate(scene, shot.window, "pan", MIDDLE, reach)
+    job = RenderJob(scale=1, samples=samples, temporal_radius=reach)
+    plain = {"plain": True, "samples": samples, "denoiser": DEFAULT_DENOISER}
+    sampled: dict[int, Stored] = {}
+    ours, rival = [], []
+    for number in range(MIDDLE - reach, MIDDLE + reach + 1):
+        scene.frame_set(number)
+        sampled[number], clock = _clocked(lambda: _sample(scene, job))
+        ours.append(clock)
+        if abs(number - MIDDLE) <= rounds // 2:
+            rival.append(_clocked(lambda: render(scene, **plain))[1])
+    result = {_name(DEFAULT, 0): _median(rival)}
+    for radius in radii:
+        finished = _finished(sampled, replace(job, temporal_radius=radius), rounds)
+        taken = _median(ours)
+        both = {name: taken[name] + finished[name] for name in ("total", "cpu")}
+        result[_name(XRDS, radius)] = {**finished, "sample": taken["total"], **both}
+    return result
+
+
+def _sample(scene: Any, job: RenderJob) -> Stored:
+    """One frame's samples, packed as a shot keeps them."""
+    from xrds_blender.frame.rendering import call_engine
+    from xrds_blender.shot.sampling import sample_frame
+
+    made = call_engine(scene, lambda *given: sample_frame(*given, job))
+    return next(iter(made.views.values()))
+
+
+def _finished(
+    sampled: Mapping[int, Stored], job: RenderJob, rounds: int
+) -> dict[str, float]:
+    """Seconds of the middle frame's accumulation and denoising."""
+    from xrds_blender.frame.denoisers import load_denoiser
+    from xrds_blender.shot.finishing import finish
+    from xrds_core.temporal.moving import Movement
+    from xrds_core.temporal.window import Shot as Window
+
+    numbers = Window(tuple(sampled), job.temporal_radius).lenders(MIDDLE)
+    own, lenders = sampled[MIDDLE], [sampled[number] for number in numbers]
+    denoiser, movement, runs = load_denoiser(job), Movement(), []
+    for _ in range(rounds):
+        picture, clock = _clocked(lambda: finish(own, lenders, job, denoiser, movement))
+        runs.append({**picture.seconds, **clock})
+    return _median(runs)
+
+
+def _clocked(work: Callable[[], T]) -> tuple[T, dict[str, float]]:
+    wall, cpu = time.perf_counter(), time.process_time()
+    result = work()
+    clock = {"total": time.perf_counter() - wall, "cpu": time.process_time() - cpu}
+    return result, clock
+
+
+def _median(runs: Sequence[dict[str, float]]) -> dict[str, float]:
+    return {name: statistics.median(run[name] for run in runs) for name in runs[0]}
+
+
+def _name(method: str, radius: int) -> str:
+    return f"{method}-{radius}"
