@@ -34,6 +34,17 @@ def test_a_cut_lends_nothing() -> None:
     assert not survey(pair(here, there)).any()
 
 
+def test_a_sky_in_both_does_not_hide_a_cut() -> None:
+    # the wall fills less than a third; the sky around it is the same in every view
+    world, other = World(wall_half=2.0), World(wall_half=2.0, wall_z=-6.0)
+    here, there = view(0, camera(), world), view(1, camera(), other)
+    assert (here.name == 0).mean() > 0.6
+    assert not survey(pair(store(here.frame), store(there.frame))).any()
+    nothing = World(wall_half=0.0)
+    skies = [store(view(k, camera(), nothing).frame) for k in range(2)]
+    assert survey(pair(*skies)).min() == 1.0
+
+
 def test_weights_are_linear_between_tiles() -> None:
     tiles = np.array([[0.0, 1.0], [1.0, 1.0]], np.float32)
     whole = spread(tiles, (2 * TILE, 2 * TILE), slice(0, 2 * TILE))

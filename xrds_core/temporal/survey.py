@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 TILE = 64  # pixels across, of what gets one weight
 # Between the pixels looked at, along each axis, in small and in large pictures.
 _STRIDES, _LARGE = (2, 4), 1_000_000
-# Of the pixels that lie within the other frame: fewer that agree are a cut.
+# Of the hits that lie within the other frame: fewer that agree are a cut.
 _LEAST_SHARE = 1 / 3
 # Tested are tiles, 3x3 tiles, and the whole picture.
 _REACHES = (0, 1, None)
@@ -48,8 +48,7 @@ def survey(pair: Pair) -> Array:
     found, landed = still_places(pair, grid)
     still = _still(pair, spots, found.pixel)
     seen = found.seen & still
-    moved, followed = _moving(pair, step)
-    if seen.sum() + followed < _LEAST_SHARE * ((landed & still).sum() + moved):
+    if _is_cut(pair, step, spots, seen, landed & still):
         return np.zeros(tiles, np.float32)
     alike = pair.here.samples == pair.there.samples
     own = _brightness(pair.here, spots, alike)
@@ -77,6 +76,22 @@ def _hats(tiles: int, pixels: NDArray[np.integer]) -> Array:
     place = np.clip((pixels + 0.5) / TILE - 0.5, 0, tiles - 1)
     hats = 1 - np.abs(place - np.arange(tiles)[:, None])
     return np.maximum(hats, 0.0).astype(np.float32)
+
+
+def _is_cut(
+    pair: Pair, step: int, spots: NDArray[np.intp], seen: Mask, landed: Mask
+) -> bool:
+    """Tell whether too few of the spots that landed show the same.
+
+    The sky is left out, if there is anything else: every view has the same.
+    """
+    near = pair.here.nearness[spots]
+    hit = (near > 0.0) | (near < 0.0)
+    if hit.any():
+        seen, landed = seen & hit, landed & hit
+    moved, followed = _moving(pair, step)
+    asked = landed.sum() + moved
+    return bool(asked == 0 or seen.sum() + followed < _LEAST_SHARE * asked)
 
 
 def _still(pair: Pair, here: NDArray[np.intp], there: NDArray[np.int32]) -> Mask:
