@@ -1,0 +1,296 @@
+"""The measure of shots over one scene of a few pixels: made, resumed, judged."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from xrds_blender import run_job
+from xrds_blender.cycles.samples import sample_layer
+from xrds_blender.frame.rendering import call_engine
+from xrds_blender.interface.registration import ensure_registered
+from xrds_blender.planning.denoiser import CYCLES_DENOISERS
+from xrds_core.errors import SceneError, UsageError
+from xrds_core.temporal.frame import Camera, Frame
+from xrds_lab.bench.windows import Window
+from xrds_lab.shots import equal, figures, film, motions, rivals
+from xrds_lab.shots.bench import Measure, bench_shots
+from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
+from xrds_lab.shots.frames import MIDDLE, ShotFrames
+
+SIZE = (48, 36)
+WINDOW = Window(*SIZE, 0, 0, *SIZE)
+
+
+@pytest.fixture
+def blend(tmp_path: Path, still_life: Callable[..., Any]) -> Path:
+    still_life()
+    path = tmp_path / "cubes.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def run(blend: Path, out: str = "out", **more: Any) -> dict[str, Any]:
+    choices = {"motions": ("pan",), "radii": (0, 1), "pair_samples": 4} | more
+    return bench_shots(
+        [blend],
+        blend.parent / out,
+        Measure(**choices),
+        resolution=SIZE,
+        cache=blend.parent / "cache",
+        reference_samples=16,
+    )
+
+
+def gain(points: list[dict[str, Any]], motion: str, radius: int) -> float:
+    found = {
+        (p["method"], p["radius"]): p["psnr"] for p in points if p["motion"] == motion
+    }
+    return float(found[XRDS, radius] - found[DEFAULT, 0])
+
+
+@pytest.mark.timeout(300)
+def test_a_second_run_renders_nothing_and_gives_the_same_files(
+    blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = {"motions": ("pan", "still"), "equal_quality": True, "films": True}
+    first = run(blend, radii=(0, 1, 4), **asked)
+    assert first["failures"] == {}
+    points = first["shots"]
+    cases = {(p["motion"], p["method"], p["radius"]) for p in points}
+    methods = [(DEFAULT, 0), (BEST, 0), (MEDIAN, 1), (XRDS, 0), (XRDS, 1), (XRDS, 4)]
+    assert cases == {(m, *x) for m in ("pan", "still") for x in methods}
+    assert all(p["flicker"] > 0 and 0 < p["flip"] < 1 for p in points)
+    for motion in ("pan", "still"):
+        assert gain(points, motion, 4) > gain(points, motion, 1) > 0.5
+    assert [e["samples"] for e in first["equal_quality"]] == [2]
+    assert first["equal_quality"][0]["cycles_samples"] > 2.0
+    out = blend.parent / "out"
+    assert json.loads((out / "results.json").read_text()) == first
+    with (out / "results.csv").open(newline="") as file:
+        assert len(list(csv.DictReader(file))) == len(points)
+    assert "| pan, 2 | 1 | +" in (out / "report.md").read_text()
+    assert len(list(out.glob("best-cubes-*-2spp.webp"))) == 1
+
+    def refuse(*_: Any) -> None:
+        raise AssertionError("measured again")
+
+    monkeypatch.setattr(ShotFrames, "_render", refuse)
+    monkeypatch.setattr(figures, "all_metrics", refuse)
+    # what an earlier call has measured stays in the report
+    again = run(blend, "again", radii=(0,), **(asked | {"films": False}))
+    assert again == first
+    for name in ("results.json", "results.csv", "report.md"):
+        assert (out / name).read_bytes() == (blend.parent / "again" / name).read_bytes()
+
+
+def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
+    result = run(blend, radii=(0, 5), pair_samples=0, seconds=True, rounds=1)
+    assert result["failures"] == {}
+    found = {(p["method"], p["radius"]): p for p in result["shots"]}
+    assert found[XRDS, 5]["psnr"] > found[XRDS, 0]["psnr"] + 1.0
+    assert found[XRDS, 5]["flicker"] is None
+    timed = [
+        found[x]["seconds_per_frame"] for x in ((XRDS, 0), (XRDS, 5), (DEFAULT, 0))
+    ]
+    assert all(0.0 < seconds < 60.0 for seconds in timed)
+    assert "## Seconds per frame" in (blend.parent / "out/report.md").read_text()
+
+
+def test_a_shot_that_cannot_be_made_leaves_the_others(blend: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    for name in ("Red", "Mirror"):
+        bpy.data.objects.remove(bpy.data.objects[name])
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    result = run(blend, motions=("objects", "pan"), radii=(0,))
+    assert {p["motion"] for p in result["shots"]} == {"pan"}
+    assert any("no small object" in why for why in result["failures"].values())
+    assert "no small object" in (blend.parent / "out/report.md").read_text()
+
+
+def test_what_cannot_be_measured_is_wrong_usage() -> None:
+    with pytest.raises(UsageError, match="samples"):
+        Measure(samples=(0,))
+    with pytest.raises(UsageError, match="radii"):
+        Measure(radii=(-1,))
+
+
+# --- motions --------------------------------------------------------------------------
+
+
+def places(scene: Any, name: str, frames: list[int]) -> list[np.ndarray]:
+    found = []
+    for frame in frames:
+        scene.frame_set(frame)
+        graph = bpy.context.evaluated_depsgraph_get()
+        found.append(np.array(graph.objects[name].matrix_world))
+    return found
+
+
+@pytest.mark.parametrize("motion", list(motions.MOTIONS))
+def test_the_middle_frame_is_the_files_own_view(
+    still_life: Callable[..., Any], motion: str
+) -> None:
+    scene = still_life()
+    arm = bpy.data.objects.new("arm", None)
+    scene.collection.objects.link(arm)
+    scene.camera.parent = arm  # the file's camera moves by another thing
+    for frame, x in ((1, 0.0), (21, 4.0)):
+        arm.location.x = x
+        arm.keyframe_insert("location", frame=frame)
+        for name in ("Red", "Mirror"):
+            thing = scene.objects[name]
+            thing.location.z = 1.0 + 0.1 * frame
+            thing.keyframe_insert("location", frame=frame)
+    scene.frame_set(11)
+    names = ("Camera", "Red", "Mirror")
+    before = {name: places(scene, name, [11])[0] for name in names}
+    moved = motions.animate(scene, WINDOW, motion, MIDDLE, 4)
+    assert bool(moved) == (motion in {"objects", "both"})
+    expected = {"Camera": motion in {"pan", "fast", "both"}}
+    expected |= {name: name in moved for name in names[1:]}
+    for name in names:
+        first, middle, last = places(scene, name, [MIDDLE - 4, MIDDLE, MIDDLE + 4])
+        assert middle == pytest.approx(before[name], abs=1e-5)
+        assert (np.abs(last - first).max() > 1e-3) == expected[name]
+    assert not scene.render.use_motion_blur
+
+
+def test_objects_move_three_pixels_a_frame(still_life: Callable[..., Any]) -> None:
+    scene = still_life()
+    window = Window(480, 360, 0, 0, 480, 360)
+    window.apply(scene)
+    (name, *_) = motions.animate(scene, window, "objects", MIDDLE, 4)
+    here, there = (x[:3, 3] for x in places(scene, name, [MIDDLE, MIDDLE + 1]))
+    graph = bpy.context.evaluated_depsgraph_get()
+    project = scene.camera.calc_matrix_camera(graph, x=480, y=360)
+    view = project @ scene.camera.matrix_world.inverted()
+    shown = [(view @ Matrix.Translation(x)).translation for x in (here, there)]
+    depth = [(view @ Matrix.Translation(x))[3][3] for x in (here, there)]
+    pixels = [480 / 2 * x[0] / w for x, w in zip(shown, depth, strict=True)]
+    assert pixels[1] - pixels[0] == pytest.approx(3.0, rel=0.25)
+
+
+def test_an_instance_moves_by_what_instances_it(
+    still_life: Callable[..., Any],
+) -> None:
+    scene = still_life()
+    hidden = bpy.data.collections.new("wheels")
+    for name in ("Red", "Mirror"):
+        thing = scene.objects[name]
+        scene.collection.objects.unlink(thing)
+        hidden.objects.link(thing)
+    for name, x in (("left", -0.5), ("right", 0.5)):
+        carrier = bpy.data.objects.new(name, None)
+        carrier.instance_type, carrier.instance_collection = "COLLECTION", hidden
+        carrier.scale, carrier.location.x = (0.3, 0.3, 0.3), x
+        scene.collection.objects.link(carrier)
+    moved = motions.animate(scene, WINDOW, "objects", MIDDLE, 4)
+    assert set(moved) <= {"left", "right"}
+    assert moved
+
+
+def test_a_window_without_small_objects_says_so(
+    empty_scene: Callable[..., Any],
+) -> None:
+    with pytest.raises(SceneError, match="shows no small object"):
+        motions.animate(empty_scene(*SIZE, 1), WINDOW, "objects", MIDDLE, 4)
+
+
+# --- rivals and figures ---------------------------------------------------------------
+
+
+def test_cycles_denoiser_is_cycles_own(still_life: Callable[..., Any]) -> None:
+    """To the bit, in every mode: one render serves them all."""
+    scene = still_life()
+    ensure_registered()
+    made, _ = call_engine(scene, lambda *given: sample_layer(*given, samples=2, seed=5))
+    noisy = next(iter(made.values()))
+    frame = Frame(
+        0,
+        Camera(np.eye(4), np.eye(4), SIZE),
+        noisy.picture[..., :3],
+        noisy.albedo,
+        noisy.normal,
+        np.ones(SIZE[::-1], np.float32),
+    )
+
+    def render(passes: Any) -> dict[str, Any]:
+        modes = CYCLES_DENOISERS
+        return {m: passes.beauty(1, 2, seed=5, denoiser=m).radiance for m in modes}
+
+    for mode, expected in run_job(scene, render).items():
+        ours = rivals.cycles_oidn(frame, mode)
+        assert np.array_equal(ours, expected), mode
+
+
+def frames_of(colours: list[float], shift: int = 0) -> dict[int, Frame]:
+    """Even frames with a brighter column; it moves by `shift` pixels a frame."""
+    result = {}
+    for number, colour in enumerate(colours):
+        radiance = np.full((64, 64, 3), colour, np.float32)
+        radiance[:, 32 + shift * (number - 1)] += 4.0
+        vector = np.zeros((64, 64, 4), np.float32)
+        vector[..., [0, 2]] = -shift
+        result[number] = Frame(
+            number,
+            Camera(np.eye(4), np.eye(4), (64, 64)),
+            radiance,
+            np.ones((64, 64, 3), np.float32),
+            np.zeros((64, 64, 3), np.float32),
+            np.ones((64, 64), np.float32),
+            vector=vector,
+        )
+    return result
+
+
+def test_the_median_leaves_out_what_one_frame_alone_shows(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(rivals, "cycles_oidn", lambda frame: frame.radiance)
+    median = rivals.median_of_three(frames_of([1.0, 9.0, 2.0], shift=5), 1)
+    inner = median[:, 8:-8]
+    assert inner[:, :24] == pytest.approx(2.0)
+    assert median[:, 32] == pytest.approx(6.0)  # moved onto its own place
+    ends = rivals.median_of_three(frames_of([1.0, 9.0]), 1)
+    assert ends[:, 0] == pytest.approx(9.0)
+
+
+def test_flicker_counts_what_changes_beside_the_scene() -> None:
+    rng = np.random.default_rng(0)
+    truth = rng.uniform(0.2, 0.8, (2, 8, 8, 3)).astype(np.float32)
+    pictures = {MIDDLE: truth[0], MIDDLE + 1: truth[1]}
+    pair = truth[0], truth[1]
+    assert flicker(pictures.__getitem__, "pan", 0.0, pair) == 0.0
+    pictures[MIDDLE + 1] = truth[1] * 1.1
+    assert flicker(pictures.__getitem__, "pan", 0.0, pair) > 0.02
+    assert flicker(pictures.__getitem__, "pan", 0.0, None) is None
+    still = dict.fromkeys(figures.STEADY, truth[0])
+    assert flicker(still.__getitem__, "still", 0.0, None) == pytest.approx(0, abs=1e-7)
+
+
+def test_equal_samples_lie_between_those_rendered() -> None:
+    known = {1: 20.0, 2: 22.0, 4: 26.0}
+    assert equal.samples_for(22.0, known) == 2.0
+    assert equal.samples_for(24.0, known) == pytest.approx(2 * 2**0.5)
+    assert equal.samples_for(15.0, known) == 1.0
+    assert equal.samples_for(27.0, known) is None
+
+
+def test_films_show_the_largest_and_the_smallest_gain() -> None:
+    points = [
+        {"scene": s, "motion": "pan", "samples": 2, "method": m, "radius": r, "psnr": p}
+        for s, psnr in (("a", 31.0), ("b", 34.0))
+        for m, r, p in ((DEFAULT, 0, 30.0), (XRDS, 4, psnr))
+    ]
+    chosen = film.chosen(points, 2)
+    assert chosen == {"best": ("b", "pan"), "worst": ("a", "pan")}
+    assert film.chosen(points, 16) == {}
