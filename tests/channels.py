@@ -10,5 +10,5 @@ from xrds_core.arrays import Array
 
 def read_channels(path: str | Path) -> dict[str, Array]:
     """By full name, as `ViewLayer.Depth.Z`: (H, W), of all parts."""
-    file = exr._File(path)
-    return {name: file.plane(name) for name in file.channels}
+    file = exr.File(path)
+    return {name: file.plane(name) for name in file.names.names}

@@ -7,6 +7,7 @@ of the file's display window.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,8 @@ from . import exr_library
 from .arrays import Array
 from .atomic import replacing
 from .errors import PictureError
-from .exr_library import Part
-
-_COMPONENTS = ("RGB", "XYZ", "rgb", "xyz")
-_COMPOSITED = "Composite."  # Blender's layer for the output of its compositor
+from .exr_channels import Channels
+from .exr_library import Part, Window
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
     With it, where there is one, the noisy pass. Raises PictureError if the file cannot
     be read or has no such pass.
     """
-    file = _File(path)
+    file = File(path)
     radiance = file.colour(names.beauty, plain=True)
     noisy = file.colour(names.noisy) if file.has(names.noisy) else None
     return Beauty(radiance, file.alpha(names.beauty), noisy)
@@ -85,7 +84,7 @@ def read_guides(
     The radiance is that of the noisy pass or, in a file of an undenoised render, that
     of the picture. Raises PictureError if the file cannot be read or lacks a pass.
     """
-    file = _File(path)
+    file = File(path)
     radiance = None
     if full:
         noisy = names.noisy if file.has(names.noisy) else names.beauty
@@ -99,75 +98,101 @@ def write_picture(path: str | Path, channels: Mapping[str, Array]) -> None:
 
     Raises PictureError, and leaves `path` as it was, if it cannot be written.
     """
-    path = Path(path)
     planes = {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}
+    with _whole(path) as unfinished:
+        exr_library.write(unfinished, planes)
+
+
+def copy_picture(
+    source: str | Path,
+    path: str | Path,
+    channels: Mapping[str, Array],
+    *,
+    part: int = 0,
+    alone: bool = False,
+) -> None:
+    """Write `source` to `path` with other pixels in some channels of one part.
+
+    The (H, W) planes are of the part's data window. What is not in `channels` stays as
+    it is, or is left out if they stand `alone`. Raises PictureError as `write_picture`.
+    """
+    planes = {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}
+    with _whole(path) as unfinished:
+        exr_library.copy(source, unfinished, planes, part=part, alone=alone)
+
+
+def write_part(path: str | Path, part: Part) -> None:
+    """Write a file of one part; raises PictureError as `write_picture`."""
+    with _whole(path) as unfinished:
+        exr_library.write_part(unfinished, part)
+
+
+@contextmanager
+def _whole(path: str | Path) -> Iterator[Path]:
     try:
-        with replacing(path) as unfinished:
-            exr_library.write(unfinished, planes)
+        with replacing(Path(path)) as unfinished:
+            yield unfinished
     except (OSError, PictureError) as error:
         raise PictureError(f"cannot write {path}: {error}") from error
 
 
-class _File:
-    """The channels of a file by full name, as `ViewLayer.Combined.R`."""
+def display_size(path: str | Path, *, whole: bool = False) -> tuple[int, int]:
+    """Return width and height of a file's display window.
+
+    Raises PictureError where it cannot be read; for `whole`, also where pixels cannot.
+    """
+    read = exr_library.read if whole else exr_library.read_headers
+    (left, top), (right, bottom) = read(path)[0].display_window
+    return right - left + 1, bottom - top + 1
+
+
+class File:
+    """The channels of a file by full name, as `ViewLayer.Combined.R`.
+
+    Planes are of the display window, or of `window` where that is set; zero where the
+    file has no pixels. Raises PictureError if the file cannot be read.
+    """
 
     def __init__(self, path: str | Path) -> None:
         self.path = path
-        self.channels = {name: (part, pixels) for name, part, pixels in _read(path)}
+        self.parts = _read(path)
+        self._places = _places(self.parts)
+        self.names = Channels(path, self._places)
+        self.window: Window | None = None
+
+    def place(self, name: str) -> tuple[int, str]:
+        """Return the part that a channel lies in, and what it is called there."""
+        return self._places[name]
+
+    def pixels(self, name: str) -> Any:
+        """Return a channel as it lies in the file."""
+        part, own = self._places[name]
+        return self.parts[part].channels[own]
 
     def has(self, wanted: str) -> bool:
-        return self._prefix(wanted) is not None
+        return self.names.find(wanted) is not None
 
     def colour(self, wanted: str, *, plain: bool = False) -> Array:
         """Return (H, W, 3) of a pass; `plain`: or of R, G, B without a pass."""
-        prefix = self._prefix(wanted)
-        if prefix is None and plain and self._components(""):
+        prefix = self.names.find(wanted)
+        if prefix is None and plain and self.names.of(""):
             prefix = ""
         if prefix is None:
             raise PictureError(
-                f"{self.path} has no pass {wanted!r}; it holds {self._contents()}"
+                f"{self.path} has no pass {wanted!r}; it holds {self.names.contents()}"
             )
-        planes = [self.plane(name) for name in self._components(prefix)]
+        planes = [self.plane(name) for name in self.names.of(prefix)]
         return np.stack(planes, axis=-1)
 
     def alpha(self, wanted: str) -> Array | None:
         """Return alpha (H, W) of a pass, or the plain one, or None."""
-        prefix = self._prefix(wanted)
+        prefix = self.names.find(wanted)
         name = "A" if prefix is None else f"{prefix}.A"
-        return self.plane(name) if name in self.channels else None
-
-    def _prefix(self, wanted: str) -> str | None:
-        """Return the full name of the one pass that is called so, or None."""
-        prefixes = {name.rpartition(".")[0] for name in self.channels}
-        matches = [
-            prefix
-            for prefix in sorted(prefixes)
-            if f".{prefix}".endswith(f".{wanted}") and self._components(prefix)
-        ]
-        if wanted in matches:
-            return wanted
-        matches = [x for x in matches if not x.startswith(_COMPOSITED)] or matches
-        if len(matches) > 1:
-            raise PictureError(
-                f"{self.path} holds {wanted!r} in several layers: "
-                f"{', '.join(matches)}; give one of these names"
-            )
-        return matches[0] if matches else None
-
-    def _components(self, prefix: str) -> list[str]:
-        dotted = f"{prefix}." if prefix else ""
-        for letters in _COMPONENTS:
-            names = [dotted + letter for letter in letters]
-            if all(name in self.channels for name in names):
-                return names
-        return []
-
-    def _contents(self) -> str:
-        passes = {name.rpartition(".")[0] or name for name in self.channels}
-        return ", ".join(sorted(passes)) or "nothing"
+        return self.plane(name) if name in self.names.names else None
 
     def plane(self, name: str) -> Array:
-        part, pixels = self.channels[name]
+        """Return the (H, W) of one channel."""
+        part, pixels = self.parts[self.place(name)[0]], self.pixels(name)
         (left, top), (right, bottom) = part.data_window
         size = (bottom - top + 1, right - left + 1)
         if pixels.dtype.kind not in "fu" or pixels.shape != size:
@@ -175,25 +200,30 @@ class _File:
                 f"channel {name!r} of {self.path} is deep or subsampled; "
                 "save it with flat channels of full resolution"
             )
-        return _placed(pixels, part)
+        return _placed(pixels, part, self.window or part.display_window)
 
 
-def _read(path: str | Path) -> Iterator[tuple[str, Part, Any]]:
-    """Yield (full channel name, its part, pixels) of all parts of a file."""
+def _read(path: str | Path) -> list[Part]:
     if not Path(path).is_file():
         raise PictureError(f"no file {path}")
-    parts = exr_library.read(path)
-    for part in parts:
+    return exr_library.read(path)
+
+
+def _places(parts: list[Part]) -> dict[str, tuple[int, str]]:
+    """Return part and own name of each channel, by its full name."""
+    places = {}
+    for number, part in enumerate(parts):
         layer = part.name if len(parts) > 1 else ""
-        for name, pixels in part.channels.items():
+        for name in part.channels:
             # Blender repeats the part's name in its channels, others do not
             full = f"{layer}.{name}" if layer and "." not in name else name
-            yield full, part, pixels
+            places[full] = number, name
+    return places
 
 
-def _placed(pixels: Any, part: Part) -> Array:
-    """Return `pixels` of the data window in the display window, zero around."""
-    (left, top), (right, bottom) = part.display_window
+def _placed(pixels: Any, part: Part, window: Window) -> Array:
+    """Return `pixels` of the data window in another one, zero around."""
+    (left, top), (right, bottom) = window
     x, y = part.data_window[0]
     size = (bottom - top + 1, right - left + 1)
     if (x, y) == (left, top) and pixels.shape == size:

@@ -17,19 +17,15 @@ def check_output(path: Path, inputs: Iterable[str | Path] = ()) -> None:
     Makes the folder, and sweeps up what killed processes left in it. Raises
     PictureError.
     """
-    check_place(path)
-    for each in inputs:
-        if path.exists() and os.path.realpath(path) == os.path.realpath(each):
-            raise PictureError(
-                f"cannot write {path}: it is an input; choose another output"
-            )
+    check_place(path, inputs)
     check_folder(Path(os.path.realpath(path)).parent)
 
 
-def check_place(path: Path) -> None:
+def check_place(path: Path, inputs: Iterable[str | Path] = ()) -> None:
     """Raise PictureError for a path that names no file, or one not to be replaced.
 
-    Those are devices, pipes and sockets, also behind a link, and read-only files.
+    Those are devices, pipes and sockets, also behind a link, read-only files, and the
+    work's own inputs.
     """
     reason = ""
     try:
@@ -49,6 +45,11 @@ def check_place(path: Path) -> None:
         reason = str(error.strerror)
     if reason:
         raise PictureError(f"cannot write {path} ({reason}); choose another output")
+    for each in inputs:
+        if path.exists() and os.path.realpath(path) == os.path.realpath(each):
+            raise PictureError(
+                f"cannot write {path}: it is an input; choose another output"
+            )
 
 
 def check_folder(folder: Path) -> None:

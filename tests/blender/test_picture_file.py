@@ -11,6 +11,7 @@ from PIL import Image
 
 from xrds_blender.command import picture_file
 from xrds_core.errors import PictureError, UsageError, XRDSError
+from xrds_core.frames import frame_path
 
 
 @pytest.mark.parametrize(
@@ -25,7 +26,7 @@ from xrds_core.errors import PictureError, UsageError, XRDSError
     ],
 )
 def test_frame_numbers(pattern: str, frame: int, name: str) -> None:
-    assert picture_file.frame_path(pattern, frame) == Path(name)
+    assert frame_path(pattern, frame) == Path(name)
 
 
 @pytest.mark.parametrize("name", ["out.jpg", "out", "out.exr.tmp"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,24 +13,11 @@ from xrds_core import output
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
+from xrds_core.frames import frame_path
 
 from .whole_file import png_size
 
 SUFFIXES = (".exr", ".png")
-
-
-def frame_path(pattern: str, frame: int) -> Path:
-    """Put the frame number in place of the last run of #, as Blender does.
-
-    Three # are three digits at least; without # the pattern is the path.
-    """
-    runs = list(re.finditer("#+", Path(pattern).name))
-    if not runs:
-        return Path(pattern)
-    first, last = runs[-1].span()
-    name = Path(pattern).name
-    width = last - first + (frame < 0)
-    return Path(pattern).with_name(f"{name[:first]}{frame:0{width}d}{name[last:]}")
 
 
 def check_output(pattern: str, frames: Sequence[int]) -> None:

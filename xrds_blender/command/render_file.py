@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import PictureError, XRDSError
+from xrds_core.frames import frame_path
 
 from ..cycles.size import picture_size
 from ..frame.denoisers import load_denoiser
@@ -56,7 +57,7 @@ def render_file(
 
     def is_done(number: int) -> bool:
         # asked anew for each: another render may be writing the same frames
-        return resume and is_whole(picture_file.frame_path(output, number), size)
+        return resume and is_whole(frame_path(output, number), size)
 
     written, last = [], None
     for number, last in _pictures(scene, job, output, numbers, is_done):
@@ -106,7 +107,7 @@ def _picture(scene: Any, job: RenderJob, output: str, number: int) -> Picture:
     try:
         return render(scene, **vars(job))
     except NetworkFailed as error:
-        target = picture_file.frame_path(output, number)
+        target = frame_path(output, number)
         low = target.with_stem(f"{target.stem}_low")
         place = _keep(low, error.radiance, error.alpha, scene)
         raise XRDSError(f"frame {number}: {error}, {place}") from error
@@ -114,7 +115,7 @@ def _picture(scene: Any, job: RenderJob, output: str, number: int) -> Picture:
 
 def _write(scene: Any, output: str, number: int, picture: Picture) -> dict[str, Any]:
     """Write one frame; returns its entry for the JSON."""
-    target = picture_file.frame_path(output, number)
+    target = frame_path(output, number)
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated

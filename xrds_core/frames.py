@@ -1,0 +1,45 @@
+"""The files of a sequence: `frames/####.exr` and the numbers of its frames."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+
+def frame_path(pattern: str, frame: int) -> Path:
+    """Put the frame number in place of the last run of #, as Blender does.
+
+    Three # are three digits at least; without # the pattern is the path.
+    """
+    parts = _split(pattern)
+    if parts is None:
+        return Path(pattern)
+    before, digits, after = parts
+    width = digits + (frame < 0)
+    return Path(pattern).with_name(f"{before}{frame:0{width}d}{after}")
+
+
+def frame_numbers(pattern: str) -> list[int]:
+    """Return the numbers of the frames that are there, in order.
+
+    [] where there are none, also of a pattern without #.
+    """
+    parts = _split(pattern)
+    folder = Path(pattern).parent
+    if parts is None or not folder.is_dir():
+        return []
+    before, _, after = (re.escape(str(part)) for part in parts)
+    name = re.compile(f"{before}(-?[0-9]+){after}")
+    found = (name.fullmatch(path.name) for path in folder.iterdir())
+    numbers = {int(match[1]) for match in found if match}
+    return sorted(n for n in numbers if frame_path(pattern, n).is_file())
+
+
+def _split(pattern: str) -> tuple[str, int, str] | None:
+    """Return what stands before the last run of #, its length, and what follows."""
+    name = Path(pattern).name
+    runs = list(re.finditer("#+", name))
+    if not runs:
+        return None
+    first, last = runs[-1].span()
+    return name[:first], last - first, name[last:]

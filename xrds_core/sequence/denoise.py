@@ -1,0 +1,211 @@
+"""Denoising a sequence of files whose frames lend each other their samples."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import exr
+from ..errors import PictureError, UsageError
+from ..frames import frame_numbers, frame_path
+from ..output import check_folder, check_place
+from ..temporal.moving import Movement
+from ..temporal.window import Shot, slide
+from .finishing import Finished, finish_frame
+from .lenders import Lenders
+from .loading import Loader
+from .reading import FrameFile, Reading
+
+if TYPE_CHECKING:
+    from ..denoising import Denoiser
+
+RADIUS = 4
+"""Frames before and after that lend, where nobody says how many."""
+Say = Callable[[str], object]
+
+
+@dataclass(frozen=True)
+class Files:
+    """Where frames come from and go to; # stands for digits of the frame number.
+
+    `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
+    the input as well, as they are.
+    """
+
+    source: str
+    output: str
+    picture_only: bool = False
+
+    def write(self, number: int, frame: FrameFile, finished: Finished) -> Path:
+        """Write a finished frame, whole or not at all; raises PictureError."""
+        names = list("RGBA") if self.picture_only else frame.channels
+        picture = finished.picture[frame.inner]
+        planes = dict(zip(names, np.moveaxis(picture, 2, 0), strict=False))
+        path = frame_path(self.output, number)
+        exr.copy_picture(
+            frame_path(self.source, number),
+            path,
+            planes,
+            part=frame.part,
+            alone=self.picture_only,
+        )
+        return path
+
+    def is_done(self, number: int) -> bool:
+        """Whether a whole output of the input's size is there."""
+        source, output = (frame_path(x, number) for x in (self.source, self.output))
+        try:
+            size = exr.display_size(output, whole=True)
+            return not source.is_file() or size == exr.display_size(source)
+        except PictureError:
+            return False
+
+    def check(self, numbers: Sequence[int]) -> None:
+        """Refuse outputs that cannot be; make their folder."""
+        if Path(self.output).suffix.lower() != ".exr":
+            raise UsageError(f"output {self.output!r} must end in .exr")
+        if len(numbers) > 1 and "#" not in Path(self.output).name:
+            raise UsageError(
+                f"all {len(numbers)} frames would be written to {self.output!r}; add "
+                "#### for the frame number"
+            )
+        for number in numbers:
+            source, path = (frame_path(x, number) for x in (self.source, self.output))
+            check_place(path, [source])
+        check_folder(Path(self.output).parent)
+
+
+def denoise_sequence(
+    files: Files,
+    denoiser: Denoiser,
+    *,
+    frames: Iterable[int] | None = None,
+    radius: int | None = None,
+    reading: Reading | None = None,
+    resume: bool = False,
+    say: Say = lambda _: None,
+) -> dict[str, Any]:
+    """Denoise the frames of a sequence, each with its neighbours' samples, in order.
+
+    Args:
+        files: inputs and outputs.
+        frames: their numbers; all that are there by default. Others that are there
+            lend, too.
+        radius: how many frames before and after lend; by default what the files
+            recommend, or 4.
+        resume: leave outputs as they are that lie there whole and of their size.
+        say: takes a line about a frame that is finished, left out, or does not lend.
+
+    Returns:
+        {output, temporal_radius, device, frames, kept, left_out}; `left_out` are the
+        frames asked for that could not be read, with the reason.
+
+    Raises:
+        UsageError: there are no frames, or outputs that cannot be.
+        PictureError: no frame can be read, the first lacks passes, or an output cannot
+            be written; outputs before it are complete.
+    """
+    numbers = sorted(set(frames)) if frames else _all_frames(files.source)
+    files.check(numbers)
+    if "#" not in Path(files.source).name:
+        radius = radius or 0  # a frame alone
+    todo = [n for n in numbers if not (resume and files.is_done(n))]
+    loader = Loader(files.source, reading or Reading(), lends=radius != 0, say=say)
+    first = loader.first(todo)
+    if radius is None:
+        radius = RADIUS if first is None or first.radius is None else first.radius
+    lending = _beside(files.source, numbers, radius)
+    shot = Shot(tuple(todo), radius, lending=(*numbers, *lending))
+    entries = []
+    clock, lenders, movement = _Clock(), Lenders(say), Movement()
+    for number, own, beside in slide(shot, loader.load):
+        if not (resume and files.is_done(number)):  # another machine was quicker
+            others = lenders.of(number, own, beside)
+            finished = finish_frame(own.stored, others, denoiser, movement)
+            started = time.perf_counter()
+            path = files.write(number, own, finished)
+            seconds = {"read": loader.seconds(), **finished.seconds}
+            seconds["write"] = time.perf_counter() - started
+            entries.append(_entry(number, path, radius, finished, seconds))
+            left = sum(n > number and n not in loader.failed for n in todo)
+            say(f"frame {number}: {path}, {clock.lap(left)}")
+    return {
+        "output": files.output,
+        "temporal_radius": radius,
+        "device": denoiser.device,
+        "frames": entries,
+        "kept": [n for n in numbers if n not in todo],
+        "left_out": [
+            {"frame": n, "reason": why}
+            for n, why in sorted(loader.failed.items())
+            if n in todo
+        ],
+    }
+
+
+def _all_frames(pattern: str) -> list[int]:
+    if "#" not in Path(pattern).name:
+        return [0]
+    numbers = frame_numbers(pattern)
+    if not numbers:
+        raise PictureError(f"no file is called {pattern}; # are digits of its number")
+    return numbers
+
+
+def _beside(pattern: str, numbers: Sequence[int], radius: int) -> list[int]:
+    """Frames before the first and after the last that are there, to lend."""
+    steps = [b - a for a, b in pairwise(numbers)]
+    reach = radius * min(steps, default=1)
+    first, last = numbers[0] - reach, numbers[-1] + reach
+    there = [n for n in frame_numbers(pattern) if first <= n <= last]
+    return [n for n in there if not numbers[0] <= n <= numbers[-1]]
+
+
+def _entry(
+    number: int, path: Path, radius: int, finished: Finished, seconds: dict[str, float]
+) -> dict[str, Any]:
+    gathered = finished.gathered
+    return {
+        "frame": number,
+        "output": str(path),
+        "seconds": seconds | {"total": sum(seconds.values())},
+        "temporal": {
+            "radius": radius,
+            "frames": finished.frames,
+            "mean_samples": float(gathered.samples.mean()),
+            "rejected": gathered.rejected,
+        },
+        "bad_pixels": finished.denoised.bad_pixels,
+    }
+
+
+class _Clock:
+    """Tells how long a frame took, and about how long the others will take."""
+
+    def __init__(self) -> None:
+        self._done = 0
+        self._start = self._last = time.perf_counter()
+
+    def lap(self, left: int) -> str:
+        """Say so of a frame that is finished; `left` are still to come."""
+        now = time.perf_counter()
+        took, self._last = now - self._last, now
+        self._done += 1
+        if not left:
+            return f"{took:.1f} s"
+        rest = _words((now - self._start) / self._done * left)
+        return f"{took:.1f} s; {left} left, about {rest}"
+
+
+def _words(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -1,0 +1,65 @@
+"""A frame with the samples of its neighbours, denoised."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..temporal.accumulate import Accumulated, accumulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from ..arrays import Array
+    from ..denoising import Denoised, Denoiser
+    from ..temporal.frame import Stored
+    from ..temporal.moving import Movement
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A finished frame.
+
+    `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of `gathered`;
+    `frames` are the numbers of those whose samples went in, its own too; `seconds`:
+    accumulate, denoise.
+    """
+
+    denoised: Denoised
+    gathered: Accumulated
+    frames: tuple[int, ...]
+    seconds: dict[str, float]
+
+    @property
+    def picture(self) -> Array:
+        """Radiance and alpha, where there is one: (H, W, 3) or (H, W, 4)."""
+        return self.denoised.radiance
+
+
+def finish_frame(
+    own: Stored,
+    lenders: Sequence[Stored],
+    denoiser: Denoiser,
+    movement: Movement,
+    progress: Callable[[float], bool] | None = None,
+) -> Finished:
+    """Accumulate the samples of `lenders` onto a frame and denoise it once.
+
+    Raises Cancelled where `progress` says so.
+    """
+    started = time.perf_counter()
+    gathered = accumulate(own, lenders, movement)
+    accumulated = time.perf_counter()
+    noisy = gathered.radiance
+    if gathered.alpha is not None:
+        noisy = np.dstack((noisy, gathered.alpha))
+    denoised = denoiser(noisy, gathered.albedo, gathered.normal, progress=progress)
+    seconds = {
+        "accumulate": accumulated - started,
+        "denoise": time.perf_counter() - accumulated,
+    }
+    frames = tuple(sorted((own.number, *(each.number for each in lenders))))
+    return Finished(denoised, gathered, frames, seconds)

@@ -1,0 +1,80 @@
+"""The frames of a sequence, read one by one; what cannot be read is told once."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from ..errors import PictureError
+from ..frames import frame_path
+from .errors import NotLending, Unfit
+from .reading import read_frame
+
+if TYPE_CHECKING:
+    from .reading import FrameFile, Reading
+
+
+class Loader:
+    """Reads frames; `failed` are the reasons of those that cannot be, by number.
+
+    A frame that is damaged or lacks passes is left out, and the others go on without
+    it. But what the first one lacks will be lacking in all: that is raised.
+    """
+
+    def __init__(
+        self, pattern: str, reading: Reading, lends: bool, say: Callable[[str], object]
+    ) -> None:
+        self.failed: dict[int, str] = {}
+        self._pattern, self._reading = pattern, reading
+        self._lends, self._say = lends, say
+        self._ahead: dict[int, FrameFile | None] = {}
+        self._any_is_fit = False
+        self._seconds = 0.0
+
+    def first(self, numbers: Sequence[int]) -> FrameFile | None:
+        """Return the first of some frames that can be read; None if there are none.
+
+        Raises PictureError where none can be.
+        """
+        for number in numbers:
+            frame = self._ahead[number] = self.load(number)
+            if frame is not None:
+                return frame
+        if numbers:
+            others = f" (and {len(numbers) - 1} more)" if len(numbers) > 1 else ""
+            raise PictureError(f"{self.failed[numbers[0]]}{others}: no frame is left")
+        return None
+
+    def load(self, number: int) -> FrameFile | None:
+        """Return a frame; None, with a line about it, where it cannot be read."""
+        if number in self._ahead:
+            return self._ahead.pop(number)
+        started = time.perf_counter()
+        try:
+            return self._read(number)
+        except PictureError as error:
+            if isinstance(error, Unfit) and not self._any_is_fit:
+                raise
+            self.failed[number] = str(error)
+            self._say(f"frame {number} is left out: {error}")
+            return None
+        finally:
+            self._seconds += time.perf_counter() - started
+
+    def seconds(self) -> float:
+        """Return the seconds that reading took since this was asked last."""
+        seconds, self._seconds = self._seconds, 0.0
+        return seconds
+
+    def _read(self, number: int) -> FrameFile:
+        path = frame_path(self._pattern, number)
+        try:
+            frame = read_frame(path, number, self._reading, lends=self._lends)
+        except NotLending as error:
+            if not self._any_is_fit:
+                raise
+            self._say(f"frame {number} is denoised by itself: {error.reason}")
+            return read_frame(path, number, self._reading, lends=False)
+        self._any_is_fit = True
+        return frame

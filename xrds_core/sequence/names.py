@@ -1,0 +1,155 @@
+"""Which channels of a file hold what: names that renderers give to their passes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+from ..exr_channels import COMPONENTS
+from .errors import Unfit
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..exr_channels import Channels
+
+NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
+CAMERA_NORMAL = "Denoising Normal"
+# Of passes in the order in which they are looked for, in any case of letters.
+_USUAL = {
+    "beauty": (NOISY, COMBINED, "beauty", "RGBA", "rgb", "C", "Ci"),
+    "albedo": ("Denoising Albedo", "albedo", "denoise_albedo", "diffuse_albedo"),
+    "normal": (CAMERA_NORMAL, "Normal", "normals", "denoise_normal", "N", "Nn"),
+    "position": ("Position", "P", "Pworld"),
+    "depth": ("Depth", "Z", "Denoising Depth"),
+    "vector": ("Vector", "motion", "motionvector", "forward"),
+}
+_SINGLE = ("Z", "V", "R", "Y", "z", "r")
+_MOTION = ("XYZW", "RGBA", "xyzw", "XY", "RG", "xy", "rg", "UV", "uv")
+
+
+@dataclass(frozen=True)
+class PassNames:
+    """What the passes are called; None for the usual names.
+
+    A layer before them may be left out. `beauty` is the noisy radiance.
+    """
+
+    beauty: str | None = None
+    albedo: str | None = None
+    normal: str | None = None
+    position: str | None = None
+    depth: str | None = None
+    vector: str | None = None
+
+
+PASSES = tuple(field.name for field in fields(PassNames))
+
+
+@dataclass(frozen=True)
+class Found:
+    """The full names of channels of one file, of those passes that it has.
+
+    `picture` are the channels that the finished picture takes, R, G, B, and `alpha` is
+    the one that holds alpha now.
+    """
+
+    beauty: list[str]
+    albedo: list[str]
+    normal: list[str]
+    position: list[str]
+    depth: list[str]
+    vector: list[str]
+    picture: list[str]
+    alpha: str | None
+    has_camera_normal: bool
+
+
+def find(channels: Channels, names: PassNames) -> Found:
+    """Find the passes of a file.
+
+    Raises Unfit where beauty, albedo or normal is missing, or one that was asked for by
+    name; PictureError where several layers hold one.
+    """
+    beauty = _pass(channels, names, "beauty")
+    prefix = "" if beauty is None else beauty
+    here = channels.of(prefix)
+    if not here:
+        raise _missing(channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB")
+    target = _target(channels, prefix)
+    alphas = [f"{x}.A" if x else "A" for x in (prefix, target)]
+    normal = _pass(channels, names, "normal")
+    return Found(
+        beauty=here,
+        albedo=_needed(channels, names, "albedo"),
+        normal=_needed(channels, names, "normal"),
+        position=_channels(channels, names, "position"),
+        depth=_depth(channels, names),
+        vector=_channels(channels, names, "vector", _MOTION),
+        picture=channels.of(target) or ["R", "G", "B"],
+        alpha=next((x for x in alphas if x in channels.names), None),
+        has_camera_normal=(normal or "").endswith(CAMERA_NORMAL),
+    )
+
+
+def _target(channels: Channels, prefix: str) -> str:
+    """The pass that the picture of a noisy pass becomes: Cycles has two of them."""
+    layer, _, name = prefix.rpartition(".")
+    if name != NOISY:
+        return prefix
+    combined = f"{layer}.{COMBINED}" if layer else COMBINED
+    return combined if channels.of(combined) else ""
+
+
+def _pass(
+    channels: Channels,
+    names: PassNames,
+    kind: str,
+    letters: Sequence[str] = COMPONENTS,
+) -> str | None:
+    """The full name of a pass; None where there is none of the usual names."""
+    asked = getattr(names, kind)
+    if asked is not None:
+        found = channels.find(asked, letters)
+        if found is None:
+            raise _missing(channels, kind, asked)
+        return found
+    if kind == "beauty" and channels.of("") and not channels.find(NOISY):
+        return None  # plain R, G, B
+    for wanted in _USUAL[kind]:
+        found = channels.find(wanted, letters, any_case=True)
+        if found is not None:
+            return found
+    return None
+
+
+def _channels(
+    channels: Channels,
+    names: PassNames,
+    kind: str,
+    letters: Sequence[str] = COMPONENTS,
+) -> list[str]:
+    found = _pass(channels, names, kind, letters)
+    return [] if found is None else channels.of(found, letters)
+
+
+def _depth(channels: Channels, names: PassNames) -> list[str]:
+    """Depth is one channel: `Depth.Z`, or without a pass `Z`."""
+    wanted = (names.depth,) if names.depth else _USUAL["depth"]
+    usual = [x.lower() for x in wanted]
+    plain = [name for name in channels.names if name.lower() in usual]
+    return plain[:1] or _channels(channels, names, "depth", _SINGLE)
+
+
+def _needed(channels: Channels, names: PassNames, kind: str) -> list[str]:
+    found = _channels(channels, names, kind)
+    if not found:
+        raise _missing(channels, kind, getattr(names, kind) or _USUAL[kind][0])
+    return found
+
+
+def _missing(channels: Channels, kind: str, name: str) -> Unfit:
+    return Unfit(
+        f"{channels.path} has no {kind} ({name}); it holds {channels.contents()}; "
+        f"render it too, or name the pass with --{kind}"
+    )

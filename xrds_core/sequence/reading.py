@@ -1,0 +1,253 @@
+"""One frame out of an OpenEXR file, ready to lend its samples to others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..exr import File
+from ..temporal.frame import SKY_DEPTH, Camera, Frame, Stored, store
+from ..temporal.motion import centres, pixels_of
+from .cameras import from_header, told_camera
+from .errors import NotLending, Unfit
+from .names import Found, PassNames, find
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from ..arrays import Array
+    from ..exr_library import Part, Window
+
+SAMPLES, KEY, RADIUS, NAME = "xrds/samples", "xrds/key", "xrds/radius", "cameraLabel"
+"""Attributes: samples per pixel; what the frame was rendered from, in letters; the
+radius that its samples were laid out for; the camera's name."""
+_UNTOLD_SAMPLES = 16
+_FITS = 2.0  # pixels by which a Position pass may lie beside its own pixel
+_SPOTS = 4096  # pixels that are asked whether it does
+_CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # stands in where none is needed
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How files are read that do not say it themselves.
+
+    `cameras` are those of `cameras.read_cameras`; `samples` per pixel; `normal_space`
+    and `position_space` are `world` or `camera`, None for what the passes' names say;
+    `motion_scale` are the factors that make a motion pass of two channels pixels to the
+    next frame, x to the right and y upwards.
+    """
+
+    names: PassNames = field(default_factory=PassNames)
+    cameras: Mapping[int | None, dict[str, Any]] | None = None
+    samples: int | None = None
+    normal_space: str | None = None
+    position_space: str | None = None
+    motion_scale: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class FrameFile:
+    """A frame as it lies in a file.
+
+    `stored` covers the display window and all that the picture's data window has
+    beyond it; `inner` cuts the data window out of its arrays. `part` is where the
+    picture lies and `channels` are those that it takes, R, G, B and, where the file has
+    alpha, A. `key`: of equal ones the render settings are the same; "" if untold.
+    `radius`: what the file recommends, or None. `lends` is False where nobody can tell
+    where its pixels were.
+    """
+
+    stored: Stored
+    inner: tuple[slice, slice]
+    part: int
+    channels: list[str]
+    key: str
+    radius: int | None
+    lends: bool
+
+
+def read_frame(
+    path: Path, number: int, reading: Reading, *, lends: bool = True
+) -> FrameFile:
+    """Read a frame; without `lends`, no camera and no depth is needed.
+
+    Raises Unfit, NotLending among them, with the path and the remedy, and PictureError
+    for a file that is not whole.
+    """
+    file = File(path)
+    found = find(file.names, reading.names)
+    number_of_part, channels = _target(file, found)
+    part = file.parts[number_of_part]
+    file.window = _union(part.data_window, part.display_window)
+    camera = _camera(file, part, number, reading)
+    depth = None
+    if camera is not None:
+        depth = _depth(file, found, camera, reading)
+    if lends and (camera is None or depth is None):
+        lacking = "camera" if camera is None else "depth"
+        raise NotLending(f"{path} has no {lacking}", _REMEDY[lacking])
+    beauty = _stack(file, found.beauty)
+    frame = Frame(
+        number=number,
+        camera=camera or _CENTRE,
+        radiance=beauty,
+        albedo=_stack(file, found.albedo),
+        normal=_normal(file, found, camera, reading),
+        depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
+        samples=_samples(part, reading),
+        alpha=file.plane(found.alpha) if found.alpha else None,
+        vector=_vector(file, found, reading),
+    )
+    return FrameFile(
+        stored=store(frame, np.float16),
+        inner=_inner(file.window, part.data_window),
+        part=number_of_part,
+        channels=channels,
+        key=str(part.attributes.get(KEY, "")),
+        radius=part.attributes.get(RADIUS),
+        lends=camera is not None and depth is not None,
+    )
+
+
+_REMEDY = {
+    "camera": "give --camera cameras.json, or --temporal-radius 0 to denoise each "
+    "frame by itself",
+    "depth": "render Position or Depth too, name it with --position or --depth, or "
+    "give --temporal-radius 0",
+}
+
+
+def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | None:
+    """The camera that the options tell, or else the header."""
+    (left, top), (right, bottom) = part.display_window
+    size = (right - left + 1, bottom - top + 1)
+    told = part.attributes
+    if reading.cameras is not None:
+        aspect = told.get("pixelAspectRatio", 1.0)
+        camera = told_camera(reading.cameras, number, size, aspect)
+    else:
+        try:
+            camera = from_header(told, size)
+        except ValueError as error:
+            raise Unfit(
+                f"{file.path}: its worldToCamera and worldToNDC cannot be used "
+                f"({error}); give --camera cameras.json"
+            ) from error
+    if camera is None or file.window is None:
+        return None
+    (x, y), _ = file.window
+    return replace(camera, window=(x - left, y - top))
+
+
+def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array | None:
+    """Depth (H, W) along the camera's axis, infinite without a hit."""
+    position, depth = found.position, found.depth
+    if depth and position and _is_half(file, position):
+        position = []  # half floats tell a place in the world by centimetres
+    if not position:
+        return _from_depth(file.plane(depth[0])) if depth else None
+    points = _stack(file, position)
+    points[~np.isfinite(points).all(axis=-1)] = 0.0
+    if reading.position_space == "camera":
+        return _from_depth(points[..., 2])
+    result = camera.depth(points)
+    _check_fit(file, camera, points, result)
+    return result
+
+
+def _from_depth(depth: Array) -> Array:
+    """Renderers write 0, infinity or a huge number where there is no hit."""
+    depth = np.abs(depth)
+    with np.errstate(invalid="ignore"):
+        hit = (depth > 0.0) & (depth < SKY_DEPTH)
+    return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
+
+
+def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
+    """Raise PictureError where the camera does not show positions at their pixels."""
+    seen = np.flatnonzero(np.isfinite(depth.ravel()) & (depth.ravel() > 0.0))
+    if not seen.size:
+        return
+    spots = seen[:: max(1, seen.size // _SPOTS)]
+    world = points.reshape(-1, 3)[spots].astype(np.float64)
+    there = pixels_of(camera) @ np.column_stack((world, np.ones(len(world)))).T
+    x, y = centres(spots, depth.shape[1])
+    apart = np.hypot(there[0] / there[2] - x, there[1] / there[2] - y)
+    off = float(np.median(apart))
+    if not off < _FITS:
+        raise Unfit(
+            f"{file.path}: its camera shows the Position pass {off:.0f} pixels beside "
+            "its pixels; give another --camera, --position-space camera, or "
+            "--temporal-radius 0"
+        )
+
+
+def _normal(file: File, found: Found, camera: Camera | None, reading: Reading) -> Array:
+    """Normals in the camera's axes, Z away from the viewer, as Cycles' guides."""
+    normal = _stack(file, found.normal)
+    space = reading.normal_space
+    if space is None:
+        space = "camera" if found.has_camera_normal else "world"
+    if space == "camera" or camera is None:
+        return normal
+    turn = np.diag([1.0, 1.0, -1.0]) @ camera.view[:3, :3]
+    return normal @ turn.T.astype(np.float32)
+
+
+def _vector(file: File, found: Found, reading: Reading) -> Array | None:
+    """Cycles' Vector pass, or one of it: motion is taken to be even around a frame."""
+    if not found.vector:
+        return None
+    motion = _stack(file, found.vector)
+    if motion.shape[-1] == 2:
+        motion = motion * np.array(reading.motion_scale, np.float32)
+        return -np.concatenate((motion, motion), axis=-1)
+    return motion
+
+
+def _samples(part: Part, reading: Reading) -> int:
+    """Samples per pixel: as asked for, or as XRDS or Blender wrote them."""
+    if reading.samples:
+        return reading.samples
+    told = [part.attributes.get(SAMPLES, 0)]
+    told += [v for k, v in part.attributes.items() if _is_cycles_samples(k)]
+    counts = [int(x) for x in told if str(x).isdigit() and int(x) > 0]
+    return counts[0] if counts else _UNTOLD_SAMPLES
+
+
+def _is_cycles_samples(name: str) -> bool:
+    return name.startswith("cycles.") and name.endswith(".samples")
+
+
+def _target(file: File, found: Found) -> tuple[int, list[str]]:
+    """Return the part that takes the picture, and its channels' names there."""
+    there = found.picture[0] in file.names.names
+    part, first = file.place(found.picture[0] if there else found.beauty[0])
+    names = [file.place(x)[1] for x in found.picture] if there else found.picture
+    if found.alpha is not None:
+        names = [*names, f"{first.rpartition('.')[0]}.A".lstrip(".") if there else "A"]
+    return part, names
+
+
+def _stack(file: File, names: list[str]) -> Array:
+    return np.stack([file.plane(name) for name in names], axis=-1)
+
+
+def _is_half(file: File, names: list[str]) -> bool:
+    return any(file.pixels(name).dtype == np.float16 for name in names)
+
+
+def _union(one: Window, two: Window) -> Window:
+    (a, b), (c, d) = one
+    (e, f), (g, h) = two
+    return (min(a, e), min(b, f)), (max(c, g), max(d, h))
+
+
+def _inner(whole: Window, part: Window) -> tuple[slice, slice]:
+    """Where a data window lies in the arrays of a larger one: rows, columns."""
+    (left, top), _ = whole
+    (x, y), (right, bottom) = part
+    return slice(y - top, bottom - top + 1), slice(x - left, right - left + 1)
