@@ -141,6 +141,7 @@ def display_size(path: str | Path, *, whole: bool = False) -> tuple[int, int]:
 
     Raises PictureError where it cannot be read; for `whole`, also where pixels cannot.
     """
+    _check_file(path)
     read = exr_library.read if whole else exr_library.read_headers
     (left, top), (right, bottom) = read(path)[0].display_window
     return right - left + 1, bottom - top + 1
@@ -204,9 +205,13 @@ class File:
 
 
 def _read(path: str | Path) -> list[Part]:
+    _check_file(path)
+    return exr_library.read(path)
+
+
+def _check_file(path: str | Path) -> None:
     if not Path(path).is_file():
         raise PictureError(f"no file {path}")
-    return exr_library.read(path)
 
 
 def _places(parts: list[Part]) -> dict[str, tuple[int, str]]:

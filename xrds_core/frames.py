@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 
@@ -33,6 +34,17 @@ def frame_numbers(pattern: str) -> list[int]:
     found = (name.fullmatch(path.name) for path in folder.iterdir())
     numbers = {int(match[1]) for match in found if match}
     return sorted(n for n in numbers if frame_path(pattern, n).is_file())
+
+
+def in_words(numbers: Sequence[int]) -> str:
+    """Say frame numbers, which are in order, as 1-24, 30."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and runs[-1][-1] == number - 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(f"{x[0]}-{x[-1]}" if len(x) > 1 else f"{x[0]}" for x in runs)
 
 
 def _split(pattern: str) -> tuple[str, int, str] | None:

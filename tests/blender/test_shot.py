@@ -17,7 +17,8 @@ from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
-from xrds_blender.shot import finishing, shot
+from xrds_blender.shot import shot
+from xrds_core.sequence import finishing
 
 FRAMES = [1, 2, 3, 4, 5]
 

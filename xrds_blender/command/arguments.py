@@ -19,12 +19,26 @@ def positive(text: str) -> int:
     return value
 
 
+def whole(text: str) -> int:
+    """A whole number, 0 or above."""
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{value} must be at least 0")
+    return value
+
+
 def factor(text: str) -> float:
     """A number above 0."""
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} must be a number above 0")
     return value
+
+
+def pair(text: str) -> tuple[float, float]:
+    """Two numbers, such as 1,-1."""
+    first, second = (float(part) for part in text.split(","))
+    return first, second
 
 
 def factors(text: str) -> tuple[float, ...]:

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 from xrds_core import atomic
 
-from . import console, info, render, upscale
+from . import console, denoise, info, render, upscale
 
 AddCommand = Callable[[Any], argparse.ArgumentParser]
 
@@ -42,9 +42,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as end:  # argparse has printed why
         return int(end.code or 0)
     if not options.json:
-        return console.status_of(lambda: _print_lines(options))
+        return console.status_of(lambda: _run(options, _print_lines(options)))
     with console.stdout_for_json() as write:
-        return console.status_of(lambda: write(options.work(options)))
+        return console.status_of(lambda: _run(options, write))
 
 
 def program() -> NoReturn:
@@ -53,10 +53,20 @@ def program() -> NoReturn:
     console.leave(main())
 
 
-def _print_lines(options: argparse.Namespace) -> None:
+def _run(options: argparse.Namespace, show: Callable[[Any], None]) -> None:
+    """Do the work and show its result; a command's `check` may then find it wanting."""
     result = options.work(options)
-    for line in options.lines(result) if result else ():
-        print(line)
+    show(result)
+    if "check" in options:
+        options.check(result)
+
+
+def _print_lines(options: argparse.Namespace) -> Callable[[Any], None]:
+    def show(result: Any) -> None:
+        for line in options.lines(result) if result else ():
+            print(line)
+
+    return show
 
 
 class _Parser(argparse.ArgumentParser):
@@ -96,7 +106,13 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         dest="command", required=True, metavar="COMMAND", title="commands"
     )
     apart = _Apart(commands)
-    added = (render.add_render, render.add_plan, upscale.add_upscale, info.add_info)
+    added = (
+        render.add_render,
+        render.add_plan,
+        denoise.add_denoise,
+        upscale.add_upscale,
+        info.add_info,
+    )
     for command in (
         *(add(commands) for add in added),
         *(add(apart) for add in _laboratory()),

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xrds_core.temporal.accumulate import accumulate
+from xrds_core.sequence.finishing import finish_frame
 from xrds_core.temporal.frame import Stored
 from xrds_core.temporal.moving import Movement
 
@@ -33,26 +32,22 @@ def finish(
 
     Raises Cancelled where `progress` says so.
     """
-    started = time.perf_counter()
-    gathered = accumulate(own, lenders, movement)
-    accumulated = time.perf_counter()
-    noisy = np.dstack((gathered.radiance, gathered.alpha))
-    denoised = denoiser(noisy, gathered.albedo, gathered.normal, progress=progress)
-    seconds = {
-        "accumulate": accumulated - started,
-        "denoise": time.perf_counter() - accumulated,
-    }
-    frames = tuple(sorted((own.number, *(each.number for each in lenders))))
+    finished = finish_frame(own, lenders, denoiser, movement, progress)
+    gathered = finished.gathered
     temporal = Temporal(
-        job.temporal_radius, frames, float(gathered.samples.mean()), gathered.rejected
+        job.temporal_radius,
+        finished.frames,
+        float(gathered.samples.mean()),
+        gathered.rejected,
     )
+    decision = _decision(finished.frames)
     return Picture(
-        radiance=np.ascontiguousarray(denoised.radiance[..., :3]),
-        alpha=np.ascontiguousarray(denoised.radiance[..., 3]),
+        radiance=np.ascontiguousarray(finished.picture[..., :3]),
+        alpha=np.ascontiguousarray(finished.picture[..., 3]),
         albedo=gathered.albedo,
         normal=gathered.normal,
-        seconds=seconds,
-        plan=(*job.plan().decisions, _decision(frames), prefilter(denoised)),
+        seconds=finished.seconds,
+        plan=(*job.plan().decisions, decision, prefilter(finished.denoised)),
         peak_memory=peak_memory(),
         device=denoiser.device,
         temporal=temporal,

@@ -52,7 +52,7 @@ def from_header(attributes: Mapping[str, Any], size: tuple[int, int]) -> Camera 
     view = _matrix(attributes[VIEW]).T
     if PROJECT in attributes:
         return Camera(_AHEAD @ view, _matrix(attributes[PROJECT]).T, size)
-    seen: Matrix = _matrix(attributes[NDC]).T @ np.linalg.inv(view)
+    seen: Matrix = _matrix(attributes[NDC]).T @ _inverse(view)
     perspective = abs(seen[3, 2]) > _SKEW * abs(seen[3, 3])
     turned: Matrix = _AHEAD if not perspective or seen[3, 2] > 0 else np.eye(4)
     return Camera(turned @ view, _project(seen @ turned, perspective), size)
@@ -131,13 +131,17 @@ def _told_camera(
         project[2, 2], project[2, 3], project[3, 2] = -1.0, -1.0, -1.0
         project[:2, 2] = shift
     project[0, 0], project[1, 1] = across, across * width / height
-    return Camera(np.linalg.inv(_matrix(told["to_world"])), project, size)
+    return Camera(_inverse(_matrix(told["to_world"])), project, size)
 
 
 def _matrix(rows: Any) -> Matrix:
     matrix = np.array(rows, np.float64)
     if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
         raise ValueError("a matrix has not 4 rows of 4 numbers")
+    return matrix
+
+
+def _inverse(matrix: Matrix) -> Matrix:
     if abs(np.linalg.det(matrix[:3, :3])) < 1e-30:
         raise ValueError("a matrix has no inverse")
-    return matrix
+    return np.asarray(np.linalg.inv(matrix))

@@ -45,8 +45,7 @@ class Files:
     def write(self, number: int, frame: FrameFile, finished: Finished) -> Path:
         """Write a finished frame, whole or not at all; raises PictureError."""
         names = list("RGBA") if self.picture_only else frame.channels
-        picture = finished.picture[frame.inner]
-        planes = dict(zip(names, np.moveaxis(picture, 2, 0), strict=False))
+        planes = dict(zip(names, np.moveaxis(finished.picture, 2, 0), strict=False))
         path = frame_path(self.output, number)
         exr.copy_picture(
             frame_path(self.source, number),
@@ -117,7 +116,10 @@ def denoise_sequence(
         radius = radius or 0  # a frame alone
     todo = [n for n in numbers if not (resume and files.is_done(n))]
     loader = Loader(files.source, reading or Reading(), lends=radius != 0, say=say)
+    loader.look(numbers)
     first = loader.first(todo)
+    if first is None and len(todo) == len(numbers):
+        raise PictureError(f"no frame can be read: {loader.failed[todo[0]]}")
     if radius is None:
         radius = RADIUS if first is None or first.radius is None else first.radius
     lending = _beside(files.source, numbers, radius)
@@ -127,7 +129,9 @@ def denoise_sequence(
     for number, own, beside in slide(shot, loader.load):
         if not (resume and files.is_done(number)):  # another machine was quicker
             others = lenders.of(number, own, beside)
-            finished = finish_frame(own.stored, others, denoiser, movement)
+            finished = finish_frame(
+                own.stored, others, denoiser, movement, region=own.inner
+            )
             started = time.perf_counter()
             path = files.write(number, own, finished)
             seconds = {"read": loader.seconds(), **finished.seconds}

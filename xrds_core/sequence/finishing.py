@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 class Finished:
     """A finished frame.
 
-    `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of `gathered`;
+    `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of `gathered`,
+    or the region of it that was asked for;
     `frames` are the numbers of those whose samples went in, its own too; `seconds`:
     accumulate, denoise.
     """
@@ -45,10 +46,13 @@ def finish_frame(
     denoiser: Denoiser,
     movement: Movement,
     progress: Callable[[float], bool] | None = None,
+    *,
+    region: tuple[slice, slice] | None = None,
 ) -> Finished:
     """Accumulate the samples of `lenders` onto a frame and denoise it once.
 
-    Raises Cancelled where `progress` says so.
+    `region`, rows and columns, is what is denoised: black around a crop would tell the
+    denoiser a wrong exposure. Raises Cancelled where `progress` says so.
     """
     started = time.perf_counter()
     gathered = accumulate(own, lenders, movement)
@@ -56,7 +60,10 @@ def finish_frame(
     noisy = gathered.radiance
     if gathered.alpha is not None:
         noisy = np.dstack((noisy, gathered.alpha))
-    denoised = denoiser(noisy, gathered.albedo, gathered.normal, progress=progress)
+    passes = [noisy, gathered.albedo, gathered.normal]
+    if region is not None:
+        passes = [np.ascontiguousarray(each[region]) for each in passes]
+    denoised = denoiser(*passes, progress=progress)
     seconds = {
         "accumulate": accumulated - started,
         "denoise": time.perf_counter() - accumulated,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from ..errors import PictureError
-from ..frames import frame_path
+from ..frames import frame_path, in_words
 from .errors import NotLending, Unfit
 from .reading import read_frame
 
@@ -32,18 +32,23 @@ class Loader:
         self._any_is_fit = False
         self._seconds = 0.0
 
-    def first(self, numbers: Sequence[int]) -> FrameFile | None:
-        """Return the first of some frames that can be read; None if there are none.
+    def look(self, numbers: Sequence[int]) -> None:
+        """Tell of frames that have no file, all in one line."""
+        paths = {n: frame_path(self._pattern, n) for n in numbers}
+        missing = {n: path for n, path in paths.items() if not path.is_file()}
+        self.failed |= {n: f"no file {path}" for n, path in missing.items()}
+        self._ahead |= dict.fromkeys(missing)
+        if missing:
+            which = in_words(sorted(missing))
+            first = next(iter(missing.values()))
+            self._say(f"left out for want of a file, as {first}: frames {which}")
 
-        Raises PictureError where none can be.
-        """
+    def first(self, numbers: Sequence[int]) -> FrameFile | None:
+        """Return the first of some frames that can be read; None if none can."""
         for number in numbers:
             frame = self._ahead[number] = self.load(number)
             if frame is not None:
                 return frame
-        if numbers:
-            others = f" (and {len(numbers) - 1} more)" if len(numbers) > 1 else ""
-            raise PictureError(f"{self.failed[numbers[0]]}{others}: no frame is left")
         return None
 
     def load(self, number: int) -> FrameFile | None:

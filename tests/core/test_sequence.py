@@ -1,0 +1,378 @@
+"""Shots of OpenEXR files: what is read, lent, written, left out and carried on."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+import pytest
+import sequences
+import shots
+from sequences import CYCLES, frame, picture, write
+
+pytest.importorskip("mitsuba_oidn")
+
+from xrds_core import exr
+from xrds_core.denoising import Denoiser
+from xrds_core.errors import PictureError, UsageError
+from xrds_core.sequence.denoise import Files, denoise_sequence
+from xrds_core.sequence.errors import NotLending, Unfit
+from xrds_core.sequence.finishing import finish_frame
+from xrds_core.sequence.names import PassNames
+from xrds_core.sequence.reading import Reading, read_frame
+from xrds_core.temporal.frame import store
+from xrds_core.temporal.moving import Movement
+
+NUMBERS = range(1, 6)
+
+
+@pytest.fixture(scope="module")
+def denoiser() -> Denoiser:
+    return Denoiser("fast", "cpu", threads=1)
+
+
+@pytest.fixture
+def shot(tmp_path: Path) -> Path:
+    """Five frames, as Cycles writes them."""
+    for number in NUMBERS:
+        write(tmp_path / "in", frame(number))
+    return tmp_path
+
+
+def denoise(shot: Path, denoiser: Denoiser, out: str = "out", **more: Any) -> Any:
+    source = more.pop("source", "in/####.exr")
+    files = Files(
+        str(shot / source), str(shot / out / "####.exr"), **more.pop("to", {})
+    )
+    return denoise_sequence(files, denoiser, **more)
+
+
+def finished(numbers: Any, own: int, denoiser: Denoiser) -> Any:
+    """What the same frames give without files."""
+    stored = {n: store(frame(n), np.float16) for n in numbers}
+    near = sorted((n for n in numbers if n != own), key=lambda n: (abs(n - own), n))
+    lenders = [stored[n] for n in near]
+    return finish_frame(stored[own], lenders, denoiser, Movement()).picture
+
+
+def test_files_give_the_picture_that_frames_in_memory_give(
+    shot: Path, denoiser: Denoiser
+) -> None:
+    told = denoise(shot, denoiser)
+    assert [entry["frame"] for entry in told["frames"]] == list(NUMBERS)
+    assert told["frames"][2]["temporal"]["frames"] == tuple(NUMBERS)
+    ours = picture(shot / "out" / "0003.exr")
+    np.testing.assert_allclose(ours, finished(NUMBERS, 3, denoiser), atol=2e-3)
+    truth = shots.view(3, frame(3).camera).colour
+    denoise(shot, denoiser, "alone", radius=0)
+    alone = picture(shot / "alone" / "0003.exr")
+    assert np.abs(ours - truth).mean() < 0.8 * np.abs(alone - truth).mean()
+
+
+def test_chunks_give_the_frames_that_one_go_gives(
+    shot: Path, denoiser: Denoiser
+) -> None:
+    """Frames beyond a chunk's ends lend, as they are there."""
+    denoise(shot, denoiser, radius=2)
+    for chunk in ([4, 5], [1, 2], [3]):
+        denoise(shot, denoiser, "chunks", radius=2, frames=chunk)
+    for number in NUMBERS:
+        name = f"{number:04d}.exr"
+        whole, part = (picture(shot / x / name) for x in ("out", "chunks"))
+        np.testing.assert_array_equal(whole, part)
+
+
+# --- passes and their names -----------------------------------------------------------
+
+FLAT = {"radiance": "RGB", "albedo": "albedo.RGB", "normal": "N.XYZ", "depth": "Z"}
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        FLAT,
+        FLAT | {"depth": "depth.Z"},
+        FLAT | {"radiance": "ViewLayer.Combined.RGB", "albedo": "VL.Albedo.RGB"},
+        FLAT | {"position": "P.XYZ", "depth": "other.Z"},
+        FLAT | {"position": "ViewLayer.Position.XYZ", "depth": "other.Z"},
+    ],
+    ids=lambda names: "-".join(names.values()),
+)
+def test_usual_names_are_known(tmp_path: Path, names: dict[str, str]) -> None:
+    own = frame(1)
+    view = shots.view(1, own.camera)
+    point = np.where(view.name[..., None] == 0, 0.0, view.point).astype(np.float32)
+    world = own.normal * [1, 1, -1] @ own.camera.view[:3, :3]
+    path = write(tmp_path, own, names, normal=world, position=point)
+    told = read_frame(path, 1, Reading()).stored
+    expected = store(own, np.float16)
+    np.testing.assert_allclose(told.picture, expected.picture, atol=1e-3)
+    np.testing.assert_allclose(told.nearness, expected.nearness, rtol=1e-5)
+
+
+def test_other_names_can_be_told(tmp_path: Path) -> None:
+    names = {"radiance": "light.RGB", "albedo": "a.RGB", "normal": "n.RGB"}
+    path = write(tmp_path, frame(1), names | {"depth": "far.R"})
+    with pytest.raises(Unfit, match=r"no beauty .* a, far, light, n; .*--beauty"):
+        read_frame(path, 1, Reading())
+    told = PassNames(beauty="light", albedo="a", normal="n", depth="far")
+    asked = Reading(told, normal_space="camera")
+    np.testing.assert_array_equal(
+        read_frame(path, 1, asked).stored.nearness, store(frame(1)).nearness
+    )
+    with pytest.raises(Unfit, match=r"no vector \(flow\)"):
+        read_frame(path, 1, replace(asked, names=replace(told, vector="flow")))
+
+
+def test_positions_in_camera_space(tmp_path: Path) -> None:
+    own = frame(2)
+    point = np.zeros((*own.shape, 3), np.float32)
+    point[..., 2] = -own.depth
+    names = FLAT | {"position": "P.XYZ", "depth": "other.Z"}
+    path = write(tmp_path, own, names, position=point)
+    told = read_frame(path, 1, Reading(position_space="camera")).stored
+    np.testing.assert_allclose(told.nearness, store(own).nearness)
+
+
+def test_a_camera_that_positions_belie_is_refused(tmp_path: Path) -> None:
+    own = frame(1)
+    names = FLAT | {"position": "P.XYZ"}
+    moved = shots.view(1, shots.camera(x=3.0)).point
+    path = write(tmp_path, own, names, position=moved)
+    with pytest.raises(Unfit, match="pixels beside"):
+        read_frame(path, 1, Reading())
+
+
+def test_motion_of_two_channels_is_cycles_vector_of_even_motion(tmp_path: Path) -> None:
+    motion = np.random.default_rng(0).normal(size=(*frame(1).shape, 2))
+    path = write(tmp_path, frame(1), CYCLES | {"motion": "motion.RG"}, motion=motion)
+    told = read_frame(path, 1, Reading(motion_scale=(2.0, -1.0))).stored.vector
+    ahead = (motion * [2.0, -1.0]).reshape(-1, 2)
+    np.testing.assert_allclose(told, -np.tile(ahead, 2), atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("header", "count"),
+    [({}, 16), ({"cycles.ViewLayer.samples": "64"}, 64), ({"xrds/samples": 3}, 3)],
+)
+def test_samples_per_pixel(tmp_path: Path, header: Any, count: int) -> None:
+    path = write(tmp_path, frame(1), header=header)
+    assert read_frame(path, 1, Reading(), lends=False).stored.samples == count
+    asked = read_frame(path, 1, Reading(samples=8), lends=False)
+    assert asked.stored.samples == 8
+
+
+# --- what is written ------------------------------------------------------------------
+
+
+def test_other_channels_and_the_header_are_carried_on(
+    tmp_path: Path, denoiser: Denoiser
+) -> None:
+    """Of files of several parts, too; a picture keeps the number format it had."""
+    own = frame(1)
+    ids = np.arange(own.depth.size, dtype=np.uint32).reshape(own.depth.shape)
+    half = {
+        k: v.astype(np.float16)
+        for k, v in sequences.planes(vars(own), {"radiance": "V.Combined.RGB"}).items()
+    }
+    guides = sequences.planes(vars(own), {k: CYCLES[k] for k in ("albedo", "normal")})
+    about = {"type": OpenEXR.scanlineimage, "owner": "a studio"}
+    parts = [
+        OpenEXR.Part(dict(about), {"id": ids}, "V.ids"),
+        OpenEXR.Part(dict(about), half, "V.Combined"),
+        OpenEXR.Part(
+            dict(about),
+            {k: np.ascontiguousarray(v) for k, v in guides.items()},
+            "V.guides",
+        ),
+    ]
+    OpenEXR.File(parts).write(str(tmp_path / "1.exr"))
+    files = Files(str(tmp_path / "1.exr"), str(tmp_path / "out.exr"))
+    denoise_sequence(files, denoiser)
+    old, new = (exr.File(path) for path in (tmp_path / "1.exr", tmp_path / "out.exr"))
+    assert [part.name for part in new.parts] == ["V.ids", "V.Combined", "V.guides"]
+    assert all(part.attributes["owner"] == "a studio" for part in new.parts)
+    assert new.names.names.keys() == old.names.names.keys()
+    for name in old.names.names:
+        assert new.pixels(name).dtype == old.pixels(name).dtype
+        same = np.array_equal(new.pixels(name), old.pixels(name))
+        assert same != ("Combined" in name)
+
+
+def test_the_picture_alone(shot: Path, denoiser: Denoiser) -> None:
+    denoise(shot, denoiser, frames=[3])
+    denoise(shot, denoiser, "alone", frames=[3], to={"picture_only": True})
+    file = exr.File(shot / "alone" / "0003.exr")
+    assert set(file.names.names) == set("RGB")
+    assert "worldToCamera" in file.parts[0].attributes
+    np.testing.assert_array_equal(
+        picture(shot / "alone" / "0003.exr"), picture(shot / "out" / "0003.exr")
+    )
+
+
+@pytest.mark.parametrize(
+    ("window", "shape"),
+    [((-8, -6), (60, 80)), ((10, 4), (30, 40)), ((-8, 10), (30, 60))],
+    ids=["overscan", "cropped", "both"],
+)
+def test_data_windows(
+    tmp_path: Path, denoiser: Denoiser, window: tuple[int, int], shape: tuple[int, int]
+) -> None:
+    """A picture keeps its window; what lies beyond the display window lends, too."""
+    for number in NUMBERS:
+        write(tmp_path / "in", frame(number, window=window, shape=shape))
+    told = denoise(tmp_path, denoiser)
+    path = tmp_path / "out" / "0003.exr"
+    (part,) = exr.File(path).parts
+    (left, top), (right, bottom) = part.data_window
+    assert (left, top) == window
+    assert (bottom - top + 1, right - left + 1) == shape
+    assert part.display_window == sequences.WINDOW
+    stored = {n: store(frame(n, window=window, shape=shape)) for n in NUMBERS}
+    others = [stored[n] for n in (2, 4, 1, 5)]
+    expected = finish_frame(stored[3], others, denoiser, Movement())
+    assert told["frames"][2]["temporal"]["mean_samples"] > 1.5
+    inside = (slice(8, -8), slice(8, -8))  # the denoiser looks beyond a crop's edges
+    difference = np.abs(picture(path) - expected.picture)[inside]
+    assert np.median(difference) < 2e-3
+
+
+# --- frames that are not as they should be --------------------------------------------
+
+
+def damage(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[:-500])
+
+
+def shrink(path: Path) -> None:
+    small = frame(int(path.stem), shape=(24, 32))
+    camera = replace(small.camera, size=(32, 24))
+    height, width = small.shape
+    window = ((0, 0), (width - 1, height - 1))
+    channels = sequences.planes(vars(small), CYCLES)
+    header = sequences.cameras.to_header(camera)
+    exr.write_part(path, exr.Part("", window, window, channels, header))
+
+
+def without_guides(path: Path) -> None:
+    write(path.parent, frame(int(path.stem)), {"radiance": CYCLES["radiance"]})
+
+
+def without_camera(path: Path) -> None:
+    write(path.parent, frame(int(path.stem)), header={})
+
+
+@pytest.mark.parametrize(
+    ("harm", "line", "is_left_out"),
+    [
+        (Path.unlink, "left out for want of a file, as .*0003.exr: frames 3$", True),
+        (damage, "frame 3 is left out: .* is not a complete OpenEXR file", True),
+        (without_guides, "frame 3 is left out: .* has no albedo", True),
+        (without_camera, "frame 3 is denoised by itself: .* has no camera", False),
+        (shrink, "lend nothing to each other: their sizes are", False),
+    ],
+)
+def test_a_bad_frame_is_told_and_the_others_go_on(
+    shot: Path, denoiser: Denoiser, harm: Any, line: str, is_left_out: bool
+) -> None:
+    harm(shot / "in" / "0003.exr")
+    said: list[str] = []
+    told = denoise(shot, denoiser, frames=NUMBERS, say=said.append)
+    (about,) = [x for x in said if "exr, " not in x]
+    assert re.search(line, about)
+    done = [entry["frame"] for entry in told["frames"]]
+    assert done == [1, 2, 4, 5] if is_left_out else list(NUMBERS)
+    assert [x["frame"] for x in told["left_out"]] == [3] * is_left_out
+    lent = {e["frame"]: e["temporal"]["frames"] for e in told["frames"]}
+    assert lent[2] == (1, 2, 4, 5)
+    ours = picture(shot / "out" / "0002.exr")
+    expected = finished([1, 2, 4, 5], 2, denoiser)
+    np.testing.assert_allclose(ours, expected, atol=2e-3)
+
+
+def test_what_the_first_frame_lacks_ends_the_work(
+    shot: Path, denoiser: Denoiser
+) -> None:
+    for path in (shot / "in").iterdir():
+        without_camera(path)
+    with pytest.raises(NotLending, match=r"has no camera; give --camera .*-radius 0"):
+        denoise(shot, denoiser)
+    assert not list((shot / "out").iterdir())
+    told = denoise(shot, denoiser, radius=0)
+    assert len(told["frames"]) == 5
+
+
+def test_nothing_to_do(tmp_path: Path, denoiser: Denoiser) -> None:
+    with pytest.raises(PictureError, match="no file is called"):
+        denoise(tmp_path, denoiser)
+    with pytest.raises(PictureError, match=r"no frame can be read: no .*0001\.exr"):
+        denoise(tmp_path, denoiser, frames=[1, 2, 3])
+
+
+def test_nan_in_one_frame_reaches_no_picture(shot: Path, denoiser: Denoiser) -> None:
+    bad = frame(3)
+    radiance, depth = bad.radiance.copy(), bad.depth.copy()
+    radiance[10:14, 10:20], depth[20:24, 30:40] = np.nan, np.nan
+    write(shot / "in", replace(bad, radiance=radiance, depth=depth))
+    denoise(shot, denoiser)
+    for number in NUMBERS:
+        ours = picture(shot / "out" / f"{number:04d}.exr")
+        assert np.isfinite(ours).all()
+        truth = shots.view(number, frame(number).camera).colour
+        assert np.abs(ours - truth).mean() < 0.05
+
+
+def test_frames_of_another_render_lend_nothing(shot: Path, denoiser: Denoiser) -> None:
+    for number in (4, 5):
+        own = frame(number)
+        told = {**sequences.cameras.to_header(own.camera), "xrds/key": "other"}
+        write(shot / "in", own, header=told)
+    said: list[str] = []
+    told = denoise(shot, denoiser, say=said.append)
+    lent = [entry["temporal"]["frames"] for entry in told["frames"]]
+    assert lent == [(1, 2, 3)] * 3 + [(4, 5)] * 2
+    assert sum("other settings" in line for line in said) == 2
+
+
+# --- resuming -------------------------------------------------------------------------
+
+
+def test_resume_makes_what_is_missing_the_same(shot: Path, denoiser: Denoiser) -> None:
+    denoise(shot, denoiser)
+    out = shot / "out"
+    whole = {path.name: path.read_bytes() for path in out.iterdir()}
+    (out / "0002.exr").unlink()
+    damage(out / "0004.exr")
+    kept = (out / "0003.exr").stat().st_mtime_ns
+    told = denoise(shot, denoiser, resume=True)
+    assert told["kept"] == [1, 3, 5]
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == whole
+    assert (out / "0003.exr").stat().st_mtime_ns == kept
+    assert not denoise(shot, denoiser, resume=True)["frames"]
+
+
+def test_a_frame_says_how_long_the_others_will_take(
+    shot: Path, denoiser: Denoiser
+) -> None:
+    said: list[str] = []
+    denoise(shot, denoiser, say=said.append)
+    assert "4 left, about " in said[0]
+    assert "left" not in said[-1]
+
+
+@pytest.mark.parametrize(
+    ("output", "error"),
+    [("out.exr", UsageError), ("o_#.png", UsageError), ("in/####.exr", PictureError)],
+)
+def test_outputs_that_cannot_be(
+    shot: Path, denoiser: Denoiser, output: str, error: type[Exception]
+) -> None:
+    before = (shot / "in" / "0001.exr").read_bytes()
+    files = Files(str(shot / "in" / "####.exr"), str(shot / output))
+    with pytest.raises(error):
+        denoise_sequence(files, denoiser)
+    assert (shot / "in" / "0001.exr").read_bytes() == before

@@ -1,0 +1,138 @@
+"""`xrds denoise`: a shot that lies in EXR files, without Blender or PyTorch."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from xrds_core.errors import XRDSError
+from xrds_core.frames import in_words
+from xrds_core.sequence.names import PASSES, PassNames
+
+from ..frame.job import QUALITIES
+from . import arguments
+
+SPACES = ("camera", "world")
+
+
+def add_denoise(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds denoise`."""
+    command = commands.add_parser(
+        "denoise", help="denoise frames that lie in EXR files, as a shot"
+    )
+    add = command.add_argument
+    add("source", metavar="IN.exr", help="noisy frames; #### is the frame number")
+    add("-o", "--output", required=True, metavar="OUT.exr", help="denoised frames")
+    add(
+        "--frames",
+        type=arguments.frames,
+        metavar="A-B",
+        help="first and last frame, such as 1-24 (default: all that are there)",
+    )
+    add(
+        "--temporal-radius",
+        type=arguments.whole,
+        metavar="N",
+        help="frames before and after that lend their samples (default: 4)",
+    )
+    add(
+        "--denoise",
+        choices=QUALITIES,
+        default="high",
+        help="quality of the denoiser (default: high)",
+    )
+    add("--resume", action="store_true", help="skip frames whose files are complete")
+    add(
+        "--picture-only",
+        action="store_true",
+        help="write R, G, B and A alone, not the input's other channels",
+    )
+    add("--device", default="auto", help="of the denoiser: auto, cpu, cuda, metal")
+    add(
+        "--memory-limit",
+        type=arguments.size_in_bytes,
+        help="memory for the denoiser, such as 500M or 4G",
+    )
+    _add_reading(command)
+    command.set_defaults(work=_denoise, lines=_lines, check=_check)
+    return command
+
+
+def _add_reading(command: argparse.ArgumentParser) -> None:
+    """Add how files are read that do not say it themselves."""
+    group = command.add_argument_group("passes, where they have unusual names")
+    for name in PASSES:
+        group.add_argument(f"--{name}", metavar="NAME", help=_PASS_HELP[name])
+    add = command.add_argument_group("what files may not tell").add_argument
+    add("--camera", type=Path, metavar="FILE.json", help="cameras, by frame number")
+    add(
+        "--samples",
+        type=arguments.positive,
+        help="per pixel (default: as the file says, or 16)",
+    )
+    add(
+        "--normal-space", choices=SPACES, help="(default: world but for Cycles' guides)"
+    )
+    add("--position-space", choices=SPACES, help="(default: world)")
+    add(
+        "--motion-scale",
+        type=arguments.pair,
+        metavar="X,Y",
+        help="factors that make a motion pass of two channels pixels to the next "
+        "frame, x to the right and y upwards",
+    )
+
+
+_PASS_HELP = {
+    "beauty": "noisy radiance",
+    "albedo": "albedo",
+    "normal": "normals",
+    "position": "place of the first hit",
+    "depth": "depth along the camera's axis",
+    "vector": "motion",
+}
+
+
+def _denoise(options: argparse.Namespace) -> dict[str, Any]:
+    from xrds_core.denoising import Denoiser
+    from xrds_core.sequence.cameras import read_cameras
+    from xrds_core.sequence.denoise import Files, denoise_sequence
+    from xrds_core.sequence.reading import Reading
+
+    reading = Reading(
+        PassNames(**{name: getattr(options, name) for name in PASSES}),
+        cameras=read_cameras(options.camera) if options.camera else None,
+        samples=options.samples,
+        normal_space=options.normal_space,
+        position_space=options.position_space,
+        motion_scale=options.motion_scale or (1.0, 1.0),
+    )
+    denoiser = Denoiser(
+        options.denoise, options.device, memory_limit=options.memory_limit
+    )
+    return denoise_sequence(
+        Files(options.source, options.output, options.picture_only),
+        denoiser,
+        frames=options.frames,
+        radius=options.temporal_radius,
+        reading=reading,
+        resume=options.resume,
+        say=lambda line: print(line, file=sys.stderr, flush=True),
+    )
+
+
+def _lines(result: dict[str, Any]) -> list[str]:
+    kept = f"; {len(result['kept'])} skipped, complete" if result["kept"] else ""
+    return [f"{result['output']}: {len(result['frames'])} frames denoised{kept}"]
+
+
+def _check(result: dict[str, Any]) -> None:
+    """Fail, after all that could be done, where a frame asked for is not there."""
+    missing = [each["frame"] for each in result["left_out"]]
+    if missing:
+        raise XRDSError(
+            f"frames {in_words(missing)} could not be read and were left out; render "
+            "them again, then denoise with --resume"
+        )
