@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from xrds_blender.planning import plan
+from xrds_blender.planning.lending import lending
 
 FACTS = plan.Facts(
     scale=4,
@@ -65,3 +66,30 @@ def test_a_panorama_says_that_it_is_resampled() -> None:
 def test_what_one_session_saved_is_the_second_sync() -> None:
     assert plan.after(1.5, 0.5)[0].saving_seconds == 1.0
     assert plan.after(0.5, 0.6)[0].saving_seconds == 0.0
+
+
+def test_the_plan_of_a_shot_names_what_lends_less() -> None:
+    quiet = replace(
+        FACTS.scene,
+        motion_blur=False,
+        volumes=False,
+        hair=False,
+        smooth=False,
+        depth_of_field=False,
+    )
+
+    def lent(cuts: tuple[int, ...] = (), **more: object) -> dict[str, str]:
+        scene = replace(quiet, **more)
+        found = lending(replace(FACTS, scene=scene), 3, cuts)
+        assert all(each.reason for each in found)
+        return {each.decision: each.value for each in found}
+
+    assert lent() == {"accumulation": "3 frames to each side"}
+    assert lent(motion_blur=True, volumes=True)["left out by pixel"] == (
+        "motion blur, volumes"
+    )
+    assert lent(moving=(), volumes=True) == {"accumulation": "3 frames to each side"}
+    assert lent(cuts=(9, 5))["cuts"] == "frame 5, 9"
+    assert lent(cuts=tuple(range(9)))["cuts"] == "frame 0, 1, 2, 3, 4, 5 and 3 more"
+    panorama = lending(replace(FACTS, exact_camera=False), 3)
+    assert [each.value for each in panorama] == ["none"]

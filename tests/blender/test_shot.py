@@ -173,7 +173,8 @@ def test_a_cancelled_shot_keeps_the_frames_before(
         ("--scale 1 --frames 1-3 --temporal-radius 2", 2),
         ("--scale 1 --frames 1-3 --temporal-radius 0", 0),
         ("--scale 1 --frame 1", 0),
-        ("--scale 2 --frames 1-3", 0),
+        ("--scale 2 --frames 1-3", 4),
+        ("--scale 2 --guides full --frames 1-3", 0),
         ("--plain --frames 1-3", 0),
     ],
 )
@@ -185,9 +186,9 @@ def test_the_radius_by_default(line: str, radius: int) -> None:
 
 
 def test_a_radius_that_cannot_be_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
-    words = "render a.blend -o b_#.exr --scale 2 --frames 1-3 --temporal-radius 1"
+    words = "render a.blend -o b_#.exr --plain --frames 1-3 --temporal-radius 1"
     assert main.main(words.split()) == 2
-    assert "--temporal-radius needs --scale 1" in capfd.readouterr().err
+    assert "--temporal-radius cannot be had with --plain" in capfd.readouterr().err
 
 
 # --- Blender's own animation renders --------------------------------------------------
@@ -246,20 +247,21 @@ def test_passes_are_those_of_the_frame(animation: Any, blend: Path) -> None:
 
 def test_frames_in_steps_lend_in_steps(animation: Any, blend: Path) -> None:
     from xrds_blender.shot import animation as module
+    from xrds_blender.shot import method
 
     seen = []
-    finish = module.finish
+    finish = method.finish
 
     def look(own: Any, lenders: Any, *rest: Any) -> Any:
         seen.append(sorted([own.number, *(each.number for each in lenders)]))
         return finish(own, lenders, *rest)
 
     animation.frame_step = 2
-    module.finish = look
+    method.finish = look
     try:
         bpy.ops.render.render(animation=True)
     finally:
-        module.finish = finish
+        method.finish = finish
     assert seen == [[1, 3, 5]] * 3
     assert not module._windows
 
@@ -282,7 +284,7 @@ def test_frames_by_number_are_rendered_by_themselves(
     monkeypatch.setattr("sys.argv", ["blender", "-b", "shot.blend", "-f", "1..5"])
     rendered = []
     monkeypatch.setattr(
-        "xrds_blender.shot.animation.sample_frame", lambda *_: rendered.append(1)
+        "xrds_blender.shot.method.sample_frame", lambda *_: rendered.append(1)
     )
     animation.frame_end = 2
     bpy.ops.render.render(animation=True)
@@ -296,3 +298,83 @@ def test_a_panorama_is_rendered_frame_by_frame(blend: Path) -> None:
     bpy.ops.wm.save_mainfile()
     result = render(blend, "pano", frames=[1, 2])
     assert [frame["temporal"] for frame in result["frames"]] == [None, None]
+
+
+# --- Cuts ----------------------------------------------------------------------------
+
+
+def with_second_camera(scene: Any) -> None:
+    """The same view again from frame 3 on, by a camera of another name."""
+    second = scene.camera.copy()
+    scene.collection.objects.link(second)
+    for frame, camera in ((1, scene.camera), (3, second)):
+        scene.timeline_markers.new("cut", frame=frame).camera = camera
+
+
+def test_across_a_cut_nothing_is_lent(blend: Path) -> None:
+    with_second_camera(bpy.context.scene)
+    bpy.ops.wm.save_mainfile()
+    result = render(blend, "whole")
+    lent = [frame["temporal"]["frames"] for frame in result["frames"]]
+    assert lent == [(1, 2), (1, 2), (3, 4, 5), (3, 4, 5), (3, 4, 5)]
+    render(blend, "after", frames=[3, 4, 5])
+    for number in (3, 4, 5):
+        whole, after = (blend.parent / n / f"{number}.exr" for n in ("whole", "after"))
+        assert np.array_equal(picture(whole), picture(after))
+
+
+def test_an_animation_knows_its_cuts(animation: Any, blend: Path) -> None:
+    with_second_camera(animation)
+    bpy.ops.render.render(animation=True)
+    animation.frame_start = 3
+    animation.render.filepath = str(blend.parent / "after" / "#.exr")
+    bpy.ops.render.render(animation=True)
+    for number in (3, 4, 5):
+        whole, after = (blend.parent / n / f"{number}.exr" for n in ("f12", "after"))
+        assert np.array_equal(combined(whole), combined(after))
+
+
+# --- A camera that stands still ------------------------------------------------------
+
+
+@pytest.mark.parametrize("moves", [False, True])
+def test_continued_frames_keep_passes_of_one_sample(
+    animation: Any, blend: Path, moves: bool
+) -> None:
+    """Depth is the frame's own though most frames begin late in their sequence."""
+    animation.camera.animation_data_clear()
+    animation.view_layers[0].use_pass_z = True
+    if moves:
+        cube = bpy.data.objects["Red"]
+        for frame in (1, 5):
+            cube.location.x = -1.0 - 0.2 * frame
+            cube.keyframe_insert("location", frame=frame)
+    bpy.ops.render.render(animation=True)
+    animation.render.engine = "CYCLES"
+    for number in (1, 2, 5):
+        animation.frame_set(number)
+        animation.render.filepath = str(blend.parent / f"own{number}.exr")
+        bpy.ops.render.render(write_still=True)
+        ours, own = (
+            next(p for n, p in layers(blend.parent / path).items() if "Depth.Z" in n)
+            for path in (f"f12/{number}.exr", f"own{number}.exr")
+        )
+        np.testing.assert_allclose(ours, own, rtol=1e-3)
+
+
+def test_an_animation_continues_the_sequence_of_the_command(
+    animation: Any, blend: Path
+) -> None:
+    animation.camera.animation_data_clear()
+    animation.view_layers[0].use_pass_z = False
+    lamp = bpy.data.lights["Lamp"]
+    for frame in (1, 5):
+        lamp.energy = 100 + 20 * frame
+        lamp.keyframe_insert("energy", frame=frame)
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.render.render(animation=True)
+    render(blend, "command")
+    for number in FRAMES:
+        ours = combined(blend.parent / "f12" / f"{number}.exr")
+        theirs = picture(blend.parent / "command" / f"{number}.exr")
+        np.testing.assert_allclose(ours, theirs, atol=2e-3)

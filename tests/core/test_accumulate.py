@@ -270,3 +270,26 @@ def test_agreement_of_noise_and_of_light() -> None:
 def test_brightness_bears_negative_light() -> None:
     assert brightness(np.array([[-1.0, -1.0, -1.0]], np.float32))[0] == 0.0
     assert brightness(np.ones((2, 3), np.float32)) == pytest.approx(1.0)
+
+
+def test_where_nothing_moves_every_sample_counts() -> None:
+    """Noise that makes other frames disagree, and no depth: nothing need be asked."""
+    frames = [view(n, camera(), noise=3.0).frame for n in range(1, 6)]
+    frames = [replace(f, depth=np.full_like(f.depth, np.nan)) for f in frames]
+    asked = [store(f) for f in frames]
+    still = [store(replace(f, still=True)) for f in frames]
+    assert accumulate(asked[0], asked[1:]).samples.mean() < 2.0
+    found = accumulate(still[0], still[1:])
+    assert (found.samples == 5.0).all()
+    assert found.rejected == 0.0
+    mean = np.mean([f.radiance for f in frames], axis=0)
+    np.testing.assert_allclose(found.radiance, mean, rtol=1e-4, atol=1e-5)
+
+
+def test_where_nothing_moves_bad_pixels_lend_nothing() -> None:
+    frames = [replace(view(n, camera()).frame, still=True) for n in (1, 2, 3)]
+    frames[1].radiance[3, 4] = np.nan
+    first, *rest = map(store, frames)
+    found = accumulate(first, rest)
+    assert found.samples[3, 4] == 2.0
+    assert np.isfinite(found.radiance).all()

@@ -55,8 +55,8 @@ def add_job(command: argparse.ArgumentParser) -> None:
         "--temporal-radius",
         type=int,
         metavar="N",
-        help="frames before and after that lend their samples, at scale 1 "
-        "(default: 4 for several frames)",
+        help="frames before and after that lend their samples (default: 4 for several "
+        "frames)",
     )
     add(
         "--guide-samples",
@@ -133,12 +133,21 @@ def job_of(options: argparse.Namespace) -> RenderJob:
 def _temporal_radius(options: argparse.Namespace) -> int:
     """The radius asked for; by default one that pays, where frames can lend."""
     asked: int | None = options.temporal_radius
-    full_size = options.scale == 1 and not (options.plain or options.time_budget)
+    hindrance = _hindrance(options)
     if asked is not None:
-        if asked and not full_size:
-            raise UsageError(
-                "--temporal-radius needs --scale 1: other scales cannot yet"
-            )
+        if asked and hindrance:
+            raise UsageError(f"--temporal-radius cannot be had with {hindrance}")
         return asked
     several = len(getattr(options, "frames", None) or ()) > 1
-    return RADIUS if several and full_size else 0
+    return RADIUS if several and not hindrance else 0
+
+
+def _hindrance(options: argparse.Namespace) -> str:
+    """The option under which frames cannot lend to each other; empty if they can."""
+    if options.plain:
+        return "--plain: Cycles renders each frame alone"
+    if options.time_budget or options.quality:
+        return "--time-budget or --quality: they choose settings for each frame"
+    if options.scale > 1 and options.guides == "full":
+        return "--guides full: frames lend fast guides alone"
+    return ""

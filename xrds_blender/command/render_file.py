@@ -94,8 +94,11 @@ def _pictures(
     is_done: Callable[[int], bool],
 ) -> Iterator[tuple[int, Picture]]:
     """Number and picture of every frame that is not done."""
-    if job.temporal_radius and len(numbers) > 1 and can_lend(scene):
-        yield from render_shot(scene, job, numbers, is_done)
+    if job.temporal_radius and len(numbers) > 1 and can_lend(scene, job):
+        try:
+            yield from render_shot(scene, job, numbers, is_done)
+        except NetworkFailed as error:
+            raise _kept(error, scene, output, error.number or 0) from error
         return
     for number in numbers:
         if not is_done(number):
@@ -107,10 +110,15 @@ def _picture(scene: Any, job: RenderJob, output: str, number: int) -> Picture:
     try:
         return render(scene, **vars(job))
     except NetworkFailed as error:
-        target = frame_path(output, number)
-        low = target.with_stem(f"{target.stem}_low")
-        place = _keep(low, error.radiance, error.alpha, scene)
-        raise XRDSError(f"frame {number}: {error}, {place}") from error
+        raise _kept(error, scene, output, number) from error
+
+
+def _kept(error: NetworkFailed, scene: Any, output: str, number: int) -> XRDSError:
+    """The error that ends the command, with what was rendered in a file."""
+    target = frame_path(output, number)
+    low = target.with_stem(f"{target.stem}_low")
+    place = _keep(low, error.radiance, error.alpha, scene)
+    return XRDSError(f"frame {number}: {error}, {place}")
 
 
 def _write(scene: Any, output: str, number: int, picture: Picture) -> dict[str, Any]:

@@ -8,15 +8,14 @@ of the render settings, and all of it is given back.
 
 from __future__ import annotations
 
-import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.temporal.samples import Portion
 
 from ..planning.denoiser import Denoiser
 from ..planning.plan import GuideRender
@@ -24,9 +23,11 @@ from . import session
 from .borrowed import Borrowed, PipelineSettings
 from .guide_settings import guide_settings
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
+from .low_samples import LowPlace, LowSamples
 from .pass_names import ALBEDO, COMBINED, DEPTH, GUIDE_PASSES, NOISY, NORMAL, is_light
 from .rendered import Beauty, Guides, InProcess
-from .settings import set_box_filter, set_denoising, set_sampling
+from .samples import read_geometry, read_samples
+from .settings import set_box_filter, set_denoising, set_portion, set_sampling
 from .size import border_start, frame_size
 
 # The tiny whole frame that a border render takes its exposure from.
@@ -39,11 +40,17 @@ class CyclesPasses:
     Any number of `beauty` and `guides` calls, in any order. Raises Cancelled when the
     user stops the render and SceneError when this Blender keeps its render settings
     in an unknown way. On exit every setting is as before. `noisy` and `depth` ask for
-    what the file's own passes may not give.
+    what the file's own passes may not give, `geometry` for passes of `samples`.
     """
 
     def __init__(
-        self, engine: Any, depsgraph: Any, *, noisy: bool = False, depth: bool = False
+        self,
+        engine: Any,
+        depsgraph: Any,
+        *,
+        noisy: bool = False,
+        depth: bool = False,
+        geometry: Sequence[tuple[str, str]] = (),
     ) -> None:
         self._engine, self._depsgraph = engine, depsgraph
         self._scene = depsgraph.scene_eval
@@ -53,6 +60,8 @@ class CyclesPasses:
         self._render = engine.path_resolve("render")
         self._borrowed = Borrowed()
         self._extra = [(DEPTH, "Z")] * depth + [(NOISY, "RGBA")] * noisy
+        self._extra += geometry
+        self._geometry = {name for name, _ in geometry}
         self.peak_memory = 0
         render, result = self._render, engine.get_result()
         self.width, self.height = frame_size(render)
@@ -134,22 +143,40 @@ class CyclesPasses:
         in_process: InProcess | None = None,
     ) -> dict[str, Beauty]:
         """As `beauty`, for every view by name (one without stereo)."""
-        in_process = in_process if denoise else None
-        denoise = denoise and in_process is None and session.has_denoiser()
+        if denoise and in_process is not None:
+            low = self.low_samples(scale, samples, seed=seed)
+            return {view: each.denoised(in_process) for view, each in low.items()}
+        denoise = denoise and session.has_denoiser()
         grid = self._grid(scale)
         with Borrowed() as borrowed:
             set_sampling(borrowed, self._scene, samples, seed)
             set_denoising(borrowed, self._scene, self._layer_eval, denoise, denoiser)
             clock = self._run_low(borrowed, grid)
         seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
-        if in_process is not None:
-            return {
-                view: self._denoised_beauty(view, grid, in_process, seconds)
-                for view in self.views
-            }
         return {
             view: self._read_beauty(view, grid, denoise, seconds) for view in self.views
         }
+
+    def low_samples(
+        self,
+        scale: int,
+        samples: int | None = None,
+        *,
+        seed: int | None = None,
+        portion: Portion | None = None,
+    ) -> dict[str, LowSamples]:
+        """Render as `beauties`, and leave the noise in.
+
+        `portion` is of a longer sequence, in the place of samples and seed. Depth and
+        vectors are there as far as `geometry` asked for them.
+        """
+        grid = self._grid(scale)
+        with Borrowed() as borrowed:
+            self._set_samples(borrowed, samples, seed, portion)
+            set_denoising(borrowed, self._scene, self._layer_eval, False)
+            clock = self._run_low(borrowed, grid)
+        seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
+        return {view: self._read_low(view, grid, seconds) for view in self.views}
 
     def border_exposure(self) -> float | None:
         """The exposure of the whole frame, where a border cuts a part out of it.
@@ -223,12 +250,16 @@ class CyclesPasses:
         full: bool = False,
         seed: int | None = None,
         how: GuideRender | None = None,
+        portion: Portion | None = None,
     ) -> dict[str, Guides]:
-        """As `guides`, for every view by name; `how` names what may be left out."""
+        """As `guides`, for every view by name; `how` names what may be left out.
+
+        `portion` is of a longer sequence, in the place of samples and seed.
+        """
         how = how or GuideRender(shadows=False)
         settings = nullcontext() if full else guide_settings(self._depsgraph, how)
         with Borrowed() as borrowed, settings:
-            set_sampling(borrowed, self._scene, samples, seed)
+            self._set_samples(borrowed, samples, seed, portion)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             clock = self._run((self.width, self.height), self.region, exact=full)
         seconds = {"sync": clock.sync, "guides": clock.render}
@@ -244,6 +275,18 @@ class CyclesPasses:
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             clock = self._run_low(borrowed, self._grid(scale), exact=False)
         return {"sync": clock.sync, "guides": clock.render}
+
+    def _set_samples(
+        self,
+        borrowed: Borrowed,
+        samples: int | None,
+        seed: int | None,
+        portion: Portion | None,
+    ) -> None:
+        if portion is None:
+            set_sampling(borrowed, self._scene, samples, seed)
+        else:
+            set_portion(borrowed, self._scene, portion)
 
     def _cameras(self) -> list[Any]:
         import bpy
@@ -328,24 +371,27 @@ class CyclesPasses:
             {name: low(pixels) for name, pixels in self._light_passes(view)},
         )
 
-    def _denoised_beauty(
-        self, view: str, grid: LowGrid, denoise: InProcess, seconds: dict[str, float]
-    ) -> Beauty:
-        """Denoise before resampling: interpolated noise would count as texture."""
-        rendered = grid.rendered(self._size)
-        beauty = self._read_beauty(view, grid, False, seconds)
-        corners = [self._radiance(view, False)]
-        corners += [self._read(name, view) for name in (ALBEDO, NORMAL)]
-        noisy, albedo, normal = (self._read_corner(x, rendered) for x in corners)
-        started = time.perf_counter()
-        picture = grid.resample(denoise(noisy, albedo, normal), rendered)
-        spent = time.perf_counter() - started
-        return replace(
-            beauty,
-            radiance=picture[..., :3].copy(),
-            noisy=beauty.radiance,
-            seconds=seconds | {"denoise": spent},
-        )
+    def _read_low(
+        self, view: str, grid: LowGrid, seconds: dict[str, float]
+    ) -> LowSamples:
+        window = grid.rendered(self._size)
+
+        def read(name: str) -> Array | None:
+            pixels = self._read(name, view)
+            return None if pixels is None else self._read_corner(pixels, window)
+
+        others = {
+            name: grid.resample(self._read_corner(pixels, window), window)
+            for name, pixels in self._light_passes(view)
+        }
+        samples = read_samples(read, self._geometry)
+        offset = grid.offset(self.region)
+        place = LowPlace(grid, window, offset, others, dict(seconds))
+        return LowSamples(samples, place)
+
+    def geometry(self, view: str) -> tuple[Array, Array | None]:
+        """Depth (H, W) and vectors (H, W, 4) or None, of the last full-size render."""
+        return read_geometry(lambda name: self._read(name, view), self._geometry)
 
     def _light_passes(self, view: str) -> Iterator[tuple[str, Array]]:
         for name in self.pass_names():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +20,8 @@ GEOMETRY = ((FIRST_HIT, "Z"), (MOTION, "XYZW"))
 LATE_DEPTH = (DEPTH, "Z")
 """In the place of the first hit's depth where a sequence is continued: that one is
 written by its first sample alone."""
+Reader = Callable[[str], Array | None]
+"""Pixels (H, W, channels) of a pass by name, None where there is none."""
 
 
 @dataclass(frozen=True)
@@ -63,20 +65,29 @@ def sample_layer(
     views = [view.name for view in result.views] or [""]
     layer, size = result.layers[layer_name], (result.resolution_x, result.resolution_y)
     wanted = {name for name, _ in geometry}
-    return {view: _read(layer, view, size, wanted) for view in views}, clock
+
+    def reader(view: str) -> Reader:
+        return lambda name: session.read_pass(layer, name, view, size)
+
+    return {view: read_samples(reader(view), wanted) for view in views}, clock
 
 
-def _read(layer: Any, view: str, size: tuple[int, int], wanted: set[str]) -> Samples:
-    def read(name: str) -> Array:
-        pixels = session.read_pass(layer, name, view, size)
-        assert pixels is not None
-        return np.ascontiguousarray(pixels)
-
+def read_samples(read: Reader, wanted: Collection[str]) -> Samples:
+    """What `read` gives of a noisy render; `wanted` are names of `geometry`."""
     # Without its denoiser Cycles leaves Combined black where there is Noisy Image.
-    picture = read(NOISY if NOISY in layer.passes else COMBINED)
-    depth = read(FIRST_HIT)[..., 0] if FIRST_HIT in wanted else None
+    noisy = read(NOISY)
+    picture = read(COMBINED) if noisy is None else noisy
+    passes = [picture, read(ALBEDO), read(NORMAL)]
+    depth, vector = read_geometry(read, wanted) if wanted else (None, None)
+    return Samples(*(np.ascontiguousarray(x) for x in passes), depth, vector)
+
+
+def read_geometry(read: Reader, wanted: Collection[str]) -> tuple[Array, Array | None]:
+    """Depth (H, W) and vectors (H, W, 4) where they are among `wanted`."""
+    depth = read(DEPTH if DEPTH in wanted else FIRST_HIT)
+    assert depth is not None
+    depth = np.ascontiguousarray(depth[..., 0])
     if DEPTH in wanted:
-        depth = read(DEPTH)[..., 0]
         depth = np.where(depth > 0.0, depth, np.float32(np.inf))  # 0 is the sky
     vector = read(MOTION) if MOTION in wanted else None
-    return Samples(picture, read(ALBEDO), read(NORMAL), depth, vector)
+    return depth, None if vector is None else np.ascontiguousarray(vector)

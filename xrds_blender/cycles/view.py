@@ -2,23 +2,43 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from xrds_core.temporal.frame import Camera
 
+from ..planning.forecast import low_size
+from .borrowed import Borrowed
 from .size import border_start, frame_size, picture_size
 
 
-def camera_of(depsgraph: Any, render: Any) -> Camera | None:
-    """The camera of a render; None for one that no matrix describes, as a panorama.
+def cameras_of(engine: Any, depsgraph: Any) -> dict[str, Camera]:
+    """The cameras of a render by view; without stereo there is one view.
 
-    `render` is the pipeline's own copy of the render settings.
+    Empty under a camera that no matrix describes, as a panorama.
     """
     camera = depsgraph.scene_eval.camera
     if camera is None or camera.data.type not in {"PERSP", "ORTHO"}:
-        return None
+        return {}
+    # The method of this name hides the property, so it is asked for by path.
+    render = engine.path_resolve("render")
+    views = [view.name for view in engine.get_result().views] or [""]
+    if len(views) == 1:
+        return {views[0]: _camera(depsgraph, render, camera.matrix_world)}
+    cameras = {}
+    for view in views:
+        engine.active_view_set(view)
+        with Borrowed() as borrowed:
+            borrowed.set(camera.data, shift_x=engine.camera_shift_x(camera))
+            place = engine.camera_model_matrix(camera)
+            cameras[view] = _camera(depsgraph, render, place)
+    return cameras
+
+
+def _camera(depsgraph: Any, render: Any, place: Any) -> Camera:
+    camera = depsgraph.scene_eval.camera
     width, height = frame_size(render)
     project = camera.calc_matrix_camera(
         depsgraph,
@@ -32,8 +52,23 @@ def camera_of(depsgraph: Any, render: Any) -> Camera | None:
         left, bottom = border_start(render)
         window = left, height - bottom - picture_size(render)[1]
     return Camera(
-        view=np.array(camera.matrix_world.normalized().inverted()),
+        view=np.array(place.normalized().inverted()),
         project=np.array(project),
         size=(width, height),
         window=window,
+        name=camera.name_full,
     )
+
+
+def low_view(camera: Camera, scale: int, window: tuple[int, int]) -> Camera:
+    """The camera of pixels `scale` times as large, as `low_camera.widen` makes it.
+
+    Its frame covers whole pixels and keeps the top left corner; `window` is the (x, y)
+    of the arrays' top-left pixel in it.
+    """
+    width, height = camera.size
+    size = low_size(width, height, scale)
+    across, down = width / (scale * size[0]), height / (scale * size[1])
+    wider = np.diag([across, down, 1.0, 1.0])
+    wider[0, 3], wider[1, 3] = across - 1.0, 1.0 - down
+    return replace(camera, project=wider @ camera.project, size=size, window=window)

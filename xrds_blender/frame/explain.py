@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from ..planning.lending import lending
+from ..scene.cuts import cuts
 from .facts import find_facts
 from .job import RenderJob
 from .rendering import evaluate
@@ -17,4 +19,7 @@ def explain(scene: Any, job: RenderJob) -> dict[str, Any]:
     """
     facts = evaluate(scene, lambda depsgraph: find_facts(depsgraph, job))
     decisions = job.plan(facts).decisions
+    if job.temporal_radius:
+        frames = range(scene.frame_start, scene.frame_end + 1)
+        decisions += lending(facts, job.temporal_radius, cuts(scene, frames))
     return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.temporal.samples import Portion
 
 from ..cycles.pass_names import ALBEDO, NORMAL, is_lasting
 from ..cycles.passes import CyclesPasses
@@ -25,7 +26,12 @@ _NAME = "guide cache"
 
 
 class GuideSource:
-    """Guides of one frame; `decision` tells afterwards where they came from."""
+    """Guides of one frame.
+
+    `decision` tells afterwards where they came from, and `key`, where it is known, what
+    they show: guides of one key hold each other's samples. `portion` says which samples
+    are new, where frames of a shot continue one sequence.
+    """
 
     def __init__(
         self,
@@ -34,9 +40,12 @@ class GuideSource:
         job: RenderJob,
         chosen: Plan,
         facts: Facts,
+        portion: Portion | None = None,
     ) -> None:
         self._passes, self._graph, self._job = passes, depsgraph, job
         self._chosen, self._facts = chosen, facts
+        self._portion = portion
+        self.key: str | None = None
         self._folder = None if job.guide_cache is None else Path(job.guide_cache)
         self.decision = Decision(_NAME, "off", "as requested")
 
@@ -52,7 +61,7 @@ class GuideSource:
             return self._render(self._chosen.guide_samples)
         started = time.perf_counter()
         try:
-            key = self._key()
+            key = self.key = self._key()
         except NotFollowed as reason:
             self.decision = Decision(
                 _NAME, "not used", f"the cache cannot track {reason}"
@@ -98,6 +107,9 @@ class GuideSource:
             raise NotFollowed(f"the pass {', '.join(light)}")
         passes, scene = self._passes, self._facts.scene
         how = sorted(asdict(self._chosen.guides).items())
+        if self._portion is not None:
+            # Depth and index may be empty: guides of single frames are others
+            names.append("continued")
         frame = passes.frame, passes.region, passes.views, names, how
         return guide_key(self._graph, scene, frame)
 
@@ -118,6 +130,7 @@ class GuideSource:
             full=self._job.guides == "full",
             seed=seed,
             how=self._chosen.guides,
+            portion=self._portion and replace(self._portion, length=samples),
         )
 
     def _add(

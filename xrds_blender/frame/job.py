@@ -34,10 +34,9 @@ class RenderJob:
     them until they are `guide_limit`.
     `denoiser` is a mode of Cycles' denoiser or its name, None the scene's own;
     `denoise` is the quality of ours, one of QUALITIES.
-    `temporal_radius` is how many frames before and after lend their samples, in a shot
-    at scale 1. With
-    `time_budget` (seconds a frame) or `quality` (PSNR in dB) scale, samples, guides,
-    network and denoiser are chosen anew for the scene.
+    `temporal_radius` is how many frames before and after lend their samples, in a shot.
+    With `time_budget` (seconds a frame) or `quality` (PSNR in dB) scale, samples,
+    guides, network and denoiser are chosen anew for the scene.
     Raises UsageError on values out of range.
     """
 
@@ -124,8 +123,10 @@ class NetworkFailed(XRDSError):
     """The network failed; what Cycles rendered for it is kept.
 
     `radiance` (h, w, 3), premultiplied, and `alpha` (h, w): low resolution, as
-    `Picture.low_resolution`.
+    `Picture.low_resolution`; of a shot, of the frame `number`.
     """
+
+    number: int | None = None
 
     def __init__(self, message: str, radiance: Array, alpha: Array) -> None:
         super().__init__(message)

@@ -9,23 +9,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core.arrays import Array
-from xrds_core.errors import OutOfMemory
 
 from ..cycles import session
-from ..cycles.colour import converted, to_rec709, working_space
 from ..cycles.pass_names import COMBINED
 from ..cycles.passes import CyclesPasses
 from ..cycles.rendered import Beauty, Guides
 from ..planning import plan
 from . import progress
 from .denoisers import in_process
+from .enlarging import bilinear, enlarge, enlarged_lights
 from .facts import find_facts
 from .guides import GuideSource
 from .job import NetworkFailed, Picture, RenderJob
 from .memory import peak_memory
 
 if TYPE_CHECKING:
-    from xrds_core import Upscaled, Upscaler
+    from xrds_core import Upscaler
 
 
 @dataclass(frozen=True)
@@ -182,51 +181,21 @@ class _Enlargement:
         progress.begin(self.engine, progress.NETWORK, 3)
         try:
             return {view: self.upscaled(view) for view in self.inputs.beauties}
-        except (OutOfMemory, RuntimeError, MemoryError) as error:  # as torch raises
+        except NetworkFailed:
             self.write(self.bilinear_pictures())
-            reason = str(error).partition("\n")[0] or "out of memory"
-            low, _ = self.inputs.first
-            raise NetworkFailed(
-                f"the network failed ({reason}); the picture is the low-resolution "
-                "render",
-                low.radiance,
-                low.alpha,
-            ) from error
+            raise
 
     def upscaled(self, view: str) -> Array:
         """The region's radiance and alpha, (H, W, 4)."""
-        beauty, guides = self.inputs.beauties[view], self.inputs.guides[view]
-        rows, columns = beauty.offset
-        matrix = to_rec709(working_space())
-
-        def placed(guide: Array | None) -> Array | None:
-            """Guides start where the first low-resolution pixel does."""
-            if guide is None:
-                return None
-            margin = ((rows, 0), (columns, 0), *[(0, 0)] * (guide.ndim - 2))
-            return np.pad(guide, margin, mode="edge")
-
-        def seen(colour: Array | None) -> Array | None:
-            """In the network's colour space."""
-            if matrix is None or colour is None:
-                return colour
-            return converted(colour, matrix)
-
-        upscaled: Upscaled = self.upscaler(
-            seen(np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1)),
-            placed(seen(guides.albedo)),
-            placed(guides.normal),
-            noisy=seen(beauty.noisy),
-            guide_radiance=placed(seen(guides.radiance)),
-            guide_alpha=placed(guides.alpha),
-            guide_samples=guides.samples,
+        return enlarge(
+            self.inputs.beauties[view],
+            self.inputs.guides[view],
+            self.job,
+            self.upscaler,
             exposure=self.inputs.exposure,
-            memory_limit=self.job.memory_limit,
-            progress=self.report,
             skip_idle=self.inputs.skip_idle,
+            progress=self.report,
         )
-        region = upscaled.radiance[rows:, columns:]
-        return region if matrix is None else converted(region, np.linalg.inv(matrix))
 
     def report(self, done: float) -> bool:
         """Show the fraction done; False once the user has stopped the render."""
@@ -237,7 +206,7 @@ class _Enlargement:
     def bilinear_pictures(self) -> dict[str, Array]:
         """By view, the region's radiance and alpha without a network, (H, W, 4)."""
         return {
-            view: _bilinear(
+            view: bilinear(
                 np.dstack((low.radiance, low.alpha)),
                 self.job.scale,
                 low.offset,
@@ -253,18 +222,7 @@ class _Enlargement:
         for view, picture in pictures.items():
             session.write_pass(layer, COMBINED, view, picture)
             beauty, scale = self.inputs.beauties[view], self.job.scale
-            for name, low in beauty.others.items():
-                large = _bilinear(low, scale, beauty.offset, picture.shape)
+            lights = enlarged_lights(beauty.others, scale, beauty.offset, picture.shape)
+            for name, large in lights.items():
                 session.write_pass(layer, name, view, large)
         self.engine.update_result(result)
-
-
-def _bilinear(
-    low: Array, scale: int, offset: tuple[int, int], shape: tuple[int, ...]
-) -> Array:
-    """Enlarge (h, w, channels) and cut the region out."""
-    from xrds_core.baselines import bilinear
-
-    rows, columns = offset
-    large = bilinear(low, scale)
-    return large[rows : rows + shape[0], columns : columns + shape[1]]

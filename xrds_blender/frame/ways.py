@@ -55,5 +55,5 @@ def on_the_way(job: RenderJob, way: Way, scene: Any, temporal_radius: int) -> Re
         job,
         scale=way.scale,
         plain=way is Way.PLAIN,
-        temporal_radius=temporal_radius if way is Way.FULL_SIZE else 0,
+        temporal_radius=0 if way is Way.PLAIN else temporal_radius,
     )

@@ -205,6 +205,24 @@ def stands_still(camera: Any) -> bool:
     return not any(_is_animated(owner) for owner in owners)
 
 
+def shapes_move(depsgraph: Any) -> bool:
+    """Whether anything but camera and light may lie elsewhere in another frame."""
+    import bpy
+
+    light = bpy.types.Light, bpy.types.World, bpy.types.Material, bpy.types.Scene
+    kinds = *light, bpy.types.Camera, bpy.types.Image, bpy.types.ShaderNodeTree
+    camera = depsgraph.scene_eval.camera
+
+    def is_shape(item: Any) -> bool:
+        if isinstance(item, bpy.types.Object):
+            return item.type != "LIGHT" and item != camera
+        return not isinstance(item, kinds)
+
+    ids = [item for item in depsgraph.ids if is_shape(item)]
+    objects = [item for item in ids if isinstance(item, bpy.types.Object)]
+    return any(True for _ in _moving(ids, objects))
+
+
 def _is_timed(tree: Any) -> bool:
     return any(node.type in _TIMED_NODES for node in tree.nodes)
 

@@ -10,35 +10,53 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from xrds_core.arrays import Array
-from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.window import Shot
 
 from ..cycles import session
+from ..cycles.pass_names import COMBINED
 from ..cycles.passes import CyclesPasses
 from ..frame import history, progress
-from ..frame.denoisers import load_denoiser
-from ..frame.job import Picture, RenderJob
+from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.layer import render_layer
-from .finishing import finish
-from .sampling import Sampled, can_lend, sample_frame
+from ..scene.cuts import cuts
+from ..scene.facts import requested_passes, shapes_move, stands_still
+from .method import FullSize, method_of
+from .sampling import Sampled, can_lend
+
+_Passes = dict[tuple[str, str], Array]
+_First = tuple[int, _Passes]
+# Passes that the first sample of a sequence writes alone, and the layer's switches.
+_OF_ONE_SAMPLE = {
+    "z": {"Depth"},
+    "position": {"Position"},
+    "object_index": {"IndexOB", "Object Index"},
+    "material_index": {"IndexMA", "Material Index"},
+}
 
 
 @dataclass
 class _Window:
     """The frames of one view layer that are kept, by number.
 
-    `passes` are Cycles' own of frames that were sampled before their turn.
+    `passes` are Cycles' own of frames that were sampled before their turn. `first` is,
+    by camera, the first frame that was sampled, and its passes of one sample.
     """
 
     job: RenderJob
     sampled: dict[int, Sampled] = field(default_factory=dict)
-    passes: dict[int, dict[tuple[str, str], Array]] = field(default_factory=dict)
-    movement: Movement = field(default_factory=Movement)
+    passes: dict[int, _Passes] = field(default_factory=dict)
+    first: dict[str, _First] = field(default_factory=dict)
+    method: FullSize = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.method = method_of(self.job)
 
     def forget_before(self, number: int) -> None:
         for kept in (self.sampled, self.passes):
@@ -57,7 +75,7 @@ def forget(*_: Any) -> None:
 def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
     """Render what Blender asks for: a frame by itself, or one of an animation.
 
-    As `render_layer`; in an animation at scale 1 with the samples of its neighbours.
+    As `render_layer`; in an animation with the samples of its neighbours.
     """
     if not _has_neighbours(engine, depsgraph, job):
         return render_layer(engine, depsgraph, job)
@@ -71,10 +89,10 @@ def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
 
 
 def _has_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> bool:
-    if job.plain or job.is_picked or job.scale > 1 or not job.temporal_radius:
+    if job.plain or job.is_picked or not job.temporal_radius:
         return False
     is_animation = engine.is_animation and not _renders_single_frames()
-    return is_animation and can_lend(depsgraph.scene_eval)
+    return is_animation and can_lend(depsgraph.scene_eval, job)
 
 
 def _renders_single_frames() -> bool:
@@ -93,7 +111,6 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
     Every pass but Combined is Cycles' own. Raises Cancelled when the user stops it.
     """
     started = time.perf_counter()
-    denoiser = load_denoiser(job)
     scene, layer_name = depsgraph.scene_eval, depsgraph.view_layer_eval.name
     number, needed = scene.frame_current, _needed(scene, job)
     window = _windows.get((scene.name, layer_name))
@@ -102,65 +119,95 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
     window.forget_before(needed[0])
     _sample_missing(engine, depsgraph, window, number, needed)
 
-    report = progress.reporter(engine)
-    progress.begin(engine, progress.DENOISE, 2, 2)
-    own = window.sampled[number]
     lenders = [window.sampled[n] for n in needed if n != number]
-    pictures = {
-        view: finish(
-            stored,
-            [each.views[view] for each in lenders],
-            job,
-            denoiser,
-            window.movement,
-            report,
-        )
-        for view, stored in own.views.items()
-    }
+    picture = _finish(engine, layer_name, window, window.sampled[number], lenders)
+    picture.seconds["total"] = time.perf_counter() - started
+    return picture
+
+
+def _finish(
+    engine: Any,
+    layer_name: str,
+    window: _Window,
+    own: Sampled,
+    lenders: Sequence[Sampled],
+) -> Picture:
+    """Make the picture of each view and write it; returns the first view's."""
+    method, layer = window.method, engine.get_result().layers[layer_name]
+    report = method.begin_finishing(engine)
+    pictures: dict[str, Picture] = {}
+    more: dict[str, Array] = {}
+    try:
+        for view in own.views:
+            pictures[view] = method.finish(own, lenders, view, report)
+    except NetworkFailed as error:
+        more[COMBINED] = np.dstack((error.radiance, error.alpha))
+        raise
+    finally:
+        for view in own.views:
+            for name, light in method.light_passes(own, view, more).items():
+                session.write_pass(layer, name, view, light)
+        engine.update_result(engine.get_result())
     combined = {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
     session.write_combined(engine, layer_name, combined)
     first = next(iter(pictures.values()))
     first.seconds.update({**own.seconds, **first.seconds})
-    first.seconds["total"] = time.perf_counter() - started
     return first
 
 
 def _needed(scene: Any, job: RenderJob) -> list[int]:
     """Numbers of the frame and of its neighbours inside the animation, in order."""
-    step, radius = scene.frame_step, job.temporal_radius
-    around = range(-radius * step, radius * step + 1, step)
-    numbers = [scene.frame_current + offset for offset in around]
-    return [
-        n
-        for n in numbers
-        if n == scene.frame_current or scene.frame_start <= n <= scene.frame_end
-    ]
+    own, step, reach = scene.frame_current, scene.frame_step, job.temporal_radius
+    around = range(own - reach * step, own + reach * step + 1, step)
+    inside = [n for n in around if scene.frame_start <= n <= scene.frame_end]
+    numbers = tuple(sorted({own, *inside}))
+    shot = Shot(numbers, reach, cuts(scene, numbers))
+    return sorted((own, *shot.lenders(own)))
 
 
 def _sample_missing(
     engine: Any, depsgraph: Any, window: _Window, number: int, needed: list[int]
 ) -> None:
     """Sample what is not kept; the result then holds the passes of frame `number`."""
-    missing = [n for n in needed if n not in window.sampled and n != number]
-    own_is_missing = number not in window.sampled
-    if not missing and not own_is_missing:
+    missing = [n for n in needed if n not in window.sampled]
+    if not missing:
         session.allocate(engine)
-        with CyclesPasses(engine, depsgraph) as passes:
-            passes.put_back(window.passes.pop(number))
-        return
     with CyclesPasses(engine, depsgraph) as passes:
         try:
-            for ahead in missing:
-                engine.frame_set(ahead, 0.0)
-                progress.begin(engine, f"{progress.SAMPLES} of frame {ahead}", 1, 2)
-                window.sampled[ahead] = sample_frame(engine, depsgraph, window.job)
-                if ahead > number:
-                    window.passes[ahead] = passes.all_passes()
+            for each in missing:
+                if each != depsgraph.scene_eval.frame_current:
+                    engine.frame_set(each, 0.0)
+                window.sampled[each] = _sample(engine, depsgraph, window, passes)
+                if each >= number and missing[-1] != number:
+                    window.passes[each] = passes.all_passes()
         finally:
-            if missing:
+            if number != depsgraph.scene_eval.frame_current:
                 engine.frame_set(number, 0.0)
-        if own_is_missing:
-            progress.begin(engine, f"{progress.SAMPLES} of frame {number}", 1, 2)
-            window.sampled[number] = sample_frame(engine, depsgraph, window.job)
-        else:
+        if number in window.passes:
             passes.put_back(window.passes.pop(number))
+
+
+def _sample(
+    engine: Any, depsgraph: Any, window: _Window, passes: CyclesPasses
+) -> Sampled:
+    """Sample the frame that the dependency graph is at.
+
+    Under a camera that stands still frames continue one sequence. Passes that its first
+    sample writes alone are the first frame's then, or else, where they are asked for
+    and things move, each frame has a seed of its own.
+    """
+    scene = depsgraph.scene_eval
+    asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
+    if not stands_still(scene.camera) or (asked and shapes_move(depsgraph)):
+        return window.method.sample(engine, depsgraph)
+    number, camera = scene.frame_current, scene.camera.name_full
+    first, kept = window.first.get(camera, (number, {}))
+    place = (number - first) // scene.frame_step
+    sampled = window.method.sample(engine, depsgraph, place)
+    names = set().union(*(_OF_ONE_SAMPLE[each] for each in asked))
+    if camera in window.first:
+        passes.put_back(kept)
+    else:
+        found = passes.all_passes() if names else {}
+        window.first[camera] = number, {k: x for k, x in found.items() if k[1] in names}
+    return sampled

@@ -40,7 +40,7 @@ def finish(
         float(gathered.samples.mean()),
         gathered.rejected,
     )
-    decision = _decision(finished.frames)
+    decision = accumulation(finished.frames)
     return Picture(
         radiance=np.ascontiguousarray(finished.picture[..., :3]),
         alpha=np.ascontiguousarray(finished.picture[..., 3]),
@@ -54,6 +54,7 @@ def finish(
     )
 
 
-def _decision(frames: Sequence[int]) -> Decision:
+def accumulation(frames: Sequence[int]) -> Decision:
+    """What was decided where these frames were asked for their samples."""
     reason = "neighbouring frames show the same: their samples count here as well"
     return Decision("accumulation", f"frames {frames[0]} to {frames[-1]}", reason)

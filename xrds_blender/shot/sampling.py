@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from xrds_core.errors import SceneError
-from xrds_core.temporal.frame import Camera, Frame, Stored, store
-from xrds_core.temporal.samples import continued
+from xrds_core.temporal.frame import Camera, Frame, store
+from xrds_core.temporal.samples import Portion, continued
 
 from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
-from ..cycles.view import camera_of
+from ..cycles.view import cameras_of
 from ..frame import progress
 from ..frame.job import RenderJob
-from ..scene.facts import scene_facts, stands_still
+from ..scene.facts import scene_facts, shapes_move, stands_still
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
@@ -25,15 +25,89 @@ LARGEST_SEED = 2**31 - 1
 
 @dataclass(frozen=True)
 class Sampled:
-    """One frame as the window keeps it, by view, and the seconds that it took."""
+    """One frame as the window keeps it, by view, and the seconds that it took.
 
-    views: dict[str, Stored]
+    Views are `Stored` at full size, `enlarged.View` above scale 1.
+    """
+
+    views: dict[str, Any]
     seconds: dict[str, float]
 
+    def lenders(self, view: str, frames: Sequence[Sampled]) -> list[Any]:
+        """What lends to a view: that view of other frames, and this frame's others."""
+        beside = [each for name, each in self.views.items() if name != view]
+        return [each.views[view] for each in frames if view in each.views] + beside
 
-def can_lend(scene: Any) -> bool:
-    """Whether frames can lend to each other: not under a panoramic camera."""
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a frame of a shot is sampled, and the cameras that see it, by view.
+
+    `count` samples per pixel; `geometry` names passes. `place` is the frame's in the
+    shot where frames continue one sequence, None where each begins its own. `still`
+    is as in `Frame`.
+    """
+
+    number: int
+    cameras: dict[str, Camera]
+    count: int
+    seed: int
+    geometry: Sequence[tuple[str, str]] = GEOMETRY
+    place: int | None = None
+    radius: int = 0
+    still: bool = False
+
+    def portion(self, count: int, other: int = 0) -> Portion | None:
+        """The frame's part, of `count` samples, of the sequence it continues.
+
+        `other` sequences have other seeds. None where each frame begins its own.
+        """
+        if self.place is None:
+            return None
+        return continued(self.place, count, self.radius, self.seed + other)
+
+    @property
+    def own_seed(self) -> int:
+        """One that no other frame has."""
+        return (self.seed + self.number * SEED_STEP) % LARGEST_SEED
+
+
+def can_lend(scene: Any, job: RenderJob) -> bool:
+    """Whether frames can lend to each other.
+
+    Not under a panoramic camera, and full guides hold light of full size, too.
+    """
+    if job.is_enlarged and job.guides != "fast":
+        return False
     return scene.camera is not None and scene.camera.data.type in {"PERSP", "ORTHO"}
+
+
+def sampling_of(
+    engine: Any, depsgraph: Any, job: RenderJob, place: int | None
+) -> Sampling:
+    """How the frame that the dependency graph is at is to be sampled.
+
+    `place`, the frame's in the shot, lets frames under a camera that stands still
+    continue one sequence; passes of its first sample alone, as Depth, are empty in the
+    result then. Raises SceneError under a camera that no matrix describes.
+    """
+    scene = depsgraph.scene_eval
+    cameras = cameras_of(engine, depsgraph)
+    if not cameras:
+        raise SceneError("a panorama has no neighbours; set the temporal radius to 0")
+    if not job.temporal_radius or not stands_still(scene.camera):
+        place = None
+    geometry = _geometry(depsgraph)
+    return Sampling(
+        number=scene.frame_current,
+        cameras=cameras,
+        count=job.samples or scene.cycles.samples,
+        seed=scene.cycles.seed if job.seed is None else job.seed,
+        geometry=geometry if place is None else [LATE_DEPTH, *geometry[1:]],
+        place=place,
+        radius=job.temporal_radius,
+        still=not scene_facts(depsgraph).moving,
+    )
 
 
 def sample_frame(
@@ -50,61 +124,32 @@ def noisy_frame(
 ) -> tuple[dict[str, Frame], dict[str, float]]:
     """Render the frame that the dependency graph is at; the result holds its passes.
 
-    Returns its samples by view, and the seconds of the stages. Every frame has a seed
-    of its own, whatever the file says. `place`, the frame's in the shot, lets frames
-    under a camera that stands still continue one sequence instead; passes of its first
-    sample alone, as Depth, are empty in the result then.
-    Raises Cancelled when the user stops it, SceneError under a camera that no matrix
-    describes.
+    Returns its samples by view, and the seconds of the stages. Every frame has samples
+    of its own, whatever the file's seed says; `place` is as in `sampling_of`. Raises
+    Cancelled when the user stops it, and what `sampling_of` does.
     """
-    scene = depsgraph.scene_eval
-    number, count = scene.frame_current, job.samples or scene.cycles.samples
-    seed = scene.cycles.seed if job.seed is None else job.seed
-    camera = camera_of(depsgraph, engine.path_resolve("render"))
-    if camera is None:
-        raise SceneError("a panorama has no neighbours; set the temporal radius to 0")
-    portion, geometry = None, _geometry(depsgraph)
-    if place is not None and job.temporal_radius and _is_continued(depsgraph):
-        portion = continued(place, count, job.temporal_radius, seed)
-        geometry = [LATE_DEPTH, *geometry[1:]]
+    how = sampling_of(engine, depsgraph, job, place)
+    progress.begin(engine, f"{progress.SAMPLES} of frame {how.number}", 1, 2)
     noisy, clock = sample_layer(
         engine,
         depsgraph,
         samples=job.samples,
-        seed=(seed + number * SEED_STEP) % LARGEST_SEED,
-        portion=portion,
-        geometry=geometry,
+        seed=how.own_seed,
+        portion=how.portion(how.count),
+        geometry=how.geometry,
     )
     frames = {
-        view: _frame(number, camera, samples, count) for view, samples in noisy.items()
+        view: light_of(how, how.cameras[view], samples)
+        for view, samples in noisy.items()
     }
     return frames, {"sync": clock.sync, "beauty": clock.render}
 
 
-def _is_continued(depsgraph: Any) -> bool:
-    """Whether frames meet pixel on pixel, so that one sequence serves them all."""
-    scene = depsgraph.scene_eval
-    cut = any(marker.camera for marker in scene.timeline_markers)
-    return not cut and stands_still(scene.camera)
-
-
-def _geometry(depsgraph: Any) -> Sequence[tuple[str, str]]:
-    """The passes that tell where pixels were; motion only where things may move.
-
-    Cycles gives no vectors with motion blur. A moving camera alone needs none.
-    """
-    scene = depsgraph.scene_eval
-    facts = scene_facts(depsgraph)
-    camera = {scene.camera.name, scene.camera.data.name}
-    if facts.motion_blur or set(facts.moving) <= camera:
-        return GEOMETRY[:1]
-    return GEOMETRY
-
-
-def _frame(number: int, camera: Camera, samples: Samples, count: int) -> Frame:
+def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
+    """One view's samples as accumulation takes them."""
     assert samples.depth is not None
     return Frame(
-        number=number,
+        number=how.number,
         camera=camera,
         radiance=samples.picture[..., :3],
         alpha=samples.picture[..., 3],
@@ -112,5 +157,15 @@ def _frame(number: int, camera: Camera, samples: Samples, count: int) -> Frame:
         normal=samples.normal,
         depth=samples.depth,
         vector=samples.vector,
-        samples=count,
+        samples=how.count,
+        still=how.still,
     )
+
+
+def _geometry(depsgraph: Any) -> Sequence[tuple[str, str]]:
+    """The passes that tell where pixels were; motion only where things may move.
+
+    Cycles gives no vectors with motion blur.
+    """
+    blurred = depsgraph.scene_eval.render.use_motion_blur
+    return GEOMETRY[:1] if blurred or not shapes_move(depsgraph) else GEOMETRY

@@ -1,7 +1,7 @@
 """A shot: every frame is sampled once and lends its samples to its neighbours.
 
 A frame is finished when its last neighbour is there: their noisy samples are moved
-along with what they show, and the sum is denoised once.
+along with what they show, and the sum is denoised once and, above scale 1, enlarged.
 """
 
 from __future__ import annotations
@@ -10,15 +10,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from xrds_core.temporal.moving import Movement
 from xrds_core.temporal.window import Shot, slide
 
 from ..frame import progress
-from ..frame.denoisers import load_denoiser
 from ..frame.job import Picture, RenderJob
 from ..frame.rendering import call_engine
-from .finishing import finish
-from .sampling import Sampled, sample_frame
+from ..scene.cuts import cuts
+from .method import FullSize, method_of
+from .sampling import Sampled
 
 
 def render_shot(
@@ -33,31 +32,28 @@ def render_shot(
     them. Yields numbers and pictures, of stereo the first view's; the scene stays at
     the last frame rendered. Raises what `render` raises.
     """
-    denoiser = load_denoiser(job)
+    method = method_of(job)
     todo = tuple(number for number in frames if not is_done(number))
-    shot = Shot(todo, job.temporal_radius, lending=tuple(frames))
-    movement = Movement()
+    begun = cuts(scene, sorted(frames))
+    shot = Shot(todo, job.temporal_radius, begun, lending=tuple(frames))
 
     def sample(number: int) -> Sampled:
         scene.frame_set(number)
         place = shot.order.index(number)
-        return call_engine(scene, lambda *given: _sample(*given, job, place))
+        return call_engine(scene, lambda *given: _sample(method, *given, place))
 
     for number, own, lenders in slide(shot, sample):
         if is_done(number):  # another machine was quicker
             continue
         view = next(iter(own.views))
-        others = [each.views[view] for each in lenders.values()]
-        picture = finish(own.views[view], others, job, denoiser, movement)
+        picture = method.finish(own, list(lenders.values()), view)
         seconds = own.seconds | picture.seconds
         seconds["total"] = sum(seconds.values())
         yield number, replace(picture, seconds=seconds)
 
 
-def _sample(engine: Any, depsgraph: Any, job: RenderJob, place: int) -> Sampled:
-    frame = depsgraph.scene_eval.frame_current
-    progress.begin(engine, f"{progress.SAMPLES} of frame {frame}", 1, 2)
+def _sample(method: FullSize, engine: Any, depsgraph: Any, place: int) -> Sampled:
     try:
-        return sample_frame(engine, depsgraph, job, place)
+        return method.sample(engine, depsgraph, place)
     finally:
         progress.end()

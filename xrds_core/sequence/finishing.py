@@ -57,6 +57,7 @@ def finish_frame(
     started = time.perf_counter()
     gathered = accumulate(own, lenders, movement)
     accumulated = time.perf_counter()
+    assert gathered.radiance is not None
     noisy = gathered.radiance
     if gathered.alpha is not None:
         noisy = np.dstack((noisy, gathered.alpha))
@@ -68,5 +69,4 @@ def finish_frame(
         "accumulate": accumulated - started,
         "denoise": time.perf_counter() - accumulated,
     }
-    frames = tuple(sorted((own.number, *(each.number for each in lenders))))
-    return Finished(denoised, gathered, frames, seconds)
+    return Finished(denoised, gathered, gathered.frames, seconds)

@@ -20,6 +20,7 @@ from .agreement import REACH, agreement, brightness
 from .motion import grid, pair, places, surroundings
 from .moving import Movement
 from .survey import spread, survey
+from .takes import same_take
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -37,25 +38,27 @@ if TYPE_CHECKING:
 # narrow one: 0.7 and 0.6 were best at 1 and 2 samples, 0.2 to 0.3 at 16.
 _SOFTNESS = 0.7
 _ROWS = 48  # at a time: their arrays stay in a processor's cache
-_NORMAL = slice(6, 9)  # of `Stored.picture`
 
 
 @dataclass(frozen=True)
 class Accumulated:
     """A frame with the samples of its neighbours; float32, (H, W, 3) or (H, W).
 
-    `radiance`, `albedo`, `normal` (in this frame's axes) and `alpha` (or None)
-    are means over `samples` (H, W) samples per pixel, NaN where no frame has any.
+    `radiance` (None of guides alone), `albedo`, `normal` (in this frame's axes) and
+    `alpha` (or None) are means over `samples` (H, W) samples per pixel, NaN where no
+    frame has any.
     `rejected` is the share of the neighbours' samples that were left out: pixels that
-    no neighbour shows, or that show other light.
+    no neighbour shows, or that show other light. `frames` are the numbers of those
+    that were asked, the frame's own too: the frames of its take, between two cuts.
     """
 
-    radiance: Array
+    radiance: Array | None
     albedo: Array
     normal: Array
     alpha: Array | None
     samples: Array
     rejected: float
+    frames: tuple[int, ...]
 
 
 def accumulate(
@@ -67,16 +70,12 @@ def accumulate(
     """Return `target` with the samples of `others`.
 
     `movement` knows what moved by itself in this shot; without it each call finds it
-    anew. Without others the result is the target's own picture to
-    the bit. `threads`: all processors by default; the result does not depend on it.
-    Raises PictureError where the frames hold different passes.
+    anew. Nothing is lent across a cut. Without others the result is the target's own
+    picture to the bit. `threads`: all processors by default; the result does not depend
+    on it. Raises PictureError where the frames hold different passes.
     """
-    detours = (movement or Movement()).detours(target, others)
-    around = surroundings(target)
-    lenders = [
-        _Lender(pair(target, other, detour, around))
-        for other, detour in zip(others, detours, strict=True)
-    ]
+    others = same_take(target, others)
+    lenders = _lenders(target, others, movement or Movement())
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
     samples = np.empty(height * width, np.float32)
@@ -90,7 +89,22 @@ def accumulate(
 
     taken = sum(_in_threads(work, range(0, height, _ROWS), threads))
     asked = sum(x.samples for x in others) * height * width
-    return _unpacked(target, means, samples, 1.0 - taken / asked if asked else 0.0)
+    rejected = 1.0 - taken / asked if asked else 0.0
+    frames = tuple(sorted({target.number, *(x.number for x in others)}))
+    return _unpacked(target, means, samples, rejected, frames)
+
+
+def _lenders(
+    target: Stored, others: Sequence[Stored], movement: Movement
+) -> list[_Same | _Lender]:
+    same = [x for x in others if target.shows_same(x)]
+    rest = [x for x in others if not target.shows_same(x)]
+    if not rest:
+        return [_Same(x) for x in same]
+    around, detours = surroundings(target), movement.detours(target, rest)
+    pairs = zip(rest, detours, strict=True)
+    asked = [_Lender(pair(target, other, way, around)) for other, way in pairs]
+    return [*(_Same(x) for x in same), *asked]
 
 
 class _Block:
@@ -113,15 +127,32 @@ class _Block:
         self.weights = np.zeros(size, np.float32)
 
 
+class _Same:
+    """A neighbour that shows the same in every pixel: there is nothing to ask."""
+
+    def __init__(self, other: Stored) -> None:
+        self._other = other
+
+    def add(self, block: _Block) -> float:
+        """As `_Lender.add`."""
+        other = self._other
+        weight = np.full(len(block.weights), other.samples, np.float32)
+        if other.spoilt is not None:
+            weight[other.spoilt[block.pixels]] = 0.0
+        block.sums += _floats(other.picture[block.pixels]) * weight[:, None]
+        block.weights += weight
+        return float(weight.sum(dtype=np.float64))
+
+
 class _Lender:
-    """One neighbour of the target."""
+    """A neighbour whose pixels are looked for, and asked whether they agree."""
 
     def __init__(self, pair: Pair) -> None:
         target, other = pair.here, pair.there
         if other.picture.shape[1] != target.picture.shape[1]:
             raise PictureError(
                 f"frame {other.number} and frame {target.number} hold different passes:"
-                " give alpha for all frames of a shot or for none"
+                " give radiance and alpha for all frames of a shot or for none"
             )
         self._pair = pair
         self._tiles = survey(pair)
@@ -145,7 +176,8 @@ class _Lender:
         weight *= np.exp(found.apart[inner] * self._fall)
         picked = picked[inner]
         if self._turn is not None:
-            picked[:, _NORMAL] = picked[:, _NORMAL] @ self._turn.T
+            normal = slice(6, 9) if other.has_light else slice(3, 6)
+            picked[:, normal] = picked[:, normal] @ self._turn.T
         picked *= weight[:, None]
         block.sums += picked
         block.weights += weight
@@ -180,19 +212,26 @@ def _means(target: Stored, block: _Block) -> tuple[Array, Array]:
 
 
 def _unpacked(
-    target: Stored, means: Array, samples: Array, rejected: float
+    target: Stored,
+    means: Array,
+    samples: Array,
+    rejected: float,
+    frames: tuple[int, ...],
 ) -> Accumulated:
-    radiance, albedo, normal, *alpha = (
+    parts = [
         np.ascontiguousarray(x).reshape(*target.shape, -1)
         for x in np.split(means, range(3, means.shape[1], 3), axis=1)
-    )
+    ]
+    alpha = parts.pop()[..., 0] if means.shape[1] % 3 else None
+    *radiance, albedo, normal = parts
     return Accumulated(
-        radiance,
+        radiance[0] if radiance else None,
         albedo,
         normal,
-        alpha[0][..., 0] if alpha else None,
+        alpha,
         samples.reshape(target.shape),
         rejected,
+        frames,
     )
 
 

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 # Blender writes 1e10 where no ray hits anything.
 SKY_DEPTH = 1e9
 LARGEST_HALF = 65504.0
-_PASSES = {"radiance": (3,), "albedo": (3,), "normal": (3,), "depth": ()}
-_OPTIONAL = {"alpha": (), "vector": (4,), "index": ()}
+_PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
+_OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "index": ()}
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,24 @@ class Camera:
     `view` (4, 4) takes world points to the camera's axes, `project` (4, 4) those to
     OpenGL clip space (in Blender: `Object.calc_matrix_camera`). `size` is (width,
     height) of the whole frame in pixels, `window` the (x, y) of the arrays' top-left
-    pixel in it: (0, 0) where no border crops the frame.
+    pixel in it: (0, 0) where no border crops the frame. Frames of cameras of different
+    names lend nothing to each other.
     """
 
     view: Matrix
     project: Matrix
     size: tuple[int, int]
     window: tuple[int, int] = (0, 0)
+    name: str = ""
+
+    def same(self, other: Camera) -> bool:
+        """Whether both show the same on the same pixels."""
+        return (
+            (self.size, self.window, self.name)
+            == (other.size, other.window, other.name)
+            and np.array_equal(self.view, other.view)
+            and np.array_equal(self.project, other.project)
+        )
 
     @property
     def orthographic(self) -> bool:
@@ -66,12 +77,16 @@ class Camera:
 class Frame:
     """What the renderer gives of one frame; arrays are not changed.
 
-    `number` is the frame's number: `vector` leads to number - 1 and number + 1, and
-    frames of one number show one moment (the views of a stereo pair). `samples` per
-    pixel weigh the frame against others. `normal` is in the camera's axes, but with Z
-    pointing away from the viewer, as in Cycles' `Denoising Normal`. `depth` (H, W) is
-    the distance of the first hit from the camera, along the camera's axis, at each
-    pixel's centre; infinite, or above 1e9, without a hit.
+    `radiance` is None in a frame of guides alone: their albedo then tells whether two
+    frames show the same. `number` is the frame's number: `vector` leads to number - 1
+    and number + 1, and frames of one number show one moment (the views of a stereo
+    pair). `samples` per pixel weigh the frame against others. `normal` is in the
+    camera's axes, but with Z pointing away from the viewer, as in Cycles' `Denoising
+    Normal`. `depth` (H, W) is the distance of the first hit from the camera, along the
+    camera's axis, at each pixel's centre; infinite, or above 1e9, without a hit.
+
+    `still` says that nothing at all moves or changes from frame to frame, no light
+    either: frames of equal cameras differ in their noise alone.
 
     Optional: `alpha` (H, W); `vector` (H, W, 4), Cycles' Vector pass: where the
     surface was one frame before minus where it is, then where it is minus where it will
@@ -82,7 +97,7 @@ class Frame:
 
     number: int
     camera: Camera
-    radiance: Array
+    radiance: Array | None
     albedo: Array
     normal: Array
     depth: Array
@@ -91,6 +106,7 @@ class Frame:
     vector: Array | None = None
     index: NDArray[Any] | None = None
     matrices: Mapping[int, Matrix] = field(default_factory=dict)
+    still: bool = False
 
     def __post_init__(self) -> None:
         for name, channels in (_PASSES | _OPTIONAL).items():
@@ -98,7 +114,7 @@ class Frame:
             if array is not None and array.shape != self.shape + channels:
                 raise PictureError(
                     f"{name} of frame {self.number} has shape {array.shape} where its "
-                    f"radiance asks for {self.shape + channels}: give passes of one "
+                    f"albedo asks for {self.shape + channels}: give passes of one "
                     "render"
                 )
         if not self.samples > 0:
@@ -110,17 +126,18 @@ class Frame:
     @property
     def shape(self) -> tuple[int, int]:
         """(H, W) of every array."""
-        return self.radiance.shape[0], self.radiance.shape[1]
+        return self.albedo.shape[0], self.albedo.shape[1]
 
 
 @dataclass(frozen=True, eq=False)
 class Stored:
     """A frame as the window keeps it: flat, packed, and free of NaN.
 
-    `picture` (H W, 9 or 10) holds radiance, albedo, normal and alpha, in half floats
-    where memory counts. `nearness` (H W) is 1 / depth, 0 without a hit; the depth
-    itself for an orthographic camera; NaN where it is not known. `spoilt` (H W) says
-    which pixels held NaN or infinities and are 0 now; None if none did.
+    `picture` (H W, 6 to 10) holds radiance (not of guides alone), albedo, normal and
+    alpha (or not), in half floats where memory counts. `nearness` (H W) is 1 / depth, 0
+    without a hit; the depth itself for an orthographic camera; NaN where it is not
+    known. `spoilt` (H W) says which pixels held NaN or infinities and are 0 now; None
+    if none did.
     """
 
     number: int
@@ -133,6 +150,16 @@ class Stored:
     vector: NDArray[Any] | None = None
     index: NDArray[Any] | None = None
     matrices: Mapping[int, Matrix] = field(default_factory=dict)
+    still: bool = False
+
+    @property
+    def has_light(self) -> bool:
+        """Whether there is radiance before albedo and normal."""
+        return self.picture.shape[1] >= 9
+
+    def shows_same(self, other: Stored) -> bool:
+        """Whether two frames differ in their noise alone."""
+        return self.still and other.still and self.camera.same(other.camera)
 
     @property
     def bytes(self) -> int:
@@ -146,7 +173,9 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
 
     `dtype` float16 halves the memory; values beyond +-65504 are cut to it.
     """
-    parts = [frame.radiance, frame.albedo, frame.normal]
+    parts = [frame.albedo, frame.normal]
+    if frame.radiance is not None:
+        parts.insert(0, frame.radiance)
     if frame.alpha is not None:
         parts.append(frame.alpha[..., None])
     picture = np.concatenate(parts, axis=-1, dtype=np.float32)
@@ -166,6 +195,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         vector=_half(frame.vector),
         index=None if frame.index is None else np.ravel(frame.index),
         matrices=frame.matrices,
+        still=frame.still,
     )
 
 

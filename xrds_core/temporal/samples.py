@@ -12,8 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -66,12 +64,4 @@ def continued(place: int, samples: int, radius: int, seed: int = 0) -> Portion:
 
 def _stands_still(cameras: Sequence[Camera], place: int) -> bool:
     beside = [x for x in (place - 1, place + 1) if 0 <= x < len(cameras)]
-    return any(_same(cameras[place], cameras[x]) for x in beside)
-
-
-def _same(one: Camera, two: Camera) -> bool:
-    return (
-        (one.size, one.window) == (two.size, two.window)
-        and np.array_equal(one.view, two.view)
-        and np.array_equal(one.project, two.project)
-    )
+    return any(cameras[place].same(cameras[x]) for x in beside)

@@ -1,0 +1,93 @@
+"""From low-resolution pixels to those of the picture, by the network or without."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from xrds_core.arrays import Array
+from xrds_core.errors import OutOfMemory
+
+from ..cycles.colour import converted, to_rec709, working_space
+from ..cycles.rendered import Beauty, Guides
+from .job import NetworkFailed, RenderJob
+
+if TYPE_CHECKING:
+    from xrds_core import Upscaled, Upscaler
+
+
+def enlarge(
+    beauty: Beauty,
+    guides: Guides,
+    job: RenderJob,
+    upscaler: Upscaler,
+    *,
+    exposure: float | None,
+    skip_idle: bool,
+    progress: Callable[[float], bool] | None = None,
+) -> Array:
+    """The region's radiance and alpha, (H, W, 4).
+
+    Raises Cancelled where `progress` says so, and NetworkFailed.
+    """
+    rows, columns = beauty.offset
+    matrix = to_rec709(working_space())
+
+    def placed(guide: Array | None) -> Array | None:
+        """Guides start where the first low-resolution pixel does."""
+        if guide is None:
+            return None
+        margin = ((rows, 0), (columns, 0), *[(0, 0)] * (guide.ndim - 2))
+        return np.pad(guide, margin, mode="edge")
+
+    def seen(colour: Array | None) -> Array | None:
+        """In the network's colour space."""
+        if matrix is None or colour is None:
+            return colour
+        return converted(colour, matrix)
+
+    try:
+        upscaled: Upscaled = upscaler(
+            seen(np.concatenate([beauty.radiance, beauty.alpha[..., None]], -1)),
+            placed(seen(guides.albedo)),
+            placed(guides.normal),
+            noisy=seen(beauty.noisy),
+            guide_radiance=placed(seen(guides.radiance)),
+            guide_alpha=placed(guides.alpha),
+            guide_samples=guides.samples,
+            exposure=exposure,
+            memory_limit=job.memory_limit,
+            progress=progress,
+            skip_idle=skip_idle,
+        )
+    except (OutOfMemory, RuntimeError, MemoryError) as error:  # as torch raises
+        reason = str(error).partition("\n")[0] or "out of memory"
+        message = (
+            f"the network failed ({reason}); the picture is the low-resolution render"
+        )
+        raise NetworkFailed(message, beauty.radiance, beauty.alpha) from error
+    region = upscaled.radiance[rows:, columns:]
+    return region if matrix is None else converted(region, np.linalg.inv(matrix))
+
+
+def enlarged_lights(
+    lights: dict[str, Array],
+    scale: int,
+    offset: tuple[int, int],
+    shape: tuple[int, ...],
+) -> dict[str, Array]:
+    """Low-resolution light passes (h, w, channels) on the picture's (H, W, ...)."""
+    return {name: bilinear(low, scale, offset, shape) for name, low in lights.items()}
+
+
+def bilinear(
+    low: Array, scale: int, offset: tuple[int, int], shape: tuple[int, ...]
+) -> Array:
+    """Enlarge (h, w, channels) without a network and cut the region out."""
+    from xrds_core.baselines import bilinear as enlarged
+
+    rows, columns = offset
+    large = enlarged(low, scale)
+    return large[rows : rows + shape[0], columns : columns + shape[1]]

@@ -1,0 +1,57 @@
+"""Where a shot cuts to something else, told by its cameras alone.
+
+Across a cut nothing is lent, whatever the pictures look like. A camera that another one
+replaces, another kind of camera, size or border, a lens that jumps and a view that
+swings away within one frame are cuts; a zoom and a fast pan are not.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from .frame import Camera, Stored
+
+# Factor by which the focal length may change from one frame to the next.
+_ZOOM = 1.25
+# Share of the angle of view by which a camera may turn from one frame to the next.
+_TURN = 0.5
+
+
+def is_cut(before: Camera, after: Camera) -> bool:
+    """Return whether something new begins between two frames beside each other."""
+    if _kind(before) != _kind(after):
+        return True
+    old, new = (np.abs(np.diag(c.project)[:2]) for c in (before, after))
+    if (np.maximum(old / new, new / old) > _ZOOM).any():
+        return True
+    cosine = before.view[2, :3] @ after.view[2, :3]
+    angle = np.arccos(np.clip(cosine, -1.0, 1.0))
+    seen = np.pi if before.orthographic else 2 * np.arctan(1 / min(*old, *new))
+    return bool(angle > _TURN * seen)
+
+
+def same_take(target: Stored, others: Sequence[Stored]) -> list[Stored]:
+    """Return those of `others`, in their order, that no cut parts from `target`.
+
+    Views of one moment, as of a stereo pair, belong together.
+    """
+    cameras = {frame.number: frame.camera for frame in (*others, target)}
+    taken = {target.number}
+    for step in (1, -1):
+        number = target.number
+        beyond = [n for n in cameras if (n - number) * step > 0]
+        for after in sorted(beyond, key=lambda n: n * step):
+            if is_cut(cameras[number], cameras[after]):
+                break
+            taken.add(after)
+            number = after
+    return [frame for frame in others if frame.number in taken]
+
+
+def _kind(camera: Camera) -> tuple[object, ...]:
+    return camera.name, camera.orthographic, camera.size, camera.window
