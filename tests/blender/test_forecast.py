@@ -30,3 +30,11 @@ def test_memory_stays_under_a_limit() -> None:
 def test_rays_are_those_of_every_full_size_pixel() -> None:
     assert forecast.rays(64, 4, 4) == (4.0, 4.0)
     assert forecast.low_size(1366, 768, 8) == (171, 96)
+
+
+def test_memory_of_a_shot_grows_with_its_window() -> None:
+    assert forecast.shot_memory(1920, 1080, 0) == 0
+    one, four = (forecast.shot_memory(1920, 1080, r) for r in (1, 4))
+    assert 2.5 < four / one < 4.0
+    # guides of full size hold no light, and the light is small
+    assert forecast.shot_memory(1920, 1080, 4, scale=4) < four

@@ -381,3 +381,20 @@ def test_presets_hold_all_settings() -> None:
     held = set(presets.XRDS_OT_preset_add.preset_values) - {"scene.cycles.samples"}
     names = set(properties.XRDSSettings.bl_rna.properties.keys()) - {"rna_type", "name"}
     assert held == {f"scene.xrds.{name}" for name in names}
+
+
+def test_the_status_bar_tells_the_frames_left() -> None:
+    class Engine:
+        def update_stats(self, *_: str) -> None: ...
+
+        def update_progress(self, _: float) -> None: ...
+
+    progress.begin_frame(12, 36, 754.0)
+    progress.begin(Engine(), "Samples", 1, 2)
+    assert progress.current() == "Frame 12 (36 left, about 13 min). XRDS 1/2: Samples"
+    progress.end()
+    assert progress.current() is None
+    progress.begin_frame(48, 0, None)
+    progress.begin(Engine(), "Samples", 1, 2)
+    assert progress.current() == "Frame 48 (the last one). XRDS 1/2: Samples"
+    progress.end()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shots import HEIGHT, WIDTH, camera, view
@@ -90,3 +92,5 @@ def test_memory_is_foretold() -> None:
     frame = view(0, camera()).frame
     assert store(frame, np.float16).bytes == bytes_needed(WIDTH, HEIGHT, 1)
     assert bytes_needed(1920, 1080, 9) < 420e6
+    guides = store(replace(frame, radiance=None), np.float16)
+    assert guides.bytes == bytes_needed(WIDTH, HEIGHT, 1, light=False)

@@ -25,6 +25,7 @@ STAGES = (
 )
 
 _current: str | None = None
+_frames_left: str = ""
 
 
 def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
@@ -33,6 +34,25 @@ def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
     _current = f"XRDS {number}/{of}: {stage}"
     engine.update_stats("XRDS", stage)
     engine.update_progress(0.0)
+
+
+def begin_frame(number: int, left: int, seconds: float | None) -> None:
+    """Note which frame of an animation has begun, and what is left after it.
+
+    `seconds`: an estimate for this frame and those after it; None without one.
+    """
+    global _frames_left
+    rest = "the last one" if not left else f"{left} left"
+    if seconds is not None:
+        rest += f", about {_time(seconds)}"
+    _frames_left = f"Frame {number} ({rest}). "
+
+
+def _time(seconds: float) -> str:
+    minutes = round(seconds / 60)
+    if minutes < 1:
+        return f"{seconds:.0f} s"
+    return f"{minutes} min" if minutes < 90 else f"{minutes / 60:.1f} h"
 
 
 def reporter(engine: Any) -> Callable[[float], bool]:
@@ -47,10 +67,10 @@ def reporter(engine: Any) -> Callable[[float], bool]:
 
 def end() -> None:
     """Note that the render is over, however it ended."""
-    global _current
-    _current = None
+    global _current, _frames_left
+    _current, _frames_left = None, ""
 
 
 def current() -> str | None:
     """What is being done, None between renders."""
-    return _current
+    return None if _current is None else _frames_left + _current

@@ -5,6 +5,8 @@ Pure functions of numbers; neither Blender nor torch is needed here.
 
 from __future__ import annotations
 
+from xrds_core.temporal.window import bytes_needed
+
 # Bytes of tensors per output pixel of a tile, as the network measures itself when it
 # runs, with what the allocator loses; the tests compare. Kept here because measuring
 # needs torch, which a panel must not load.
@@ -26,6 +28,10 @@ DEFAULT_LIMIT = 4 << 30
 PICTURE_CHANNELS = 24
 
 
+# Channels of Cycles' passes that an animation keeps of each frame sampled ahead.
+AHEAD_CHANNELS = 15
+
+
 def low_size(width: int, height: int, scale: int) -> tuple[int, int]:
     """Width and height of the small render."""
     return -(-width // scale), -(-height // scale)
@@ -44,3 +50,20 @@ def memory(
     network = pixels * (NETWORK_BYTES[preset, scale] * OVERHEAD + TILE_BYTES)
     pictures = pixels * PICTURE_CHANNELS * 4
     return int(pictures + min(network, limit or DEFAULT_LIMIT))
+
+
+def shot_memory(width: int, height: int, radius: int, scale: int = 1) -> int:
+    """Bytes that an animation's window of frames takes, of an ordinary scene.
+
+    Without the user's own passes; frames that lend `radius` to each side are kept.
+    """
+    if not radius:
+        return 0
+    frames = 2 * radius + 1
+    low = low_size(width, height, scale)
+    window = bytes_needed(*low, frames, alpha=True, vector=True)
+    if scale > 1:
+        window += bytes_needed(
+            width, height, frames, alpha=True, vector=True, light=False
+        )
+    return window + radius * width * height * AHEAD_CHANNELS * 4

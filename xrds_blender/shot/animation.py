@@ -46,17 +46,30 @@ class _Window:
     """The frames of one view layer that are kept, by number.
 
     `passes` are Cycles' own of frames that were sampled before their turn. `first` is,
-    by camera, the first frame that was sampled, and its passes of one sample.
+    by camera, the first frame that was sampled, and its passes of one sample; `count`
+    is how many were sampled since `began`.
     """
 
     job: RenderJob
     sampled: dict[int, Sampled] = field(default_factory=dict)
     passes: dict[int, _Passes] = field(default_factory=dict)
     first: dict[str, _First] = field(default_factory=dict)
+    began: float = field(default_factory=time.perf_counter)
+    count: int = 0
     method: FullSize = field(init=False)
 
     def __post_init__(self) -> None:
         self.method = method_of(self.job)
+
+    def begin_frame(self, scene: Any) -> None:
+        """Show how far the animation is; frames ahead are sampled already."""
+        number, end, step = scene.frame_current, scene.frame_end, scene.frame_step
+        newest = max(self.sampled, default=number - step)
+        seconds = None
+        if self.count:
+            each = (time.perf_counter() - self.began) / self.count
+            seconds = each * ((end - newest) // step + 1)
+        progress.begin_frame(number, (end - number) // step, seconds)
 
     def forget_before(self, number: int) -> None:
         for kept in (self.sampled, self.passes):
@@ -117,6 +130,7 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
     if window is None or window.job != job:
         window = _windows[scene.name, layer_name] = _Window(job)
     window.forget_before(needed[0])
+    window.begin_frame(scene)
     _sample_missing(engine, depsgraph, window, number, needed)
 
     lenders = [window.sampled[n] for n in needed if n != number]
@@ -178,6 +192,7 @@ def _sample_missing(
                 if each != depsgraph.scene_eval.frame_current:
                     engine.frame_set(each, 0.0)
                 window.sampled[each] = _sample(engine, depsgraph, window, passes)
+                window.count += 1
                 if each >= number and missing[-1] != number:
                     window.passes[each] = passes.all_passes()
         finally:

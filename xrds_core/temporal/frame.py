@@ -114,7 +114,7 @@ class Frame:
             if array is not None and array.shape != self.shape + channels:
                 raise PictureError(
                     f"{name} of frame {self.number} has shape {array.shape} where its "
-                    f"albedo asks for {self.shape + channels}: give passes of one "
+                    f"normal asks for {self.shape + channels}: give passes of one "
                     "render"
                 )
         if not self.samples > 0:
@@ -126,7 +126,7 @@ class Frame:
     @property
     def shape(self) -> tuple[int, int]:
         """(H, W) of every array."""
-        return self.albedo.shape[0], self.albedo.shape[1]
+        return self.normal.shape[0], self.normal.shape[1]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """Where a shot cuts to something else, told by its cameras alone.
 
 Across a cut nothing is lent, whatever the pictures look like. A camera that another one
-replaces, another kind of camera, size or border, a lens that jumps and a view that
-swings away within one frame are cuts; a zoom and a fast pan are not.
+replaces, another kind of camera or size of frame, a lens that jumps and a view that
+swings away within one frame are cuts; a zoom, a fast pan and another border are not.
 """
 
 from __future__ import annotations
@@ -54,4 +54,4 @@ def same_take(target: Stored, others: Sequence[Stored]) -> list[Stored]:
 
 
 def _kind(camera: Camera) -> tuple[object, ...]:
-    return camera.name, camera.orthographic, camera.size, camera.window
+    return camera.name, camera.orthographic, camera.size

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 Kept = TypeVar("Kept")
 
-# Of radiance, albedo and normal, in half floats, and nearness; then of a Vector pass
+# Of albedo and normal, in half floats, and nearness; then of radiance, a Vector pass
 # and an alpha, in half floats, and an index.
-_BYTES = 3 * 3 * 2 + 4
-_VECTOR_BYTES, _ALPHA_BYTES, _INDEX_BYTES = 8, 2, 4
+_BYTES = 2 * 3 * 2 + 4
+_LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES, _INDEX_BYTES = 6, 8, 2, 4
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,12 @@ def bytes_needed(
     alpha: bool = False,
     vector: bool = False,
     index: bool = False,
+    light: bool = True,
 ) -> int:
-    """Return the bytes that `frames` frames of half floats take in a window."""
-    each = _BYTES + _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha + _INDEX_BYTES * index
+    """Return the bytes that `frames` frames of half floats take in a window.
+
+    Guides alone have no `light`.
+    """
+    each = _BYTES + _LIGHT_BYTES * light
+    each += _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha + _INDEX_BYTES * index
     return width * height * each * frames
