@@ -356,7 +356,7 @@ def test_continued_frames_keep_passes_of_one_sample(
         animation.render.filepath = str(blend.parent / f"own{number}.exr")
         bpy.ops.render.render(write_still=True)
         ours, own = (
-            next(p for n, p in layers(blend.parent / path).items() if "Depth.Z" in n)
+            next(p for n, p in layers(blend.parent / path).items() if ".Depth.Z" in n)
             for path in (f"f12/{number}.exr", f"own{number}.exr")
         )
         np.testing.assert_allclose(ours, own, rtol=1e-3)

@@ -78,7 +78,7 @@ def _draw_choices(layout: Any, scene: Any, job: RenderJob, at_hand: Means) -> No
     if job.is_enlarged:
         offered = [p for p in PRESETS if _network(job, preset=p) in at_hand.networks]
         _offer(column, settings, "preset", offered)
-    elif not (job.plain or job.is_picked):
+    if not (job.plain or job.is_picked):
         column.prop(settings, "temporal_radius")
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .facts_cache import FactsCache
 
 Row = tuple[str, str]
-MOST_ROWS = 5
+MOST_ROWS = 6
 _STAGES = {
     "sync": "Scene",
     "beauty": "Samples",
@@ -51,7 +51,7 @@ def forget() -> None:
 
 
 def next_render(scene: Any, job: RenderJob, at_hand: Means) -> list[Row]:
-    """Name and value of what the render will do, take and leave out; five at most."""
+    """Name and value of what the render will do, take and leave out; six at most."""
     size = frame_size(scene.render)
     if job.is_picked:
         return [("Picture", _size(*size)), ("About", _foreseen(scene, job, at_hand))]
@@ -63,11 +63,17 @@ def next_render(scene: Any, job: RenderJob, at_hand: Means) -> list[Row]:
         told = f"OIDN {mode.quality}, {mode.prefilter}" if mode else translated("none")
         return [*rows, ("Denoising", told)]
     rows.append(("Denoising", translated(_QUALITIES[job.denoise])))
-    if job.temporal_radius:
-        text = "{radius} before and after"
-        neighbours = translated(text, radius=job.temporal_radius)
-        rows.append(("Neighbouring Frames", neighbours))
-    return rows
+    return rows + _neighbours(size, job)
+
+
+def _neighbours(size: tuple[int, int], job: RenderJob) -> list[Row]:
+    """How many frames an animation keeps, and the memory that they take."""
+    if not job.temporal_radius:
+        return []
+    text = "{radius} before and after, {memory}"
+    taken = _amount(forecast.shot_memory(*size, job.temporal_radius, job.scale))
+    told = translated(text, radius=job.temporal_radius, memory=taken)
+    return [("Neighbouring Frames", told)]
 
 
 def _foreseen(scene: Any, job: RenderJob, at_hand: Means) -> str:
@@ -97,6 +103,7 @@ def _enlarged(scene: Any, job: RenderJob) -> list[Row]:
         ("Guides", guides if chosen.render_guides else translated("none")),
         ("Network", f"{translated(_PRESETS[job.preset])}, {job.scale}×"),
         ("Memory", f"≤ {_amount(taken)}"),
+        *_neighbours(size, job),
     ]
     left_out = ", ".join(translated(each) for each in _left_out(chosen))
     return [*rows, ("Left Out", left_out)] if left_out else rows
