@@ -378,3 +378,27 @@ def test_an_animation_continues_the_sequence_of_the_command(
         ours = combined(blend.parent / "f12" / f"{number}.exr")
         theirs = picture(blend.parent / "command" / f"{number}.exr")
         np.testing.assert_allclose(ours, theirs, atol=2e-3)
+
+
+def test_views_of_a_pair_lend_to_each_other(
+    animation: Any, blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They see the same floor from two places, each with its own camera."""
+    gathered = []
+    accumulate = finishing.accumulate
+
+    def keep(own: Any, lenders: Any, movement: Any) -> Any:
+        gathered.append((own, list(lenders), accumulate(own, lenders, movement)))
+        return gathered[-1][2]
+
+    monkeypatch.setattr(finishing, "accumulate", keep)
+    animation.render.use_multiview = True
+    animation.render.views_format = "STEREO_3D"
+    animation.camera.data.stereo.interocular_distance = 0.3
+    animation.frame_set(3)
+    list(shot.render_shot(animation, RenderJob(scale=1, temporal_radius=1), [3]))
+    own, (other,), found = gathered[0]
+    assert own.number == other.number == 3
+    apart = np.linalg.inv(other.camera.view) - np.linalg.inv(own.camera.view)
+    assert np.linalg.norm(apart[:3, 3]) == pytest.approx(0.3, rel=1e-3)
+    assert 1.6 < found.samples.mean() <= 2.0

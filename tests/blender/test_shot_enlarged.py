@@ -65,7 +65,7 @@ def picture(path: Path) -> np.ndarray:
     return np.dstack([channels[name] for name in names])
 
 
-def test_neighbours_make_a_better_picture(moving: Path) -> None:
+def test_light_and_guides_of_neighbours_make_a_better_picture(moving: Path) -> None:
     render(moving, "alone", job={"temporal_radius": 0})
     result = render(moving, "shot")
     bpy.ops.wm.open_mainfile(filepath=str(moving))
@@ -145,7 +145,9 @@ def layer(path: Path, name: str, letters: str = "RGB") -> np.ndarray:
     return np.dstack([found[each] for each in names])
 
 
-def test_an_animation_is_the_shot_of_the_command(animation: Any, moving: Path) -> None:
+def test_an_enlarged_animation_is_the_shot_of_the_command(
+    animation: Any, moving: Path
+) -> None:
     bpy.ops.render.render(animation=True)
     render(moving, "command")
     for number in FRAMES:
