@@ -145,3 +145,34 @@ def test_plain_alone_does_not_tell_samples_from_denoising() -> None:
     after = learn(known, Way.FULL_SIZE, ASKED, PIXELS, FULL, MODEL)
     again = learn(after, Way.PLAIN, ASKED, PIXELS, plain, MODEL)
     assert again.beauty == pytest.approx(2.0, rel=0.01)
+
+
+def test_layers_of_a_scene_add_up() -> None:
+    from types import SimpleNamespace
+
+    from xrds_blender.frame import history
+    from xrds_blender.frame.job import Picture, RenderJob
+
+    history.forget()
+    picture = Picture(None, None, seconds=FULL)
+    job = RenderJob(1)
+    for layer in ("fore", "back"):
+        history.keep(history.Place("Scene", layer, PIXELS, 16, None), job, picture)
+    render = SimpleNamespace(
+        resolution_x=1920,
+        resolution_y=1080,
+        resolution_percentage=100,
+        use_border=False,
+    )
+    layers = [SimpleNamespace(name=n, use=n != "off") for n in ("fore", "back", "off")]
+    scene = SimpleNamespace(name="Scene", view_layers=layers, render=render)
+    asked = history.asked_of(job, 16, None)
+    one = history.seconds(scene, Way.FULL_SIZE, asked)
+    assert one == pytest.approx(2 * 39.667)
+    assert history.last(scene).seconds["beauty"] == 64.0
+    assert history.costs(scene) is None
+    layers[1].use = False
+    assert history.seconds(scene, Way.FULL_SIZE, asked) == pytest.approx(one / 2)
+    layers[2].use = True  # never rendered
+    assert history.seconds(scene, Way.FULL_SIZE, asked) is None
+    history.forget()

@@ -6,7 +6,7 @@ Kept for as long as Blender runs and the file is open, for the panel to show.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ..cycles import session
@@ -15,7 +15,6 @@ from ..planning import budget
 from ..planning.budget import Costs
 from ..planning.denoiser import Denoiser
 from ..planning.measured import Measured, learn
-from ..planning.plan import Decision
 from ..planning.ways import Asked, Way
 from .job import Picture, RenderJob
 
@@ -33,15 +32,15 @@ class Place:
 
 @dataclass(frozen=True)
 class LastRender:
-    """The way and the samples that were taken, the seconds by stage, and the plan."""
+    """The way and the samples that were taken, and the seconds by stage."""
 
     way: Way
     samples: int
     seconds: Mapping[str, float]
-    plan: tuple[Decision, ...]
 
 
-_last: dict[str, LastRender] = {}
+# By name of the scene and of the view layer.
+_last: dict[str, dict[str, LastRender]] = {}
 _measured: dict[str, dict[str, Measured]] = {}
 
 
@@ -87,7 +86,8 @@ def keep(place: Place, job: RenderJob, picture: Picture) -> None:
     way = Way.of(job.scale, job.plain)
     asked = asked_of(job, place.samples, place.plain_denoiser)
     seconds = dict(picture.seconds)
-    _last[place.scene] = LastRender(way, asked.samples, seconds, picture.plan)
+    done = LastRender(way, asked.samples, seconds)
+    _last.setdefault(place.scene, {})[place.layer] = done
     layers = _measured.setdefault(place.scene, {})
     layers[place.layer] = learn(
         layers.get(place.layer), way, asked, place.pixels, seconds, budget.shipped()
@@ -95,8 +95,14 @@ def keep(place: Place, job: RenderJob, picture: Picture) -> None:
 
 
 def last(scene: Any) -> LastRender | None:
-    """The scene's last render since the file was opened."""
-    return _last.get(scene.name)
+    """The scene's last render since the file was opened: all its layers together."""
+    layers = _last.get(scene.name, {})
+    done = [layers[x.name] for x in scene.view_layers if x.use and x.name in layers]
+    if not done:
+        return None
+    stages = {stage for each in done for stage in each.seconds}
+    seconds = {s: sum(each.seconds.get(s, 0.0) for each in done) for s in stages}
+    return replace(done[-1], seconds=seconds)
 
 
 def seconds(scene: Any, way: Way, asked: Asked) -> float | None:

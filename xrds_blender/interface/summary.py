@@ -60,7 +60,8 @@ def next_render(scene: Any, job: RenderJob, at_hand: Means) -> list[Row]:
     rows = [("Picture", _sampled(*size, scene.cycles.samples))]
     if job.plain:
         mode = plain_denoiser(scene)
-        told = f"OIDN {mode.quality}, {mode.prefilter}" if mode else translated("none")
+        named = mode and f"OIDN {mode.quality.title()}, {mode.prefilter.title()}"
+        told = named or translated("none")
         return [*rows, ("Denoising", told)]
     rows.append(("Denoising", translated(_QUALITIES[job.denoise])))
     return rows + _neighbours(size, job)
