@@ -41,6 +41,7 @@ MODULES = (
     "passes",
     "picking",
     "shot",
+    "translations",
     "unchanged",
 )
 Verdicts = dict[str, str]
