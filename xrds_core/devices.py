@@ -22,7 +22,7 @@ def choose_device(name: str = "auto") -> torch.device:
         return torch.device(present[0] if present else "cpu")
     try:
         device = torch.device(name)
-        torch.zeros(1, device=device)
+        torch.zeros(1, device=device).cpu()  # "meta" holds no numbers
     except (RuntimeError, AssertionError, NotImplementedError) as error:
         # torch's own text runs over many lines
         reason = str(error).partition("\n")[0]

@@ -19,6 +19,7 @@ from .arrays import Array
 from .atomic import replacing
 from .errors import PictureError
 from .exr_channels import Channels
+from .exr_encoding import FLOAT_ZIP, Encoding
 from .exr_library import Part, Window
 
 
@@ -93,14 +94,16 @@ def read_guides(
     return Guides(albedo, normal, radiance, file.alpha(names.beauty))
 
 
-def write_picture(path: str | Path, channels: Mapping[str, Array]) -> None:
-    """Write (H, W) planes by channel name, as float32, all at once or not at all.
+def write_picture(
+    path: str | Path, channels: Mapping[str, Array], encoding: Encoding = FLOAT_ZIP
+) -> None:
+    """Write (H, W) planes by channel name, all at once or not at all.
 
     Raises PictureError, and leaves `path` as it was, if it cannot be written.
     """
-    planes = {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}
+    planes = {name: encoding.plane(pixels) for name, pixels in channels.items()}
     with _whole(path) as unfinished:
-        exr_library.write(unfinished, planes)
+        exr_library.write(unfinished, planes, encoding.codec)
 
 
 def copy_picture(
@@ -141,7 +144,6 @@ def display_size(path: str | Path, *, whole: bool = False) -> tuple[int, int]:
 
     Raises PictureError where it cannot be read; for `whole`, also where pixels cannot.
     """
-    _check_file(path)
     read = exr_library.read if whole else exr_library.read_headers
     (left, top), (right, bottom) = read(path)[0].display_window
     return right - left + 1, bottom - top + 1
@@ -156,7 +158,7 @@ class File:
 
     def __init__(self, path: str | Path) -> None:
         self.path = path
-        self.parts = _read(path)
+        self.parts = exr_library.read(path)
         self._places = _places(self.parts)
         self.names = Channels(path, self._places)
         self.window: Window | None = None
@@ -202,16 +204,6 @@ class File:
                 "save it with flat channels of full resolution"
             )
         return _placed(pixels, part, self.window or part.display_window)
-
-
-def _read(path: str | Path) -> list[Part]:
-    _check_file(path)
-    return exr_library.read(path)
-
-
-def _check_file(path: str | Path) -> None:
-    if not Path(path).is_file():
-        raise PictureError(f"no file {path}")
 
 
 def _places(parts: list[Part]) -> dict[str, tuple[int, str]]:

@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import ctypes
 import json
+import math
 import os
 import sys
-from collections.abc import Mapping
-from contextlib import redirect_stdout
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass, field
 from functools import cache
 from io import StringIO
@@ -25,17 +27,18 @@ import numpy as np
 from .atomic import scratch_folder
 from .children import run_python
 from .errors import PictureError
+from .exr_encoding import FLOAT_ZIP, Pixels, fitting
+from .exr_limits import check_claims, limit_of
+from .files import check_input
 
-Pixels = np.ndarray[Any, Any]
 Window = tuple[tuple[int, int], tuple[int, int]]
 Attributes = dict[str, Any]
 """Of a header: texts, numbers, and matrices as lists of rows."""
 
-_LARGEST_SIDE = 1 << 16  # pixels; more is a damaged header
-_LARGEST_HALF = 65504.0
 _FAULTS = (RuntimeError, ValueError, TypeError, MemoryError)  # of a damaged file
 # Of a header, what a file with other channels has anew.
 _OF_CHANNELS = {"channels", "name", "type", "tiles", "chunkCount", "version"}
+_stderr = threading.Lock()
 
 
 @dataclass(frozen=True)
@@ -52,37 +55,45 @@ class Part:
 
 
 def read(path: str | Path) -> list[Part]:
-    """Read all parts of a file; raises PictureError if it is not whole."""
-    return _read(path) if not _is_shadowed() else _read_apart("read", path)
+    """Read all parts of a file.
+
+    Raises PictureError if it is not whole, or its header claims more than
+    `exr_limits.limit_of` allows: then before memory is taken.
+    """
+    limit = limit_of(check_input(Path(path)))
+    return _read(path, limit) if not _is_shadowed() else _read_apart(path, limit)
 
 
 def read_headers(path: str | Path) -> list[Part]:
     """Read all parts of a file without their channels; raises PictureError."""
-    return _read_headers(path) if not _is_shadowed() else _read_apart("headers", path)
+    check_input(Path(path))
+    return _read_headers(path) if not _is_shadowed() else _read_apart(path, 0)
 
 
-def write(path: str | Path, planes: Mapping[str, Pixels]) -> None:
+def write(
+    path: str | Path, planes: Mapping[str, Pixels], codec: str = FLOAT_ZIP.codec
+) -> None:
     """Write planes of one size by channel name, in their own number formats.
 
     Raises PictureError with the library's reason if they cannot be written.
     """
     height, width = next(iter(planes.values())).shape
     window = ((0, 0), (width - 1, height - 1))
-    write_part(path, Part("", window, window, dict(planes)))
+    write_part(path, Part("", window, window, dict(planes)), codec)
 
 
-def write_part(path: str | Path, part: Part) -> None:
+def write_part(path: str | Path, part: Part, codec: str = FLOAT_ZIP.codec) -> None:
     """Write a file of one part, with its windows and attributes.
 
     Matrices are written in single precision. Raises PictureError as `write`.
     """
     if not _is_shadowed():
-        _write(path, part)
+        _write(path, part, codec)
         return
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         _pack(archive, [part])
-        _apart("write", path, archive)
+        _apart("write", path, archive, codec)
 
 
 def copy(
@@ -99,15 +110,16 @@ def copy(
     another takes its number format. `alone`: nothing but `planes` is written, beside
     the part's windows and attributes. Raises PictureError.
     """
+    limit = limit_of(check_input(Path(source)))
     if not _is_shadowed():
-        _copy(source, path, planes, part, alone)
+        _copy(source, path, planes, part, alone, limit)
         return
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         window = ((0, 0), (0, 0))  # not read: the source has them
         told = {"source": os.fspath(source), "part": part, "alone": alone}
         _pack(archive, [Part("", window, window, dict(planes), told)])
-        _apart("copy", path, archive)
+        _apart("copy", path, archive, str(limit))
 
 
 @cache
@@ -116,8 +128,8 @@ def _is_shadowed() -> bool:
     return sys.platform == "linux" and hasattr(ctypes.CDLL(None), "exr_start_read")
 
 
-def _read(path: str | Path) -> list[Part]:
-    parts = _opened(path).parts
+def _read(path: str | Path, limit: int) -> list[Part]:
+    parts = _opened(path, limit).parts
     return [
         _part(each, {name: x.pixels for name, x in each.channels.items()})
         for each in parts
@@ -126,7 +138,8 @@ def _read(path: str | Path) -> list[Part]:
 
 def _read_headers(path: str | Path) -> list[Part]:
     try:
-        return [_part(each, {}) for each in _headers(path)]
+        with _silent_library():
+            return [_part(each, {}) for each in _headers(path)]
     except _FAULTS as error:
         raise _incomplete(path, error) from error
 
@@ -142,23 +155,22 @@ def _part(part: Any, channels: dict[str, Pixels]) -> Part:
     )
 
 
-def _headers(path: str | Path) -> Any:
+def _headers(path: str | Path, limit: float = math.inf) -> Any:
     import OpenEXR
 
     headers = OpenEXR.File(str(path), header_only=True).parts
-    for part in headers:
-        _check_windows(path, part.header)
+    check_claims(path, [part.header for part in headers], limit)
     return headers
 
 
-def _opened(path: str | Path) -> Any:
+def _opened(path: str | Path, limit: int) -> Any:
     """Return the library's file with all its pixels; PictureError if not whole."""
     import OpenEXR
 
     try:
-        headers = _headers(path)
         # OpenEXR leaves out a part that it cannot read and says why on stdout
-        with redirect_stdout(StringIO()) as output:
+        with _silent_library(), redirect_stdout(StringIO()) as output:
+            headers = _headers(path, limit)
             file = OpenEXR.File(str(path), separate_channels=True)
     except _FAULTS as error:
         raise _incomplete(path, error) from error
@@ -181,10 +193,33 @@ def _attributes(header: Mapping[str, Any]) -> Attributes:
     return plain | matrices
 
 
-def _write(path: str | Path, part: Part) -> None:
+@contextmanager
+def _silent_library() -> Iterator[None]:
+    """Drop what the library's C code prints on stderr; its exceptions say the same."""
+    with _stderr:
+        try:
+            kept = os.dup(2)
+        except OSError:  # closed
+            yield
+            return
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, 2)
+        os.close(nothing)
+        try:
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+
+
+def _write(path: str | Path, part: Part, codec: str) -> None:
     import OpenEXR
 
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    compression = "NO" if codec == "none" else codec.upper()
+    header = {
+        "compression": getattr(OpenEXR, f"{compression}_COMPRESSION"),
+        "type": OpenEXR.scanlineimage,
+    }
     for name, value in part.attributes.items():
         matrix = isinstance(value, list)
         header[name] = np.asarray(value, np.float32) if matrix else value
@@ -194,7 +229,8 @@ def _write(path: str | Path, part: Part) -> None:
     # the library reads other arrays as if they were contiguous
     planes = {name: np.ascontiguousarray(x) for name, x in part.channels.items()}
     try:
-        OpenEXR.File(header, planes).write(str(path))
+        with _silent_library():
+            OpenEXR.File(header, planes).write(str(path))
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
 
@@ -205,16 +241,17 @@ def _copy(
     planes: Mapping[str, Pixels],
     number: int,
     alone: bool,
+    limit: int,
 ) -> None:
     import OpenEXR
 
-    file = _opened(source)
+    file = _opened(source, limit)
     part = file.parts[number]
     channels = {} if alone else part.channels
     for name, pixels in planes.items():
         if name in channels:
             old = channels[name].pixels
-            old[...] = _fitting(pixels, old.dtype)
+            old[...] = fitting(pixels, old.dtype)
         else:
             channels[name] = OpenEXR.Channel(name, np.ascontiguousarray(pixels))
     try:
@@ -222,16 +259,10 @@ def _copy(
             header = {k: v for k, v in part.header.items() if k not in _OF_CHANNELS}
             header["type"] = OpenEXR.scanlineimage
             file = OpenEXR.File(header, channels)
-        file.write(str(path))
+        with _silent_library():
+            file.write(str(path))
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
-
-
-def _fitting(pixels: Pixels, dtype: Any) -> Pixels:
-    """Return pixels in another number format, cut to what a half float can hold."""
-    if dtype == np.float16:
-        pixels = np.clip(pixels, -_LARGEST_HALF, _LARGEST_HALF)
-    return pixels.astype(dtype)
 
 
 def _window(corners: Any) -> Window:
@@ -239,26 +270,18 @@ def _window(corners: Any) -> Window:
     return (int(left), int(top)), (int(right), int(bottom))
 
 
-def _check_windows(path: str | Path, header: Any) -> None:
-    for name in ("dataWindow", "displayWindow"):
-        least, most = _window(header[name])
-        sides = [b - a + 1 for a, b in zip(least, most, strict=True)]
-        if not all(0 < side <= _LARGEST_SIDE for side in sides):
-            raise PictureError(
-                f"{path} is damaged: its {name} is {sides[0]}x{sides[1]} pixels"
-            )
-
-
-def _read_apart(task: str, path: str | Path) -> list[Part]:
+def _read_apart(path: str | Path, limit: int) -> list[Part]:
+    """Read all parts, without a limit their headers alone."""
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
-        _apart(task, path, archive)
+        _apart("read" if limit else "headers", path, archive, str(limit))
         return _unpack(archive)
 
 
-def _apart(task: str, path: str | Path, archive: Path) -> None:
+def _apart(task: str, path: str | Path, archive: Path, how: str) -> None:
     """Do a task in a process without the program's library."""
-    done = run_python("-m", __name__, task, os.fspath(path), str(archive))
+    words = (task, os.fspath(path), str(archive), how)
+    done = run_python("-m", __name__, *words)
     if done.returncode:
         lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
         raise PictureError(lines[-1])
@@ -293,21 +316,22 @@ def _unpack(archive: Path) -> list[Part]:
         ]
 
 
-def _main(task: str, path: str, archive: str) -> int:
+def _main(task: str, path: str, archive: str, how: str) -> int:
+    """Do a task; `how` is the limit of what is read, or the codec of what is not."""
     try:
         if task == "read":
-            _pack(Path(archive), _read(path))
+            _pack(Path(archive), _read(path, int(how)))
             return 0
         if task == "headers":
             _pack(Path(archive), _read_headers(path))
             return 0
         (part,) = _unpack(Path(archive))
         if task == "write":
-            _write(path, part)
+            _write(path, part, how)
         else:
             told = part.attributes
             source, number, alone = told["source"], told["part"], told["alone"]
-            _copy(source, path, part.channels, number, alone)
+            _copy(source, path, part.channels, number, alone, int(how))
     except PictureError as error:
         print(error, file=sys.stderr)
         return 1

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import torch
 
 from .exr import CYCLES, Names, read_beauty, read_guides, write_picture
-from .output import check_output
+from .exr_encoding import FLOAT_ZIP, Encoding
+from .files import check_output
 from .progress import Callback
 from .upscaler import Upscaler
 
@@ -28,6 +30,8 @@ def upscale_file(
     memory_limit: int | None = None,
     weights: str | Path | None = None,
     names: Names = CYCLES,
+    encoding: Encoding = FLOAT_ZIP,
+    threads: int | None = None,
     progress: Callback | None = None,
 ) -> dict[str, Any]:
     """Enlarge a low-resolution EXR under full-resolution passes; write an EXR.
@@ -40,6 +44,8 @@ def upscale_file(
             is made.
         weights: a folder of presets, or a file, in place of the shipped ones.
         names: what the passes are called in both files.
+        encoding: how the output holds its pixels.
+        threads: of the processor, for this process from now on.
 
     The other arguments are those of `Upscaler`.
 
@@ -52,6 +58,8 @@ def upscale_file(
     """
     start = time.perf_counter()
     check_output(Path(output), (beauty, guide_file))
+    if threads is not None:
+        torch.set_num_threads(threads)
     upscaler = Upscaler(preset, scale, guides, device, weights=weights)
     low = read_beauty(beauty, names)
     passes = read_guides(guide_file, full=guides == "full", names=names)
@@ -68,7 +76,7 @@ def upscale_file(
         progress=progress,
     )
     planes = zip("RGBA", np.moveaxis(result.radiance, 2, 0), strict=False)
-    write_picture(output, dict(planes))
+    write_picture(output, dict(planes), encoding)
     return {
         "output": str(output),
         "seconds": time.perf_counter() - start,

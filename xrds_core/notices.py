@@ -10,5 +10,7 @@ from .errors import printable
 
 def warn(text: str) -> None:
     """Tell the user one line; lost where there is no stderr to take it."""
+    if sys.stderr is None:
+        return
     with suppress(OSError, ValueError):  # full, or closed
         print(f"xrds: {printable(text)}", file=sys.stderr, flush=True)

@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from xrds_blender.command import console, main
+from xrds_blender.command.options import choice_of, encoding_of, job_of
 from xrds_core.errors import (
     Cancelled,
     PictureError,
@@ -23,9 +24,12 @@ from xrds_core.errors import (
     WeightsError,
     XRDSError,
 )
+from xrds_core.exr_encoding import Encoding
 from xrds_core.network import XRDS, preset_config
+from xrds_core.version import package_version
 from xrds_core.weights import file_name, save
 
+HUGE = "99999999999999999999999"  # more than 64 bits
 MAIN = "import sys, xrds_blender.command.main as m; sys.exit(m.main(sys.argv[1:]))"
 
 
@@ -54,6 +58,22 @@ def run(code: str, *words: str) -> subprocess.CompletedProcess[str]:
         ["render", "a.blend", "-o", "b.exr", "--frames", "1-2", "--frame", "1"],
         ["render", "a.blend", "-o", "b.exr", "--samples", "0"],
         ["render", "a.blend", "-o", "b.exr", "--resolution", "0x5"],
+        ["render", "a.blend", "-o", "b.exr", "--resolution", "70000x4"],
+        ["render", "a.blend", "-o", "b.exr", "--frame", HUGE],
+        ["render", "a.blend", "-o", "#.exr", "--frames", "1-99999999999"],
+        ["render", "a.blend", "-o", "#.exr", "--frames", "1-2x0"],
+        ["render", "a.blend", "-o", "#.exr", "--frames", "1-9,12-"],
+        ["render", "a.blend", "-o", "b.exr", "--samples", HUGE],
+        ["render", "a.blend", "-o", "b.exr", "--seed", HUGE],
+        ["render", "a.blend", "-o", "b.exr", "--seed=-1"],
+        ["render", "a.blend", "-o", "b.exr", "--guide-samples", HUGE],
+        ["render", "a.blend", "-o", "b.exr", "--guide-limit", HUGE],
+        ["render", "a.blend", "-o", "b.exr", "--scale", "1", "--temporal-radius", HUGE],
+        ["render", "a.blend", "-o", "b.exr", "--memory-limit", HUGE + "G"],
+        ["render", "a.blend", "-o", "b.exr", "--exposure", "1e300"],
+        ["stability", "--out", __file__],
+        ["train", "a.toml", "--out", __file__],
+        ["plan-report", "unknown", "--out", "o"],
         ["render", "a.blend", "-o", "b.exr", "--preset", "best"],
         ["render", "a.blend", "-o", "b.exr", "--exposure", "0"],
         ["render", "a.blend", "-o", "b.exr", "--memory-limit", "much"],
@@ -75,6 +95,11 @@ def test_wrong_usage_is_2(words: list[str], capfd: pytest.CaptureFixture[str]) -
 def test_help_is_0(capfd: pytest.CaptureFixture[str]) -> None:
     assert main.main(["render", "--help"]) == 0
     assert "--guide-samples" in capfd.readouterr().out
+
+
+def test_the_version_is_told(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main.main(["--version"]) == 0
+    assert capfd.readouterr().out == f"XRDS {package_version()}\n"
 
 
 def test_without_the_laboratory_its_commands_are_not_listed(
@@ -104,8 +129,12 @@ def test_with_it_they_are(capfd: pytest.CaptureFixture[str]) -> None:
 def test_render_options() -> None:
     options = parse(
         "render a.blend -o f_####.png --frames=-2-3 --resolution 640x360 "
-        "--scale 4 --samples 9 --memory-limit 2G --exposure 0.5 --seed 7 --resume"
+        "--scale 4 --samples 9 --memory-limit 2G --exposure 0.5 --seed 7 --resume "
+        "--threads 3 --exr-depth half --exr-codec dwaa -y"
     )
+    assert job_of(options).threads == choice_of(options).threads == 3
+    assert encoding_of(options) == Encoding(half=True, codec="dwaa")
+    assert choice_of(options).trusted
     assert options.scene == Path("a.blend")
     assert options.frames == [-2, -1, 0, 1, 2, 3]
     assert options.resolution == (640, 360)
@@ -123,6 +152,56 @@ def test_render_options() -> None:
         False,
         False,
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "frames"),
+    [
+        ("5", [5]),
+        ("-2-1", [-2, -1, 0, 1]),
+        ("1-10x4", [1, 5, 9]),
+        ("1-9x4,120,3", [1, 5, 9, 120, 3]),
+        ("1-3,2-4", [1, 2, 3, 4]),
+        ("-5--3", [-5, -4, -3]),
+    ],
+)
+def test_frames_are_ranges_steps_and_lists(text: str, frames: list[int]) -> None:
+    assert parse(f"render a.blend -o #.exr --frames={text}").frames == frames
+
+
+LONG = "x" * 300
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["upscale", f"{LONG}.exr", "a.exr", "-o", "b.exr"],
+        ["upscale", "a.exr", "a.exr", "-o", f"{LONG}.exr"],
+        ["upscale", "a.exr", "a.exr", "-o", "b.exr", "--weights", LONG],
+        ["upscale", "a.exr", "a.exr", "-o", "b.exr", "--device", "meta"],
+        ["info", "--weights", LONG],
+        ["info", "--weights", "none"],
+        ["evaluate", "a", "--windows", LONG, "--references", "r"],
+        ["train", f"{LONG}.toml", "--out", "o"],
+        ["plan-report", f"{LONG}.blend", "--out", "o"],
+        ["plan-report", "none.blend", "--out", "o"],
+    ],
+    ids=lambda words: " ".join(words).replace(LONG, "LONG"),
+)
+def test_what_cannot_be_is_one_line(
+    words: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main.main(words) in {1, 2}
+    out, err = capfd.readouterr()
+    assert not out
+    assert err.startswith("xrds: ")
+    assert err.count("\n") == 1
+    assert "bug" not in err
+    assert not list(tmp_path.iterdir())
 
 
 def test_evaluate_lists() -> None:
@@ -172,14 +251,16 @@ def started(code: str) -> subprocess.Popen[str]:
     )
 
 
-def test_a_reader_that_leaves_early_is_no_fault() -> None:
-    code = """
-    import sys
+def test_a_reader_that_leaves_early_is_no_fault(tmp_path: Path) -> None:
+    code = f"""
+    from pathlib import Path
     from xrds_blender.command import console
+    console.prepare()
     def work():
         for _ in range(100_000):
             print("a line")
-    sys.exit(console.status_of(work))
+        Path({str(tmp_path)!r}, "picture").touch()
+    console.leave(console.status_of(work))
     """
     with started(code) as child:
         assert child.stdout is not None
@@ -188,6 +269,7 @@ def test_a_reader_that_leaves_early_is_no_fault() -> None:
         assert child.stderr is not None
         assert not child.stderr.read()
     assert child.returncode == 1
+    assert (tmp_path / "picture").exists()
 
 
 def test_json_has_stdout_to_itself() -> None:
@@ -195,27 +277,41 @@ def test_json_has_stdout_to_itself() -> None:
         """
         import ctypes, os
         from xrds_blender.command import console
-        with console.stdout_for_json() as write:
+        def work():
             print("Fra:1 from Python")
             ctypes.CDLL(None).puts(b"Fra:1 from C")
             os.write(1, b"Fra:1 from the kernel\\n")
-            write({"answer": 42})
+            return {"answer": 42}
+        console.status_with_json(work)
         """
     )
     assert json.loads(done.stdout) == {"answer": 42}
     assert done.stderr.count("Fra:1") == 3
 
 
-def test_no_json_when_the_work_fails(tmp_path: Path) -> None:
+@pytest.mark.parametrize("words", [["upscale"], ["renders"], ["render", "a"]])
+def test_wrong_usage_is_json_too(
+    words: list[str], capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main.main([*words, "--json"]) == 2
+    out, err = capfd.readouterr()
+    told = json.loads(out)
+    assert set(told) == {"error", "status"}
+    assert told["status"] == 2
+    assert err == f"xrds: {told['error']}\n"
+
+
+def test_a_failure_is_one_json_object(tmp_path: Path) -> None:
     beauty, out = str(tmp_path / "missing.exr"), str(tmp_path / "out.exr")
     weights = tmp_path / file_name("fast", 2)
     save(XRDS(preset_config("fast", 2)), weights, {})
     words = ["upscale", beauty, beauty, "-o", out, "--weights", str(weights)]
     done = run(MAIN, *words, "--json")
     assert done.returncode == 1
-    assert not done.stdout
-    assert done.stderr.startswith("xrds: ")
-    assert "missing.exr" in done.stderr
+    told = json.loads(done.stdout)
+    assert told["status"] == 1
+    assert "missing.exr" in told["error"]
+    assert done.stderr == f"xrds: {told['error']}\n"
 
 
 @pytest.mark.timeout(300)
@@ -271,3 +367,103 @@ def test_a_signal_does_not_wait_for_c(tmp_path: Path, name: str, told: str) -> N
     assert err == f"xrds: {told}\n"
     assert time.perf_counter() - start < 10
     assert not list(tmp_path.iterdir())
+
+
+# --- streams that the shell closed, or that take no more ------------------------------
+
+STREAMS = """
+import os, sys
+from pathlib import Path
+from xrds_blender.command import console, streams
+console.prepare()
+with open(sys.argv[1], "w") as picture:  # as any file that is opened afterwards
+    assert picture.fileno() > 2
+    def work():
+        for number in (1, 2):
+            try:
+                os.write(number, b"as Cycles prints from C")
+            except OSError:
+                pass
+        print("progress", file=sys.stderr)
+        picture.write("whole")
+        return {"answer": 42}
+    how = console.status_with_json if "--json" in sys.argv else console.status_of
+    status = how(work)
+    print("out.exr: 1.0 s")
+console.leave(status)
+"""
+
+
+@pytest.mark.skipif(os.name == "nt", reason="of a POSIX shell")
+@pytest.mark.parametrize(
+    ("shell", "status"),
+    [
+        (">&-", 1),
+        ("2>&-", 0),
+        (">&- 2>&-", 1),
+        ("<&- >&- 2>&-", 1),
+        ("> /dev/full", 1),
+        ("2> /dev/full", 0),
+        ("> /dev/full 2> /dev/full", 1),
+        ("2>&1 | true; exit ${PIPESTATUS[0]}", 1),
+        (">&- --json", 1),
+        ("> /dev/full --json", 1),
+        ("2>&- --json", 0),
+    ],
+)
+def test_closed_and_full_streams_cost_no_picture(
+    tmp_path: Path, shell: str, status: int
+) -> None:
+    picture = tmp_path / "picture"
+    line = f'"$0" -c "$1" "$2" {shell}'
+    done = subprocess.run(
+        ["bash", "-c", line, sys.executable, STREAMS, str(picture)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == status
+    assert picture.read_text() == "whole"
+    assert "Traceback" not in done.stderr
+    assert ("cannot write to stdout" in done.stderr) == (
+        status == 1 and "2>" not in shell
+    )
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no signals to send")
+def test_an_interrupted_command_is_json_too() -> None:
+    code = """
+    import sys, time
+    from xrds_blender.command import console
+    console.prepare()
+    def work():
+        print("ready", file=sys.stderr)
+        time.sleep(60)
+    console.leave(console.status_with_json(work))
+    """
+    with started(code) as child:
+        assert child.stderr is not None
+        assert child.stderr.readline() == "ready\n"
+        child.send_signal(signal.SIGTERM)
+        out, err = child.communicate(timeout=20)
+    assert child.returncode == 143
+    assert json.loads(out) == {"error": "terminated", "status": 143}
+    assert err == "xrds: terminated\n"
+
+
+# --- text from outside ----------------------------------------------------------------
+
+STEERING = "a\x1b[2J\nxrds: all well\r\u202e"
+
+
+def test_nothing_printed_can_steer_a_terminal(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    assert main.main(["upscale", STEERING, STEERING, "-o", "o.exr"]) == 1
+    assert main.main(["render", "a.blend", "-o", "b.exr", "--preset", STEERING]) == 2
+    assert main.main([STEERING]) == 2
+    assert console.status_of(lambda: 1, lambda _: [f"{STEERING}: 1 s"]) == 0
+    out, err = capfd.readouterr()
+    assert err.count("\n") == 3
+    assert out.count("\n") == 1
+    assert (out + err).replace("\n", "").isprintable()

@@ -21,6 +21,7 @@ bpy = pytest.importorskip("bpy")
 from xrds_blender import render
 from xrds_blender.command import main, picture_file
 from xrds_blender.command.render_file import render_file
+from xrds_blender.command.scene_file import SceneChoice
 from xrds_blender.command.whole_file import is_whole
 from xrds_blender.cycles import session
 from xrds_blender.frame import (
@@ -308,7 +309,12 @@ def test_a_killed_animation_resumes_at_the_first_missing_frame(
     assert (again["kept"], again["frames"]) == ([1, 2, 3, 4], [])
     assert again["resolution"] == [*SIZE]
     other = render_file(
-        blend, output, job, frames=(4,), resolution=(30, 20), resume=True
+        blend,
+        output,
+        job,
+        frames=(4,),
+        choice=SceneChoice(resolution=(30, 20)),
+        resume=True,
     )
     assert other["kept"] == []  # of another size
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hostile import Trigger
 
 bpy = pytest.importorskip("bpy")
 
@@ -157,12 +158,17 @@ def test_a_folder_serves_another_process(tmp_path: Path) -> None:
     np.testing.assert_array_equal(second.albedo, first.albedo)
 
 
-def test_a_folder_that_takes_no_file_costs_no_picture(tmp_path: Path) -> None:
+def test_a_folder_that_takes_no_file_costs_no_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "file").touch()
     picture = shot(traps.trap("texture", 48, 36), guide_cache=tmp_path / "file")
     (decision,) = [d for d in picture.plan if d.decision == "guide cache"]
     assert decision.value == "kept 2 samples"
     assert decision.reason.startswith("in memory only")
+    assert f"in memory only: cannot write to {tmp_path / 'file'}" in (
+        capsys.readouterr().err
+    )
 
 
 # --- the cache alone ------------------------------------------------------------------
@@ -279,8 +285,15 @@ def of_another_key(path: Path) -> None:
     path.write_bytes(stored("other", path.parents[1]).read_bytes())
 
 
-def of_code(path: Path) -> None:
-    path.write_bytes(pickle.dumps({"what": some(1.0)}))
+def test_code_in_a_file_does_not_run(tmp_path: Path) -> None:
+    GuideCache().put("key", some(1.0), tmp_path)
+    mark = tmp_path / "it ran"
+    path = stored("key", tmp_path)
+    changed(path, lambda a: a.update({"/Depth": np.array([Trigger(mark)], object)}))
+    assert GuideCache().get("key", tmp_path) is None
+    path.write_bytes(pickle.dumps(Trigger(mark)))
+    assert GuideCache().get("key", tmp_path) is None
+    assert not mark.exists()
 
 
 @pytest.mark.parametrize(
@@ -294,7 +307,6 @@ def of_code(path: Path) -> None:
         without_normals,
         of_text,
         of_another_key,
-        of_code,
     ],
 )
 def test_a_damaged_file_is_named_and_replaced(

@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -9,10 +12,11 @@ import OpenEXR
 import pytest
 from channels import read_channels
 
-from xrds_core import exr_library
+from xrds_core import exr_library, exr_limits
 from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
 from xrds_core.exr import Names, read_beauty, read_guides, write_picture
+from xrds_core.exr_encoding import CODECS, Encoding
 
 LAYOUTS = ("flat", "layered", "parts", "named parts")
 
@@ -104,12 +108,64 @@ def test_a_process_of_its_own_writes(
 
 
 @pytest.mark.usefixtures("apart")
+@pytest.mark.parametrize("module", ["numpy", "json", "OpenEXR", "xrds_core"])
+def test_a_process_of_its_own_runs_nothing_of_the_working_folder(
+    path: Path, monkeypatch: pytest.MonkeyPatch, module: str
+) -> None:
+    folder = path.parent / "working"
+    folder.mkdir()
+    mark = path.parent / "it ran"
+    (folder / f"{module}.py").write_text(f"open({str(mark)!r}, 'w')")
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr(sys, "path", ["", *sys.path])  # as under `python -c`
+    write_picture(path, planes(0))
+    read_beauty(path)
+    assert not mark.exists()
+
+
+@pytest.mark.usefixtures("apart")
 def test_what_goes_wrong_apart_is_told(path: Path) -> None:
     path.write_bytes(b"no picture")
     with pytest.raises(PictureError, match="is not a complete OpenEXR file"):
         read_beauty(path)
     with pytest.raises(PictureError, match="cannot write"):
         write_picture(path / "below_a_file.exr", planes(1))
+
+
+# --- how a file holds its pixels ------------------------------------------------------
+
+
+def encoding(path: Path) -> tuple[str, str]:
+    """Compression, and number format of R."""
+    (part,) = OpenEXR.File(str(path), separate_channels=True).parts
+    kinds = {np.dtype(np.float16): "half", np.dtype(np.float32): "float"}
+    return part.header["compression"].name, kinds[part.channels["R"].pixels.dtype]
+
+
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("codec", CODECS)
+def test_every_encoding_is_read_back(path: Path, half: bool, codec: str) -> None:
+    rows = np.linspace(0.1, 1.0, 32, dtype=np.float32)[:, None]
+    picture = rows * np.linspace(0.5, 1.0, 48, dtype=np.float32)
+    write_picture(path, dict.fromkeys("RGB", picture), Encoding(half, codec))
+    expected = "NO" if codec == "none" else codec.upper()
+    assert encoding(path) == (f"{expected}_COMPRESSION", "half" if half else "float")
+    np.testing.assert_allclose(read_beauty(path).radiance[..., 1], picture, rtol=0.05)
+    if codec in CODECS[:5] and not half:
+        np.testing.assert_array_equal(read_beauty(path).radiance[..., 1], picture)
+
+
+def test_half_floats_are_bounded(path: Path) -> None:
+    values = np.array([[1e30, -1e30, np.inf, np.nan, 1.0]], np.float32)
+    write_picture(path, dict.fromkeys("RGB", values), Encoding(half=True))
+    written = read_beauty(path).radiance[0, :, 0]
+    np.testing.assert_array_equal(written, [65504, -65504, np.inf, np.nan, 1.0])
+
+
+@pytest.mark.usefixtures("apart")
+def test_a_process_of_its_own_encodes_alike(path: Path) -> None:
+    write_picture(path, planes(0), Encoding(half=True, codec="piz"))
+    assert encoding(path) == ("PIZ_COMPRESSION", "half")
 
 
 # --- what Cycles writes ---------------------------------------------------------------
@@ -273,9 +329,98 @@ def test_random_bytes_are_a_picture_error(path: Path, seed: int) -> None:
 
 
 def test_no_file_and_a_folder(path: Path) -> None:
-    for missing in (path, path.parent):
-        with pytest.raises(PictureError, match="no file"):
+    for missing, reason in ((path, "no file"), (path.parent, "no regular file")):
+        with pytest.raises(PictureError, match=reason):
             read_beauty(missing)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX only")
+def test_a_pipe_is_not_waited_for(path: Path) -> None:
+    os.mkfifo(path)
+    with pytest.raises(PictureError, match="no regular file"):
+        read_beauty(path)
+
+
+def test_the_library_prints_nothing_itself(
+    path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    for layout in ("layered", "parts"):
+        write_passes(path, PASSES, layout)
+        whole = path.read_bytes()
+        for percent in (10, 50, 90):
+            path.write_bytes(whole[: len(whole) * percent // 100])
+            with pytest.raises(PictureError):
+                read_beauty(path)
+    with pytest.raises(PictureError):
+        write_picture(path.parent / "none" / "out.exr", planes(0))
+    os.write(2, b"stderr is where it was\n")
+    assert capfd.readouterr() == ("", "stderr is where it was\n")
+
+
+def test_names_of_channels_and_files_are_escaped(path: Path) -> None:
+    steering = path.with_name("a\x1b[2J\n\u202e.exr")
+    write(steering, {"b\x1b]0;owned\x07.Z": planes(0)["R"]})
+    with pytest.raises(PictureError, match="has no pass") as error:
+        read_beauty(steering)
+    assert str(error.value).isprintable()
+
+
+def claiming(path: Path, right: int, bottom: int) -> None:
+    """Write a picture whose windows claim to be larger than they are."""
+    write(path, planes(0))
+    windows = np.asarray([[0, 0, 5, 3], [0, 0, right, bottom]], "<i4")
+    true, claimed = (window.tobytes() for window in windows)
+    kind = b"Window\0box2i\0" + (16).to_bytes(4, "little")
+    whole = path.read_bytes()
+    assert whole.count(kind + true) == 2
+    path.write_bytes(whole.replace(kind + true, kind + claimed))
+
+
+CLAIM = """
+import resource, sys
+from xrds_core.errors import PictureError
+from xrds_core.exr import read_beauty
+try:
+    read_beauty(sys.argv[1])
+except PictureError as error:
+    print(error)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of memory are POSIX'")
+def test_windows_that_claim_more_than_the_file_holds_take_no_memory(path: Path) -> None:
+    claiming(path, 65535, 65535)
+    done = subprocess.run(
+        [sys.executable, "-c", CLAIM, str(path)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    told, _, kilobytes = done.stdout.strip().partition("\n")
+    assert "claims 51.5 GB of pixels" in told
+    assert "--read-limit" in told
+    assert int(kilobytes) < 500_000
+
+
+@pytest.mark.parametrize("shadowed", [False, True])
+def test_the_limit_can_be_raised_and_lowered(
+    path: Path, monkeypatch: pytest.MonkeyPatch, shadowed: bool
+) -> None:
+    write(path, planes(0))
+    monkeypatch.setattr(exr_library, "_is_shadowed", lambda: shadowed)
+    monkeypatch.setattr(exr_limits, "_allowed", 0)
+    exr_limits.allow(4 * 6 * 3 * 4)
+    assert read_beauty(path).radiance.shape == (4, 6, 3)
+    exr_limits.allow(4 * 6 * 3 * 4 - 1)
+    with pytest.raises(PictureError, match="claims"):
+        read_beauty(path)
+
+
+def test_black_of_any_size_is_no_claim() -> None:
+    """A packed picture holds no more bytes than the limit for its size allows."""
+    assert exr_limits.limit_of(0) >= 8192 * 8192 * 4 * 4
+    assert exr_limits.limit_of(10**8) == 10**11
 
 
 def test_a_header_that_claims_too_much(path: Path) -> None:

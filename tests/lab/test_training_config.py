@@ -29,6 +29,18 @@ CONFIGS = sorted((Path(xrds_lab.training.__file__).parent / "configs").glob("*.t
         ("data = '.'\n[network]\nwidth = 3", "width"),
         ("data = '.'\nscale = 3\ncrop = 33", "scale is 3"),
         ("data = '.'\nprecision = 'fp8'", "fp8"),
+        ("data = 5", "data = 5 names no folders"),
+        ("data = [5]", "names no folders"),
+        ("data = ''", "names no folders"),
+        ("data = '.'\nscale = 'x'", "scale = 'x' is not of type int"),
+        ("data = '.'\nscale = 0", "scale is 0"),
+        ("data = '.'\nsteps = -5", "steps is -5"),
+        ("data = '.'\nbetas = 5", "not iterable"),
+        ("data = '.'\nloss = 3", "loss = 3"),
+        ("data = '.'\n[loss]\nl1 = 'a'", "no table of numbers"),
+        ("data = '.'\nvariation = 1", "no table"),
+        ("data = '.'\n[variation]\nnoisy = 'a'", "noisy = 'a'"),
+        ("data = '.'\n[network]\ngroups = 'a'", "groups = 'a'"),
     ],
 )
 def test_wrong_configuration_is_named(tmp_path: Path, text: str, message: str) -> None:

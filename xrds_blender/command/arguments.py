@@ -9,6 +9,10 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable, Sequence
+from pathlib import Path
+
+LAST_FRAME = 1048574  # Blender's MAXFRAME
+LARGEST_SIDE = 65536  # pixels; Blender's largest resolution
 
 
 def positive(text: str) -> int:
@@ -73,28 +77,62 @@ def names(known: Sequence[str]) -> Callable[[str], tuple[str, ...]]:
 
 def frame(text: str) -> list[int]:
     """One frame number, as a list."""
-    return [int(text)]
+    return [_frame_number(text)]
 
 
 def frames(text: str) -> list[int]:
-    """Frame numbers, such as 1-24."""
-    match = re.fullmatch(r"(-?\d+)-(-?\d+)", text)
-    if not match or int(match[1]) > int(match[2]):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a range such as 1-24")
-    return list(range(int(match[1]), int(match[2]) + 1))
+    """Frame numbers, such as 1-24, 1-100x4 (every fourth) or 1-24,30; each once."""
+    numbers: dict[int, None] = {}
+    for part in text.split(","):
+        match = re.fullmatch(r"(-?\d+)(?:-(-?\d+)(?:x(\d+))?)?", part)
+        if not match:
+            raise argparse.ArgumentTypeError(
+                f"{text!r} is not frames such as 1-24, 1-100x4 or 1-24,30"
+            )
+        first = _frame_number(match[1])
+        last, step = _frame_number(match[2] or match[1]), int(match[3] or 1)
+        if last < first or step < 1:
+            raise argparse.ArgumentTypeError(f"{part!r} holds no frame")
+        numbers |= dict.fromkeys(range(first, last + 1, step))
+    return list(numbers)
+
+
+def _frame_number(text: str) -> int:
+    number = int(text)
+    if abs(number) > LAST_FRAME:
+        raise argparse.ArgumentTypeError(
+            f"frame {number} is beyond Blender's last, {LAST_FRAME}"
+        )
+    return number
 
 
 def size(text: str) -> tuple[int, int]:
     """Width and height in pixels, such as 1920x1080."""
     match = re.fullmatch(r"(\d+)x(\d+)", text)
-    if not match or "0" in match.groups():
+    if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 1920x1080")
-    return int(match[1]), int(match[2])
+    width, height = int(match[1]), int(match[2])
+    if not (0 < width <= LARGEST_SIDE and 0 < height <= LARGEST_SIDE):
+        raise argparse.ArgumentTypeError(
+            f"{text} is not a size that Blender takes: 1 to {LARGEST_SIDE} pixels"
+        )
+    return width, height
 
 
 def sizes(text: str) -> tuple[tuple[int, int], ...]:
     """Sizes, such as 960x540,1920x1080."""
     return tuple(size(part) for part in text.split(","))
+
+
+def folder(text: str) -> Path:
+    """A folder, there or to be made."""
+    try:
+        is_file = Path(text).is_file()
+    except OSError as error:
+        raise argparse.ArgumentTypeError(f"{text}: {error.strerror}") from error
+    if is_file:
+        raise argparse.ArgumentTypeError(f"{text} is a file; name a folder")
+    return Path(text)
 
 
 def size_in_bytes(text: str) -> int:

@@ -27,5 +27,5 @@ def _run(argv: list[str]) -> int:
     from . import console
     from .main import main
 
-    console.end_at_once_by_signals()
-    return main(argv)
+    console.prepare()
+    return console.finished(main(argv))

@@ -1,99 +1,114 @@
-"""What a command owes the shell: clean streams, an exit status, a quick Ctrl-C."""
+"""What a command owes the shell: an error in one line, an exit status, a quick end."""
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import signal
-import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from xrds_core import atomic
-from xrds_core.errors import Cancelled, UsageError, XRDSError
+from xrds_core.errors import Cancelled, UsageError, XRDSError, printable
+from xrds_core.notices import warn
+
+from . import streams
+
+Check = Callable[[Any], None]
 
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
 _SIGNALS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 
 
-def flush_all() -> None:
-    """Flush what Python and the C library still hold of stdout and stderr."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    if os.name != "nt":  # Windows' C libraries keep one buffer each
-        ctypes.CDLL(None).fflush(None)
+@dataclass(frozen=True)
+class _End:
+    """How work ended: what it gave, or the line that says why it did not."""
+
+    status: int = DONE
+    line: str = ""
+    value: Any = None
 
 
-@contextmanager
-def stdout_for_json() -> Iterator[Callable[[Any], None]]:
-    """Keep stdout for one JSON value; all else that is printed goes to stderr.
+def status_of(
+    work: Callable[[], Any],
+    lines: Callable[[Any], Iterable[str]] = lambda _: (),
+    check: Check | None = None,
+) -> int:
+    """Run `work` and print its result's `lines`; return the exit status.
 
-    Cycles prints its progress from C, so the file descriptor itself is moved. Yields
-    the function that writes the value; nothing is written if it is not called.
+    An error is shown as one line on stderr. `check` may find the result wanting: it
+    raises the error, and the result is printed all the same.
     """
-    flush_all()
-    kept = os.dup(1)
-    os.dup2(2, 1)
-    values: list[Any] = []
+    end = _ended(work)
+    if end.status != DONE:
+        return end.status
+    for line in lines(end.value) if end.value else ():
+        print(printable(line))
+    return _checked(end, check)
+
+
+def status_with_json(work: Callable[[], Any], check: Check | None = None) -> int:
+    """The same with one JSON value on stdout, of the result or of the error.
+
+    All else that is printed goes to stderr.
+    """
+    with streams.stdout_to_stderr():
+        end = _ended(work)
+    told = end.value if end.status == DONE else _error(end.line, end.status)
+    print(json.dumps(told, indent=1), flush=True)
+    return _checked(end, check)
+
+
+def _checked(end: _End, check: Check | None) -> int:
+    if end.status != DONE or check is None:
+        return end.status
+    return _ended(lambda: check(end.value)).status
+
+
+def _error(line: str, status: int) -> dict[str, Any]:
+    return {"error": line, "status": status}
+
+
+def _ended(work: Callable[[], Any]) -> _End:
+    """Run `work`; an error is told on stderr."""
     try:
-        yield values.append
-    finally:
-        flush_all()
-        os.dup2(kept, 1)
-        os.close(kept)
-    for value in values:
-        print(json.dumps(value, indent=1), flush=True)
-
-
-@contextmanager
-def stdout_to(path: Path) -> Iterator[None]:
-    """Append what is printed to stdout, by Cycles' C code too, to a file."""
-    flush_all()
-    kept = os.dup(1)
-    try:
-        with path.open("ab") as file:
-            os.dup2(file.fileno(), 1)
-        yield
-    finally:
-        flush_all()
-        os.dup2(kept, 1)
-        os.close(kept)
-
-
-def status_of(work: Callable[[], None]) -> int:
-    """Run `work`; show its error as one line on stderr and return the exit status."""
-    try:
-        work()
+        return _End(value=work())
     except (KeyboardInterrupt, Cancelled):
-        line, status = "interrupted", INTERRUPTED
+        end = _End(INTERRUPTED, "interrupted")
     except UsageError as error:
-        line, status = str(error), WRONG_USAGE
+        end = _End(WRONG_USAGE, str(error))
     except XRDSError as error:
-        line, status = str(error), FAILED
+        end = _End(FAILED, str(error))
     except ModuleNotFoundError as error:
         # the extension leaves out torch and what only makes XRDS
-        line, status = f"the Python module {error.name} is not installed", FAILED
-    except BrokenPipeError:  # the reader of stdout has left, as `head` does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-        return FAILED
+        end = _End(FAILED, f"the Python module {error.name} is not installed")
+    except OSError as error:  # of files, mostly ones that the user named
+        end = _End(FAILED, _reason(error))
     except MemoryError:
         line = "out of memory; set --memory-limit or render a smaller picture"
-        status = FAILED
+        end = _End(FAILED, line)
     except Exception as error:  # a fault of ours: show where, end as a command ends
         traceback.print_exc()
-        line, status = (
-            f"unexpected {type(error).__name__}: a bug in XRDS, please report it",
-            FAILED,
-        )
-    else:
-        return DONE
-    print(f"xrds: {line}", file=sys.stderr, flush=True)
-    return status
+        name = type(error).__name__
+        end = _End(FAILED, f"unexpected {name}: a bug in XRDS, please report it")
+    warn(end.line)
+    return end
+
+
+def _reason(error: OSError) -> str:
+    if error.filename is None:
+        return printable(error.strerror or str(error) or type(error).__name__)
+    return printable(f"{error.strerror}: {os.fsdecode(error.filename)}")
+
+
+def prepare() -> None:
+    """Make streams and signals safe; once, at the start of a process."""
+    streams.prepare()
+    end_at_once_by_signals()
+    atomic.sweep()
 
 
 def end_at_once_by_signals() -> None:
@@ -118,14 +133,26 @@ def end_at_once_by_signals() -> None:
         while (number := os.read(woken, 1)[0]) not in heeded:
             pass
         atomic.abandon()
-        with suppress(OSError):  # stderr may be gone, as the terminal is
-            os.write(2, f"xrds: {heeded[number]}\n".encode())
-        os._exit(128 + number)
+        line, status = heeded[number], 128 + number
+        result = json.dumps(_error(line, status), indent=1) + "\n"
+        streams.write_at_once(f"xrds: {line}\n", result)
+        os._exit(status)
 
     threading.Thread(target=wait, daemon=True).start()
 
 
+def finished(status: int) -> int:
+    """The exit status at last: what could not be printed is a failure, too."""
+    fault = streams.fault()
+    if fault is None or status != DONE:
+        return status
+    if not isinstance(fault, BrokenPipeError):  # not as `head` leaves
+        warn(f"cannot write to stdout ({fault.strerror})")
+    return FAILED
+
+
 def leave(status: int) -> NoReturn:
     """End the process; the bpy module can hang when the interpreter ends."""
-    flush_all()
+    status = finished(status)
+    streams.flush_all()
     os._exit(status)

@@ -13,6 +13,7 @@ from xrds_core.sequence.names import PASSES, PassNames
 
 from ..frame.job import QUALITIES
 from . import arguments
+from .options import add_read_limit
 
 SPACES = ("camera", "world")
 
@@ -24,7 +25,7 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
     )
     add = command.add_argument
     add("source", metavar="IN.exr", help="noisy frames; #### is the frame number")
-    add("-o", "--output", required=True, metavar="OUT.exr", help="denoised frames")
+    add("-o", "--out", required=True, metavar="OUT.exr", help="denoised frames")
     add(
         "--frames",
         type=arguments.frames,
@@ -55,6 +56,7 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         type=arguments.size_in_bytes,
         help="memory for the denoiser, such as 500M or 4G",
     )
+    add_read_limit(command)
     _add_reading(command)
     command.set_defaults(work=_denoise, lines=_lines, check=_check)
     return command
@@ -96,11 +98,13 @@ _PASS_HELP = {
 
 
 def _denoise(options: argparse.Namespace) -> dict[str, Any]:
+    from xrds_core import exr_limits
     from xrds_core.denoising import Denoiser
     from xrds_core.sequence.cameras import read_cameras
     from xrds_core.sequence.denoise import Files, denoise_sequence
     from xrds_core.sequence.reading import Reading
 
+    exr_limits.allow(options.read_limit)
     reading = Reading(
         PassNames(**{name: getattr(options, name) for name in PASSES}),
         cameras=read_cameras(options.camera) if options.camera else None,
@@ -113,7 +117,7 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
         options.denoise, options.device, memory_limit=options.memory_limit
     )
     return denoise_sequence(
-        Files(options.source, options.output, options.picture_only),
+        Files(options.source, options.out, options.picture_only),
         denoiser,
         frames=options.frames,
         radius=options.temporal_radius,

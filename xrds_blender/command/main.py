@@ -1,7 +1,7 @@
 """`xrds ...` and `blender --command xrds ...`: parse, call the work, print.
 
 Exit status: 0 done, 1 failed, 2 wrong usage, 130 interrupted. With --json, stdout
-holds the JSON alone.
+holds the JSON alone, of the result or of the error.
 """
 
 from __future__ import annotations
@@ -12,9 +12,11 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
-from xrds_core import atomic
+from xrds_core.errors import UsageError
+from xrds_core.version import package_version
 
 from . import console, denoise, info, render, upscale
+from .deferred import no_lines
 
 AddCommand = Callable[[Any], argparse.ArgumentParser]
 
@@ -35,46 +37,38 @@ LABORATORY = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
-    atomic.sweep()
     words = sys.argv[1:] if argv is None else list(argv)
     try:
         options = _parser(words).parse_args(words)
-    except SystemExit as end:  # argparse has printed why
+    except SystemExit as end:  # --help and --version have been printed
         return int(end.code or 0)
-    if not options.json:
-        return console.status_of(lambda: _run(options, _print_lines(options)))
-    with console.stdout_for_json() as write:
-        return console.status_of(lambda: _run(options, write))
+    except UsageError as error:
+        as_json = "--json" in words
+        options = argparse.Namespace(json=as_json, work=_refusal(error), lines=no_lines)
+    check = getattr(options, "check", None)
+    if options.json:
+        return console.status_with_json(lambda: options.work(options), check)
+    return console.status_of(lambda: options.work(options), options.lines, check)
 
 
 def program() -> NoReturn:
     """Run the console script `xrds`."""
-    console.end_at_once_by_signals()
+    console.prepare()
     console.leave(main())
 
 
-def _run(options: argparse.Namespace, show: Callable[[Any], None]) -> None:
-    """Do the work and show its result; a command's `check` may then find it wanting."""
-    result = options.work(options)
-    show(result)
-    if "check" in options:
-        options.check(result)
+def _refusal(error: UsageError) -> Callable[[argparse.Namespace], NoReturn]:
+    def work(_: argparse.Namespace) -> NoReturn:
+        raise error
 
-
-def _print_lines(options: argparse.Namespace) -> Callable[[Any], None]:
-    def show(result: Any) -> None:
-        for line in options.lines(result) if result else ():
-            print(line)
-
-    return show
+    return work
 
 
 class _Parser(argparse.ArgumentParser):
-    """Prints wrong usage in one line, like every other error."""
+    """Raises wrong usage, so that it is told like every other error."""
 
     def error(self, message: str) -> NoReturn:
-        line = f"xrds: {message}; see {self.prog} --help\n"
-        self.exit(console.WRONG_USAGE, line)
+        raise UsageError(f"{message}; see {self.prog} --help")
 
 
 class _Apart:
@@ -105,6 +99,9 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(
         dest="command", required=True, metavar="COMMAND", title="commands"
     )
+    parser.add_argument(
+        "--version", action="version", version=f"XRDS {package_version()}"
+    )
     apart = _Apart(commands)
     added = (
         render.add_render,
@@ -125,7 +122,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     parser.epilog = apart.listing()
     asked = words[0] if words else ""
     if asked in LABORATORY and asked not in commands.choices:
-        parser.error(
+        raise UsageError(
             f"{asked} belongs to the laboratory, which is not installed: "
             "run pip install ./xrds_lab in a source tree of XRDS"
         )

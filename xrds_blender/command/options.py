@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from xrds_core.errors import UsageError
+from xrds_core.exr_encoding import CODECS, FLOAT_ZIP, Encoding
 
 from ..frame.job import GUIDES, PRESETS, QUALITIES, SCALES, RenderJob
 from ..planning.plan import SAVINGS
 from . import arguments
+from .scene_file import SceneChoice
 
 RADIUS = 4  # frames, by default: more bring little
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
@@ -79,6 +82,15 @@ def add_job(command: argparse.ArgumentParser) -> None:
         help="size in pixels, in place of the file's",
     )
     add("--seed", type=int, help="seed of Cycles' noise, in place of the file's")
+    add("--scene", dest="scene_name", metavar="NAME", help="a scene of the file")
+    add("--view-layer", metavar="NAME", help="a view layer (default: the first used)")
+    add("--camera", metavar="NAME", help="a camera of the scene, for all frames")
+    add(
+        "-y",
+        "--enable-autoexec",
+        action="store_true",
+        help="trust the file: run its drivers and scripts",
+    )
     add_network(command)
 
 
@@ -99,11 +111,63 @@ def add_network(command: argparse.ArgumentParser) -> None:
     )
     add("--device", default="auto", help=DEVICE_HELP)
     add(
+        "--threads",
+        type=arguments.positive,
+        metavar="N",
+        help="threads of the processor (default: all)",
+    )
+    add(
         "--memory-limit",
         type=arguments.size_in_bytes,
         help="memory for the network, such as 500M or 4G",
     )
     add("--weights", type=Path, help="weights file, or a folder of them")
+
+
+def add_output(command: argparse.ArgumentParser, **how: Any) -> None:
+    """Add where the result goes, and how an .exr holds it."""
+    add = command.add_argument
+    add("-o", "--out", **how)
+    add(
+        "--exr-depth",
+        choices=("float", "half"),
+        default="float",
+        help="32 or 16 bits for each number of an .exr (default: float)",
+    )
+    add(
+        "--exr-codec",
+        choices=CODECS,
+        default=FLOAT_ZIP.codec,
+        help="compression of an .exr (default: zip)",
+    )
+
+
+def add_read_limit(command: argparse.ArgumentParser) -> None:
+    """Add how much memory a file may claim."""
+    command.add_argument(
+        "--read-limit",
+        type=arguments.size_in_bytes,
+        metavar="SIZE",
+        help="memory that a file's pixels may take, such as 20G "
+        "(default: 1G, or 1000 times the file)",
+    )
+
+
+def encoding_of(options: argparse.Namespace) -> Encoding:
+    """How .exr files hold their pixels."""
+    return Encoding(options.exr_depth == "half", options.exr_codec)
+
+
+def choice_of(options: argparse.Namespace) -> SceneChoice:
+    """What of the file is rendered."""
+    return SceneChoice(
+        options.scene_name,
+        options.view_layer,
+        options.camera,
+        options.resolution,
+        options.threads,
+        options.enable_autoexec,
+    )
 
 
 def job_of(options: argparse.Namespace) -> RenderJob:
@@ -122,6 +186,7 @@ def job_of(options: argparse.Namespace) -> RenderJob:
         quality=options.quality,
         memory_limit=options.memory_limit,
         weights=options.weights,
+        threads=options.threads,
         denoise=options.denoise,
         temporal_radius=_temporal_radius(options),
         savings=() if options.keep_all else SAVINGS,

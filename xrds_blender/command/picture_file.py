@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core import output
+from xrds_core import files
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
+from xrds_core.exr_encoding import FLOAT_ZIP, Encoding
 from xrds_core.frames import frame_path
 
 from .whole_file import png_size
@@ -24,7 +25,7 @@ def check_output(pattern: str, frames: Sequence[int]) -> None:
     """Refuse, before anything is rendered, an output that could not be written.
 
     Makes the folder. Raises UsageError for a suffix that is neither .exr nor .png and
-    for several frames of one name, PictureError as `xrds_core.output.check_output`.
+    for several frames of one name, PictureError as `xrds_core.files.check_output`.
     """
     path = Path(pattern)
     if path.suffix.lower() not in SUFFIXES:
@@ -35,11 +36,17 @@ def check_output(pattern: str, frames: Sequence[int]) -> None:
             f"the frame number, such as {path.stem}_####{path.suffix}"
         )
     for number in frames:
-        output.check_place(frame_path(pattern, number))
-    output.check_folder(path.parent)
+        files.check_place(frame_path(pattern, number))
+    files.check_folder(path.parent)
 
 
-def save(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
+def save(
+    path: Path,
+    radiance: Array,
+    alpha: Array,
+    scene: Any,
+    encoding: Encoding = FLOAT_ZIP,
+) -> None:
     """Write one frame, all at once or not at all; raises PictureError if it cannot.
 
     Args:
@@ -48,6 +55,7 @@ def save(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
         alpha: (H, W) in [0, 1].
         scene: its view settings shape the PNG; with a transparent film both formats
             hold alpha.
+        encoding: of an .exr.
     """
     if path.suffix.lower() == ".png":
         _write_png(path, radiance, alpha, scene)
@@ -57,7 +65,7 @@ def save(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
     channels = {name: radiance[..., i] for i, name in enumerate("RGB")}
     if scene.render.film_transparent:
         channels["A"] = alpha
-    exr.write_picture(path, channels)
+    exr.write_picture(path, channels, encoding)
 
 
 def _write_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:

@@ -9,7 +9,7 @@ from xrds_core.errors import UsageError
 
 from . import arguments
 from .deferred import need_blender
-from .options import add_job, job_of
+from .options import add_job, add_output, choice_of, encoding_of, job_of
 
 
 def add_render(commands: Any) -> argparse.ArgumentParser:
@@ -17,7 +17,7 @@ def add_render(commands: Any) -> argparse.ArgumentParser:
     command = commands.add_parser("render", help="render frames of a .blend file")
     add = command.add_argument
     add_job(command)
-    add("-o", "--output", help="an .exr or .png file; #### stands for the frame number")
+    add_output(command, help="an .exr or .png file; #### stands for the frame number")
     add("--explain", action="store_true", help="print the plan without rendering")
     add("--resume", action="store_true", help="skip frames whose files are complete")
     which = command.add_mutually_exclusive_group()
@@ -31,7 +31,7 @@ def add_render(commands: Any) -> argparse.ArgumentParser:
     which.add_argument(
         "--frames",
         type=arguments.frames,
-        help="first and last frame, such as 1-24",
+        help="such as 1-24, 1-100x4 (every fourth) or 1-24,30",
         metavar="A-B",
     )
     command.set_defaults(work=_render, lines=_lines)
@@ -50,16 +50,17 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
     if options.explain:
         return _plan(options)
     need_blender("render")
-    if options.output is None:
+    if options.out is None:
         raise UsageError("name the output with -o, or ask for the plan with --explain")
     from .render_file import render_file
 
     return render_file(
         options.scene,
-        options.output,
+        options.out,
         job_of(options),
         frames=options.frames,
-        resolution=options.resolution,
+        choice=choice_of(options),
+        encoding=encoding_of(options),
         resume=options.resume,
     )
 
@@ -70,7 +71,7 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
     from .scene_file import open_scene
 
     job = job_of(options)
-    return explain(open_scene(options.scene, options.resolution), job)
+    return explain(open_scene(options.scene, choice_of(options)), job)
 
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:

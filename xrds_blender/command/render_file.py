@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import PictureError, XRDSError
+from xrds_core.exr_encoding import FLOAT_ZIP, Encoding
 from xrds_core.frames import frame_path
 
 from ..cycles.size import picture_size
@@ -20,7 +21,7 @@ from ..frame.rendering import render
 from ..shot.sampling import can_lend
 from ..shot.shot import render_shot
 from . import picture_file
-from .scene_file import open_scene
+from .scene_file import AS_SAVED, SceneChoice, open_scene
 from .whole_file import is_whole
 
 
@@ -30,7 +31,8 @@ def render_file(
     job: RenderJob,
     *,
     frames: Sequence[int] | None = None,
-    resolution: tuple[int, int] | None = None,
+    choice: SceneChoice = AS_SAVED,
+    encoding: Encoding = FLOAT_ZIP,
     resume: bool = False,
 ) -> dict[str, Any]:
     """Render frames of a .blend file and return what `xrds render --json` prints.
@@ -40,7 +42,8 @@ def render_file(
         output: .exr or .png; # stands for digits of the frame number.
         job: scale, samples and the rest.
         frames: numbers of the frames; the file's current one by default.
-        resolution: width and height in pixels instead of the file's.
+        choice: what comes in the place of what the file was saved with.
+        encoding: of .exr files.
         resume: leave frames as they are that lie there whole and of their size.
 
     Raises:
@@ -50,7 +53,7 @@ def render_file(
             rendered, and the frames before are complete.
     """
     picture_file.check_output(output, frames or [0])
-    scene = open_scene(path, resolution)
+    scene = open_scene(path, choice)
     _check_libraries(job)
     numbers = list(frames or [scene.frame_current])
     size = picture_size(scene.render)
@@ -61,7 +64,7 @@ def render_file(
 
     written, last = [], None
     for number, last in _pictures(scene, job, output, numbers, is_done):
-        written.append(_write(scene, output, number, last))
+        written.append(_write(scene, output, number, last, encoding))
     job = (last and last.job) or job
     rendered = {entry["frame"] for entry in written}
     return {
@@ -121,14 +124,16 @@ def _kept(error: NetworkFailed, scene: Any, output: str, number: int) -> XRDSErr
     return XRDSError(f"frame {number}: {error}, {place}")
 
 
-def _write(scene: Any, output: str, number: int, picture: Picture) -> dict[str, Any]:
+def _write(
+    scene: Any, output: str, number: int, picture: Picture, encoding: Encoding
+) -> dict[str, Any]:
     """Write one frame; returns its entry for the JSON."""
     target = frame_path(output, number)
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated
     try:
-        picture_file.save(target, picture.radiance, picture.alpha, scene)
+        picture_file.save(target, picture.radiance, picture.alpha, scene, encoding)
     except PictureError as error:
         place = _keep_elsewhere(target, picture.radiance, picture.alpha, scene)
         raise PictureError(f"{error}; the frame was {place}") from error

@@ -2,34 +2,95 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import SceneError
+from xrds_core.files import check_input
+from xrds_core.notices import warn
 
 
-def open_scene(path: Path, resolution: tuple[int, int] | None = None) -> Any:
+@dataclass(frozen=True)
+class SceneChoice:
+    """What comes in the place of what a file was saved with; None leaves it.
+
+    `scene`, `view_layer` and `camera` are names; `resolution` is width and height in
+    pixels; `threads` are Cycles'. `trusted` lets drivers and scripts of the file run.
+    """
+
+    scene: str | None = None
+    view_layer: str | None = None
+    camera: str | None = None
+    resolution: tuple[int, int] | None = None
+    threads: int | None = None
+    trusted: bool = False
+
+
+AS_SAVED = SceneChoice()
+
+
+def open_scene(path: Path, choice: SceneChoice = AS_SAVED) -> Any:
     """Open a .blend file and return its scene, ready to render.
 
-    Whatever Blender has open is replaced. `resolution`, width and height in pixels,
-    takes the place of the file's.
+    Whatever Blender has open is replaced. Python in a file that is not trusted is left
+    alone, which a line on stderr tells.
 
-    Raises SceneError if there is no such file, Blender cannot read it, or it has no
-    camera.
+    Raises SceneError if there is no such file, Blender cannot read it, it has nothing
+    of a chosen name, or no camera.
     """
     import bpy
 
-    if not path.is_file():
-        raise SceneError(f"no file {path}")
+    check_input(path, SceneError)
     try:
-        bpy.ops.wm.open_mainfile(filepath=str(path.resolve()), load_ui=False)
+        bpy.ops.wm.open_mainfile(
+            filepath=str(path.resolve()), load_ui=False, use_scripts=choice.trusted
+        )
     except RuntimeError as error:
         reason = " ".join(str(error).removeprefix("Error:").split())
         raise SceneError(f"Blender cannot open {path}: {reason}") from error
     scene = bpy.context.scene
+    if choice.scene is not None:
+        scene = _named("scene", choice.scene, bpy.data.scenes, path)
+    _apply(choice, scene, path)
     if scene.camera is None:
         raise SceneError(f"{path} has no camera in scene {scene.name!r}; add one")
-    if resolution:
-        scene.render.resolution_x, scene.render.resolution_y = resolution
-        scene.render.resolution_percentage = 100
+    _tell_what_did_not_run(scene, path)
     return scene
+
+
+def _apply(choice: SceneChoice, scene: Any, path: Path) -> None:
+    if choice.view_layer is not None:
+        wanted = _named("view layer", choice.view_layer, scene.view_layers, path)
+        for layer in scene.view_layers:
+            layer.use = layer == wanted
+    if choice.camera is not None:
+        cameras = {each.name: each for each in scene.objects if each.type == "CAMERA"}
+        scene.camera = _named("camera", choice.camera, cameras, path)
+        for marker in scene.timeline_markers:  # they would switch back
+            marker.camera = None
+    if choice.resolution:
+        scene.render.resolution_x, scene.render.resolution_y = choice.resolution
+        scene.render.resolution_percentage = 100
+    if choice.threads is not None:
+        scene.render.threads_mode, scene.render.threads = "FIXED", choice.threads
+
+
+def _named(kind: str, name: str, known: Any, path: Path) -> Any:
+    """The entry of that name; raises SceneError, telling the names that there are."""
+    if name not in known:
+        names = ", ".join(known.keys()) or "none"
+        raise SceneError(f"{path} has no {kind} {name!r}; there are: {names}")
+    return known[name]
+
+
+def _tell_what_did_not_run(scene: Any, path: Path) -> None:
+    """Say on stderr which Python of the file Blender did not run, if any."""
+    import bpy
+
+    scene.view_layers[0].update()  # looks at drivers
+    if bpy.app.autoexec_fail:
+        warn(
+            f"{path} holds Python that was not run ({bpy.app.autoexec_fail_message}); "
+            "if you trust the file, give --enable-autoexec"
+        )

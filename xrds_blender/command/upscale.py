@@ -8,7 +8,7 @@ from typing import Any
 
 from ..frame.job import SCALES
 from . import arguments
-from .options import add_network
+from .options import add_network, add_output, add_read_limit, encoding_of
 
 
 def add_upscale(commands: Any) -> argparse.ArgumentParser:
@@ -29,9 +29,8 @@ def add_upscale(commands: Any) -> argparse.ArgumentParser:
         metavar="GUIDES.exr",
         help="full-resolution passes",
     )
-    add(
-        "-o",
-        "--output",
+    add_output(
+        command,
         type=Path,
         required=True,
         metavar="OUT.exr",
@@ -50,18 +49,22 @@ def add_upscale(commands: Any) -> argparse.ArgumentParser:
         metavar="N",
         help="samples per pixel of GUIDES.exr; few are denoised first (default: many)",
     )
+    add_read_limit(command)
     add_network(command)
     command.set_defaults(work=_upscale, lines=_lines)
     return command
 
 
 def _upscale(options: argparse.Namespace) -> dict[str, Any]:
+    from xrds_core import exr_limits
+
     from ..frame.torch_folder import load
 
+    exr_limits.allow(options.read_limit)
     return load("exr_upscale").upscale_file(
         options.beauty,
         options.guide_file,
-        options.output,
+        options.out,
         scale=options.scale,
         preset=options.preset,
         guides=options.guides,
@@ -70,6 +73,8 @@ def _upscale(options: argparse.Namespace) -> dict[str, Any]:
         device=options.device,
         memory_limit=options.memory_limit,
         weights=options.weights,
+        encoding=encoding_of(options),
+        threads=options.threads,
     )
 
 

@@ -15,7 +15,8 @@ def set_sampling(
 ) -> None:
     """Set seed and fixed samples per pixel; None keeps the scene's own."""
     if seed is not None:
-        borrowed.set(scene.cycles, seed=seed, use_animated_seed=False)
+        # counting on from the file's seed may leave what Cycles can hold
+        borrowed.set(scene.cycles, seed=seed % 2**31, use_animated_seed=False)
     if samples is not None:
         borrowed.set(
             scene.cycles,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.notices import warn
 from xrds_core.temporal.samples import Portion
 
 from ..cycles.pass_names import ALBEDO, NORMAL, is_lasting
@@ -155,6 +156,7 @@ class GuideSource:
             reason = (
                 f"in memory only: cannot write to {self._folder} ({error.strerror})"
             )
+            warn(f"guides are kept {reason}")
         self.decision = Decision(_NAME, value, reason)
         return _guides(guides, seconds)
 

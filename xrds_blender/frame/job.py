@@ -20,6 +20,17 @@ SCALES = (1, 2, 4, 8)
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
 QUALITIES = ("best", "high", "balanced", "fast")
+_SAMPLES = 1 << 24  # the most that Cycles takes
+_RANGES = {
+    "samples": (1, _SAMPLES),
+    "guide_samples": (1, _SAMPLES),
+    "guide_limit": (0, _SAMPLES),
+    "seed": (0, 2**31 - 1),
+    "threads": (1, 1024),
+    "temporal_radius": (0, 1000),
+    "memory_limit": (1, 2**63 - 1),
+    "exposure": (1e-30, 1e30),
+}
 
 
 @dataclass(frozen=True)
@@ -65,10 +76,12 @@ class RenderJob:
         if self.scale not in SCALES:
             known = ", ".join(map(str, SCALES))
             raise UsageError(f"scale {self.scale} is not one of {known}")
-        for name in ("samples", "guide_samples", "threads"):
+        for name, (least, most) in _RANGES.items():
             value = getattr(self, name)
-            if value is not None and value < 1:
-                raise UsageError(f"{name} is {value}; it must be at least 1")
+            if value is not None and not least <= value <= most:
+                raise UsageError(
+                    f"{name} is {value}; it must be from {least} to {most}"
+                )
         unknown = set(self.savings) - set(SAVINGS)
         if unknown:
             known = ", ".join(SAVINGS)
@@ -78,8 +91,6 @@ class RenderJob:
         if self.denoiser is not None:
             # The class is frozen; a name is as good as the mode it names.
             object.__setattr__(self, "denoiser", _denoiser(self.denoiser))
-        if self.temporal_radius < 0:
-            raise UsageError(f"temporal radius {self.temporal_radius} is below 0")
         if self.denoise not in QUALITIES:
             known = ", ".join(QUALITIES)
             raise UsageError(f"denoise {self.denoise!r} is not one of {known}")

@@ -13,8 +13,8 @@ import numpy as np
 
 from .. import exr
 from ..errors import PictureError, UsageError
+from ..files import check_folder, check_place
 from ..frames import frame_numbers, frame_path
-from ..output import check_folder, check_place
 from ..temporal.moving import Movement
 from ..temporal.window import Shot, slide
 from .finishing import Finished, finish_frame

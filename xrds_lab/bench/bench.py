@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.command import console
+from xrds_blender.command import streams
 from xrds_blender.planning.budget import Network
 from xrds_core.atomic import replacing, write_json
 
@@ -79,7 +79,7 @@ def bench(
         timing,
         picker,
     )
-    with console.stdout_to(folder.directory / "blender.log"):
+    with streams.stdout_to(folder.directory / "blender.log"):
         shots = find_shots(scenes, windows, references, resolution)
         parts = [SceneBench(shot, chosen) for shot in shots]
         _report_missing(networks, presets)

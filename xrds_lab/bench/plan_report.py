@@ -20,6 +20,8 @@ from xrds_blender.planning.plan import SAVINGS
 from xrds_core import metrics
 from xrds_core.atomic import replacing, write_json
 from xrds_core.children import run_python
+from xrds_core.errors import SceneError, UsageError
+from xrds_core.files import check_input
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -143,6 +145,7 @@ def report(
 
     Records already in the JSON are kept, so that a report can be made in parts.
     """
+    _check_scenes(scenes)
     path = out.with_suffix(".json")
     records = json.loads(path.read_text("utf-8"))["records"] if path.is_file() else []
     for kind in kinds:
@@ -158,6 +161,20 @@ def report(
             with replacing(out.with_suffix(".md")) as part:
                 part.write_text(text(records), "utf-8")
     return {"records": records}
+
+
+def _check_scenes(scenes: Sequence[str]) -> None:
+    """Raise XRDSError for a scene that is neither a file nor a small one's name."""
+    from ..studio.traps import TRAPS
+
+    for scene in scenes:
+        if scene.endswith(".blend"):
+            check_input(Path(scene), SceneError)
+        elif scene not in TRAPS:
+            raise UsageError(
+                f"scene {scene!r} is neither a .blend file nor one of "
+                f"{', '.join(TRAPS)}"
+            )
 
 
 def text(records: Sequence[dict[str, Any]]) -> str:

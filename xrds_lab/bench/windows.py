@@ -87,7 +87,7 @@ def read_windows(path: Path) -> dict[str, Window]:
         }
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise UsageError(
-            f"{path} is not a windows file ({error!r}): it maps scene names to "
+            f"{path} is not a windows file ({error}): it maps scene names to "
             "resolution, window and floor_psnr"
         ) from error
 

@@ -39,7 +39,7 @@ def add_evaluate(commands: Any) -> argparse.ArgumentParser:
     add("--timing", action="store_true", help="also time whole frames")
     add("--timing-scenes", type=arguments.words, help="of these alone, as bmw27,house")
     add("--weights", type=Path, help="folder of weights files")
-    add("--out", type=Path, help="folder for results.json")
+    add("-o", "--out", type=arguments.folder, help="folder for results.json")
     add("--sheets", type=Path, help="folder for a JPEG of crops for each scene")
     command.set_defaults(work=_evaluate, lines=no_lines)
     return command
@@ -83,7 +83,13 @@ def add_stability(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds stability`."""
     command = commands.add_parser("stability", help="measure stiff and extreme cases")
     add = command.add_argument
-    add("--out", type=Path, required=True, help="folder for results.json and report")
+    add(
+        "-o",
+        "--out",
+        type=arguments.folder,
+        required=True,
+        help="folder for results.json and report",
+    )
     add(
         "--parts",
         type=arguments.names(STABILITY),
@@ -132,7 +138,7 @@ def add_plan_report(commands: Any) -> argparse.ArgumentParser:
     add("--guide-samples", type=arguments.positive, default=4)
     add("--resolution", type=arguments.size, metavar="WxH", default=(960, 540))
     add("--rounds", type=arguments.positive, default=1, help="pairs of runs")
-    add("--out", type=Path, required=True, help="path of the .json and .md")
+    add("-o", "--out", type=Path, required=True, help="path of the .json and .md")
     command.set_defaults(work=_plan_report, lines=no_lines)
     return command
 
@@ -158,7 +164,13 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     )
     add = command.add_argument
     add("scenes", type=Path, nargs="+", metavar="SCENE.blend")
-    add("--out", type=Path, required=True, help="folder; an unfinished run resumes")
+    add(
+        "-o",
+        "--out",
+        type=arguments.folder,
+        required=True,
+        help="folder; an unfinished run resumes",
+    )
     add(
         "--budgets",
         type=arguments.factors,

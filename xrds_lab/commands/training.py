@@ -65,7 +65,7 @@ def add_dataset(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds dataset`."""
     command = commands.add_parser("dataset", help="render a training set")
     add = command.add_argument
-    add("--out", type=Path, required=True)
+    add("-o", "--out", type=arguments.folder, required=True)
     add("--seed", type=int, default=0, help="first scene's seed")
     add("--count", type=arguments.positive, default=1, help="number of scenes")
     add("--assets", type=Path, help="folder of models, textures and skies")
@@ -79,7 +79,9 @@ def add_train(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds train`."""
     command = commands.add_parser("train", help="train or resume a network")
     command.add_argument("config", type=Path, metavar="CONFIG.toml")
-    command.add_argument("--out", type=Path, metavar="RUN", help="runs/CONFIG")
+    command.add_argument(
+        "-o", "--out", type=arguments.folder, metavar="RUN", help="runs/CONFIG"
+    )
     _add_changes(command)
     command.set_defaults(work=_train, lines=_train_lines)
     return command
@@ -97,7 +99,13 @@ def add_ablate(commands: Any) -> argparse.ArgumentParser:
         required=True,
         help="base, guides, blocks, depth, rival, loss, input, variation",
     )
-    add("--out", type=Path, required=True, help="folder of TABLE.json and its runs")
+    add(
+        "-o",
+        "--out",
+        type=arguments.folder,
+        required=True,
+        help="folder of TABLE.json and its runs",
+    )
     add("--seeds", type=arguments.positive, default=3, help="runs of each variant")
     _add_changes(command)
     command.set_defaults(work=_ablate, lines=lines_of("xrds_lab.training.ablations"))
@@ -111,7 +119,7 @@ def add_train_filter(commands: Any) -> argparse.ArgumentParser:
     )
     add = command.add_argument
     add("data", type=Path, nargs="+", metavar="DATASET", help="folders of `dataset`")
-    add("--out", type=Path, required=True, metavar="guide_filter.safetensors")
+    add("-o", "--out", type=Path, required=True, metavar="guide_filter.safetensors")
     add("--steps", type=arguments.positive, default=10_000)
     add("--seed", type=int, default=0)
     lines = lines_of("xrds_lab.training.guide_filter")

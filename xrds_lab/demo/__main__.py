@@ -6,7 +6,6 @@ Writes pictures, guides, comparison.png and results.json into a folder.
 from __future__ import annotations
 
 import argparse
-import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -116,7 +115,7 @@ def _write_results(
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=Path("demo"))
+    parser.add_argument("-o", "--out", type=Path, default=Path("demo"))
     parser.add_argument("--preset", default="fast")
     parser.add_argument("--weights", type=Path, help="folder of weights files")
     parser.add_argument("--seconds", type=float, default=TOTAL_SECONDS)
@@ -127,6 +126,5 @@ def _parser() -> argparse.ArgumentParser:
 
 
 if __name__ == "__main__":
-    console.end_at_once_by_signals()
-    sys.stderr.reconfigure(line_buffering=True)  # type: ignore[union-attr]
+    console.prepare()
     console.leave(main())

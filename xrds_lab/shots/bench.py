@@ -10,7 +10,7 @@ import csv
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.command import console
+from xrds_blender.command import streams
 from xrds_core.atomic import replacing, write_json
 from xrds_core.errors import UsageError
 
@@ -82,7 +82,7 @@ def bench_shots(
     out.mkdir(parents=True, exist_ok=True)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-shots.json", report_line)
-    with console.stdout_to(folder.directory / "blender.log"):
+    with streams.stdout_to(folder.directory / "blender.log"):
         shots = find_shots(scenes, windows, references, resolution)
         networks = Networks(None, "cpu")
         parts = [

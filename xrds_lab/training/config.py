@@ -20,6 +20,17 @@ from xrds_core.network import NetworkConfig, preset_config
 from .data import Variation
 from .losses import LOSSES
 
+_LEAST = {
+    "scale": 1,
+    "batch": 1,
+    "crop": 1,
+    "steps": 0,
+    "seed": 0,
+    "warmup": 0,
+    "validate_every": 1,
+    "validation_windows": 1,
+}
+
 
 @dataclass(frozen=True)
 class TrainingConfig:
@@ -65,6 +76,9 @@ class TrainingConfig:
         unknown = set(self.loss) - set(LOSSES)
         if unknown:
             raise UsageError(f"loss {sorted(unknown)} is none of {sorted(LOSSES)}")
+        for name, least in _LEAST.items():
+            if getattr(self, name) < least:
+                raise UsageError(f"{name} is {getattr(self, name)}, less than {least}")
         if self.crop % self.scale:
             raise UsageError(f"crop {self.crop} is no multiple of scale {self.scale}")
         choose_precision(self.precision, torch.device("cpu"))  # is it known?
@@ -102,7 +116,7 @@ def read_config(path: Path, changes: Sequence[str] = ()) -> TrainingConfig:
         UsageError: it is missing, no TOML, or has unknown or wrong values.
     """
     try:
-        values = rooted(tomllib.loads(path.read_text()), path.parent)
+        values = rooted(tomllib.loads(path.read_text("utf-8")), path.parent)
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UsageError(
             f"cannot read training configuration {path}: {error}"
@@ -117,9 +131,12 @@ def read_config(path: Path, changes: Sequence[str] = ()) -> TrainingConfig:
 
 def rooted(values: dict[str, Any], folder: Path) -> dict[str, Any]:
     """The same with absolute paths."""
-    if data := values.get("data"):
-        folders = [data] if isinstance(data, str) else data
-        values["data"] = tuple(str((folder / str(f)).absolute()) for f in folders)
+    if "data" in values:
+        data = values["data"]
+        folders = data if isinstance(data, list) else [data]
+        if not folders or not all(isinstance(x, str) and x for x in folders):
+            raise UsageError(f"data = {data!r} names no folders: give one or a list")
+        values["data"] = tuple(str((folder / f).absolute()) for f in folders)
     if start := values.get("start"):
         values["start"] = str((folder / str(start)).absolute())
     return values
@@ -142,11 +159,39 @@ def from_values(values: dict[str, Any], path: Path) -> TrainingConfig:
             f"{path}: unknown {sorted(unknown)}; known are {sorted(known)}"
         )
     try:
+        _check_types(TrainingConfig, values)
+        _check_types(Variation, values.get("variation", {}))
+        _check_types(NetworkConfig, values.get("network", {}))
+        losses = values.get("loss", {})
+        if not isinstance(losses, dict) or not all(
+            _is(float, x) for x in losses.values()
+        ):
+            raise TypeError(f"loss = {losses!r} is no table of numbers")
         values["variation"] = Variation(**values.get("variation", {}))
         values["betas"] = tuple(values.get("betas", TrainingConfig.betas))
         return TrainingConfig(**values)
-    except (KeyError, TypeError, UsageError) as error:
+    except (KeyError, TypeError, ValueError, UsageError) as error:
         raise UsageError(f"{path}: {error}") from error
+
+
+def _check_types(owner: type, values: Any) -> None:
+    """Raise TypeError for a value of another type than the field of `owner`."""
+    if not isinstance(values, dict):
+        raise TypeError(f"{values!r} is no table")
+    simple = {kind.__name__: kind for kind in (bool, int, float, str)}
+    for each in dataclasses.fields(owner):
+        kind = simple.get(str(each.type))
+        if kind and each.name in values and not _is(kind, values[each.name]):
+            raise TypeError(
+                f"{each.name} = {values[each.name]!r} is not of type {kind.__name__}"
+            )
+
+
+def _is(kind: type, value: Any) -> bool:
+    """Whether a TOML value is of a type; an integer is a float, a truth value none."""
+    if isinstance(value, bool):
+        return kind is bool
+    return isinstance(value, (int, float) if kind is float else kind)
 
 
 def to_toml(config: TrainingConfig) -> str:

@@ -18,13 +18,13 @@ import torch
 from torch import Tensor
 from tqdm import tqdm
 
-from xrds_core.atomic import replacing
 from xrds_core.devices import choose_device
 from xrds_core.errors import Cancelled, UsageError, WeightsError
 from xrds_core.front_end import clean_albedo, clean_normal
 from xrds_core.guide_filter import FEW_SAMPLES, GuideFilter
 from xrds_core.weights import save_guide_filter
 
+from .checkpoint import read_checkpoint, taking_over, write_checkpoint
 from .config import cosine
 from .interruption import Interruption
 from .windows import find_windows, paths_of, read_arrays
@@ -172,20 +172,21 @@ class Learner:
     def keep(self) -> None:
         """Write the checkpoint."""
         state = {name: getattr(self, name).state_dict() for name in KEPT}
-        with replacing(self.checkpoint) as part:
-            torch.save(state | {"step": self.step, "seed": self.seed}, part)
+        state |= {"step": self.step, "seed": self.seed}
+        write_checkpoint(self.checkpoint, state)
 
     def resume(self) -> None:
         """Go back to the checkpoint."""
-        state = torch.load(self.checkpoint, map_location=self.device, weights_only=True)
-        if state["seed"] != self.seed:
-            raise UsageError(
-                f"{self.checkpoint} is of seed {state['seed']}: remove it, or give "
-                "that seed"
-            )
-        self.step = state["step"]
-        for name in KEPT:
-            getattr(self, name).load_state_dict(state[name])
+        state = read_checkpoint(self.checkpoint, self.device)
+        with taking_over(self.checkpoint):
+            if state["seed"] != self.seed:
+                raise UsageError(
+                    f"{self.checkpoint} is of seed {state['seed']}: remove it, or give "
+                    "that seed"
+                )
+            self.step = state["step"]
+            for name in KEPT:
+                getattr(self, name).load_state_dict(state[name])
 
 
 KEPT = ("network", "optimizer")

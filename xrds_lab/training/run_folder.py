@@ -16,6 +16,7 @@ import torch
 from xrds_core.atomic import replacing
 from xrds_core.errors import UsageError
 
+from .checkpoint import read_checkpoint, write_checkpoint
 from .config import TrainingConfig, read_config, to_toml
 from .windows import Files, WindowSet, array_names, find_windows, paths_of
 
@@ -102,11 +103,10 @@ class RunFolder:
 
     def save(self, state: dict[str, Any]) -> None:
         """Write the checkpoint."""
-        with replacing(self.checkpoint) as part:
-            torch.save(state, part)
+        write_checkpoint(self.checkpoint, state)
 
     def load(self, device: torch.device) -> dict[str, Any] | None:
-        """Read the checkpoint, if there is one."""
+        """Read the checkpoint, if there is one; WeightsError if it is damaged."""
         if not self.checkpoint.exists():
             return None
-        return torch.load(self.checkpoint, map_location=device, weights_only=True)
+        return read_checkpoint(self.checkpoint, device)

@@ -20,6 +20,7 @@ from tqdm import tqdm
 
 from xrds_core.errors import Cancelled, WeightsError
 
+from .checkpoint import taking_over
 from .config import TrainingConfig
 from .crop import Batch
 from .data import draw
@@ -58,7 +59,8 @@ class Run:
         self.seconds = 0.0  # of these steps
         self.records: list[dict[str, Any]] = []
         if state:
-            self.resume(state)
+            with taking_over(self.folder.checkpoint):
+                self.resume(state)
 
     # --- steps ------------------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Whether a file can be written, asked before the work that it is to hold."""
+"""Whether files can be read and written, asked before the work."""
 
 from __future__ import annotations
 
@@ -8,7 +8,20 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from .atomic import sweep, try_folder
-from .errors import PictureError
+from .errors import PictureError, XRDSError
+
+
+def check_input(path: Path, error: type[XRDSError] = PictureError) -> int:
+    """Return the bytes of a file; raise `error`, saying why, if it cannot be read."""
+    try:
+        if not stat.S_ISREG(path.stat().st_mode):
+            raise error(f"cannot read {path}: it is no regular file")
+        with path.open("rb") as file:
+            return os.fstat(file.fileno()).st_size
+    except FileNotFoundError as reason:
+        raise error(f"no file {path}") from reason
+    except OSError as reason:
+        raise error(f"cannot read {path} ({reason.strerror})") from reason
 
 
 def check_output(path: Path, inputs: Iterable[str | Path] = ()) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from xrds_core.errors import PictureError
-from xrds_core.output import check_output
+from xrds_core.files import check_output
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="such files are POSIX'")
 

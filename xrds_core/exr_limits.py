@@ -1,0 +1,47 @@
+"""What an OpenEXR file's header may claim, judged before memory is taken for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from .errors import PictureError
+
+_LARGEST_SIDE = 1 << 16  # pixels; more is a damaged header
+_ALWAYS_READ = 1 << 30  # bytes of pixels
+_USUAL_RATIO = 1000  # of pixels to file; ZIP, the default, packs no picture smaller
+_BYTES = 4  # of a number; the header as read does not tell them apart
+
+_allowed = 0
+
+
+def allow(size: int | None) -> None:
+    """Let this process read files of `size` bytes of pixels; None: the usual again."""
+    global _allowed
+    _allowed = size or 0
+
+
+def limit_of(size: int) -> int:
+    """The bytes of pixels that are read of a file of `size` bytes."""
+    return _allowed or max(_ALWAYS_READ, size * _USUAL_RATIO)
+
+
+def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
+    """Raise PictureError for windows that cannot be, or whose pixels take too much."""
+    claimed = 0
+    for header in headers:
+        areas = [_area(path, header, name) for name in ("dataWindow", "displayWindow")]
+        claimed += max(areas) * len(header["channels"]) * _BYTES
+    if claimed > limit:
+        raise PictureError(
+            f"{path} claims {claimed / 1e9:.1f} GB of pixels, more than a file of its "
+            "size should hold; if it is sound, raise --read-limit above that"
+        )
+
+
+def _area(path: object, header: Any, name: str) -> int:
+    (left, top), (right, bottom) = header[name]
+    width, height = int(right) - int(left) + 1, int(bottom) - int(top) + 1
+    if not (0 < width <= _LARGEST_SIDE and 0 < height <= _LARGEST_SIDE):
+        raise PictureError(f"{path} is damaged: its {name} is {width}x{height} pixels")
+    return width * height
