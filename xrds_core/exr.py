@@ -159,7 +159,7 @@ class File:
     def __init__(self, path: str | Path) -> None:
         self.path = path
         self.parts = exr_library.read(path)
-        self._places = _places(self.parts)
+        self._places = _places(path, self.parts)
         self.names = Channels(path, self._places)
         self.window: Window | None = None
 
@@ -206,14 +206,23 @@ class File:
         return _placed(pixels, part, self.window or part.display_window)
 
 
-def _places(parts: list[Part]) -> dict[str, tuple[int, str]]:
-    """Return part and own name of each channel, by its full name."""
-    places = {}
+def _places(path: str | Path, parts: list[Part]) -> dict[str, tuple[int, str]]:
+    """Return part and own name of each channel, by its full name.
+
+    Raises PictureError where two parts hold channels of one name.
+    """
+    places: dict[str, tuple[int, str]] = {}
     for number, part in enumerate(parts):
         layer = part.name if len(parts) > 1 else ""
         for name in part.channels:
             # Blender repeats the part's name in its channels, others do not
             full = f"{layer}.{name}" if layer and "." not in name else name
+            if full in places:
+                first = parts[places[full][0]].name
+                raise PictureError(
+                    f"{path} holds the channel {full!r} twice, in its parts {first!r} "
+                    f"and {part.name!r}; save it with one of them"
+                )
             places[full] = number, name
     return places
 

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 import torch
 
+from .errors import UsageError
 from .exr import CYCLES, Names, read_beauty, read_guides, write_picture
 from .exr_encoding import FLOAT_ZIP, Encoding
-from .files import check_output
+from .files import check_output, check_place
 from .progress import Callback
 from .upscaler import Upscaler
 
@@ -54,9 +55,16 @@ def upscale_file(
 
     Raises:
         PictureError: a file cannot be read, written, or lacks a pass.
+        UsageError: `output` does not end in .exr.
         WeightsError, UsageError, Cancelled: as `Upscaler`.
     """
     start = time.perf_counter()
+    check_place(Path(output))
+    if Path(output).suffix.lower() != ".exr":
+        raise UsageError(
+            f"output {str(output)!r} must end in .exr: without Blender there is no "
+            "view transform to make another format with"
+        )
     check_output(Path(output), (beauty, guide_file))
     if threads is not None:
         torch.set_num_threads(threads)

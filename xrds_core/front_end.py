@@ -38,7 +38,7 @@ _FARTHEST_BIN = 1e4  # times brighter or darker: such bins say nothing of the ex
 _LARGEST = np.float32(3.4e38)  # blended tiles may round up and stay finite
 # Of k e x: its square, over the epsilons that networks divide by, is a float32 still.
 _LARGEST_EXPOSED = 1e18
-_LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
+LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
 
 
 def clean_radiance(x: Array) -> tuple[Array, int]:
@@ -134,11 +134,11 @@ def transfer(x: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
 def inverse_transfer(t: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
     """Return the radiance whose transfer is `t`; finite for every finite t."""
     if isinstance(t, Tensor):
-        exposed = torch.expm1(t.float().clamp(max=_LARGEST_TRANSFERRED))
+        exposed = torch.expm1(t.float().clamp(max=LARGEST_TRANSFERRED))
         return (exposed / (TRANSFER_GAIN * exposure)).clamp(max=float(_LARGEST))
     with np.errstate(over="ignore"):
         t = t.astype(np.float32, copy=False)
-        exposed = np.expm1(np.minimum(t, np.float32(_LARGEST_TRANSFERRED)))
+        exposed = np.expm1(np.minimum(t, np.float32(LARGEST_TRANSFERRED)))
         return np.minimum(exposed / _gain(exposure), _LARGEST)
 
 

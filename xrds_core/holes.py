@@ -35,6 +35,15 @@ def clean_radiance(x: Array) -> tuple[Array, int]:
     return _pull_push(lit, known.all(axis=-1)), bad
 
 
+def clean_alpha(x: Array) -> tuple[Array, int]:
+    """Return (x, holes) as `fill_holes`, but 1 where no pixel has an alpha.
+
+    So a picture whose alpha is lost keeps its colour.
+    """
+    filled, holes = fill_holes(x)
+    return (np.ones_like(x), holes) if holes and holes == x.size else (filled, holes)
+
+
 def fill_holes(x: Array) -> tuple[Array, int]:
     """Return (x, holes): NaN and infinities get the mean of finite pixels near them.
 

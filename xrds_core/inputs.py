@@ -13,7 +13,7 @@ from .arrays import Array, float_array
 from .errors import PictureError, UsageError
 from .front_end import clean_radiance, pad_guide, transfer
 from .guide_filter import FEW_SAMPLES
-from .holes import fill_holes
+from .holes import clean_alpha, fill_holes
 from .layout import to_planes
 from .tiling import Tile
 
@@ -123,11 +123,10 @@ def check(
         guides["guide_alpha"] = float_array("guide_alpha", plane, (1,))
     _check_sizes(scale, low, guides)
     cleaned = {
-        name: (clean_radiance if name == "guide_radiance" else fill_holes)(guide)
-        for name, guide in guides.items()
+        name: _CLEAN.get(name, fill_holes)(guide) for name, guide in guides.items()
     }
     before, faults = (None, 0) if noisy is None else _noisy(noisy, low)
-    low, bad_pixels = clean_radiance(low)
+    low, bad_pixels = _picture(low)
     bad_pixels += faults + sum(count for _, count in cleaned.values())
     light, _ = cleaned.get("guide_radiance", (None, 0))
     cover, _ = cleaned.get("guide_alpha", (None, 0))
@@ -144,6 +143,20 @@ def check(
         bad_pixels,
         guide_samples is not None and guide_samples < FEW_SAMPLES,
     )
+
+
+# Of guides; all others just have their holes filled.
+_CLEAN = {"guide_radiance": clean_radiance, "guide_alpha": clean_alpha}
+
+
+def _picture(low: Array) -> tuple[Array, int]:
+    """Return the picture, cleaned, and its bad pixels; bad alpha spoils no colour."""
+    cleaned, bad = clean_radiance(low)
+    if not bad or low.shape[2] == 3:
+        return cleaned, bad
+    colour, _ = clean_radiance(low[..., :3])
+    alpha, _ = clean_alpha(low[..., 3:])
+    return np.concatenate((colour, alpha.clip(0.0)), axis=2), bad
 
 
 def _noisy(value: Any, low: Array) -> tuple[Array, int]:

@@ -16,8 +16,8 @@ from .alpha import finish
 from .arrays import Array
 from .cost import Cost, measure
 from .devices import choose_device, choose_precision, free_memory, is_out_of_memory
-from .errors import OutOfMemory, PictureError
-from .front_end import choose_exposure, inverse_transfer
+from .errors import OutOfMemory, PictureError, WeightsError
+from .front_end import LARGEST_TRANSFERRED, choose_exposure, inverse_transfer
 from .guide_filter import filter_guides
 from .idle import Area, busy_area, write_base
 from .inputs import Inputs, check
@@ -132,6 +132,7 @@ class Upscaler:
 
         Raises:
             PictureError: the arrays do not fit each other or this network.
+            WeightsError: what the network gives is no picture.
             OutOfMemory: the device has no room even for the smallest tiles.
             Cancelled: `progress` returned False.
         """
@@ -281,6 +282,11 @@ class Upscaler:
                         inputs.radiance_tensor(tile, exposure).to(self.device),
                         guides,
                         None if noisy is None else noisy.to(self.device),
+                    )
+                if not bool((t.abs() <= LARGEST_TRANSFERRED).all()):
+                    raise WeightsError(
+                        "the network gives values that no picture has: its weights "
+                        "are damaged; download them again"
                     )
                 result = inverse_transfer(t, exposure).clamp_(min=0.0)
         except (RuntimeError, MemoryError) as error:

@@ -135,6 +135,13 @@ def test_interrupt_ends_a_render_at_once(folder: Path) -> None:
         ("render scene.blend -o a.jpg --weights .", 2, "a.jpg"),
         ("render scene.blend -o a.exr --frames 1-2 --weights .", 2, "####"),
         ("render scene.blend -o a.exr --device abacus --weights .", 2, "abacus"),
+        (
+            "render scene.blend -o a.exr --resolution 3x3",
+            2,
+            "3x3 is not a size that Blender takes",
+        ),
+        ("render scene.blend -o a.exr --resolution 4x99999", 2, "4 to 65536 pixels"),
+        ("plan scene.blend --resolution 1x40", 2, "1x40 is not a size"),
     ],
 )
 def test_refusals_come_before_rendering(

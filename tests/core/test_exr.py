@@ -459,3 +459,18 @@ def test_a_file_that_cannot_be_written_leaves_nothing(path: Path) -> None:
         write_picture(path, {**planes(0), "A": np.zeros((9, 9), np.float32)})
     np.testing.assert_array_equal(read_beauty(path).radiance[..., 0], planes(0)["R"])
     assert {x.name for x in path.parent.iterdir()} == {"render.exr", "folder.exr"}
+
+
+def test_one_name_in_two_parts_is_refused(tmp_path: Path) -> None:
+    """Which of them would be the picture depends on their order alone."""
+    path = tmp_path / "two.exr"
+    parts = [
+        OpenEXR.Part(
+            header(), {f"View.Combined.{k}": v for k, v in planes(seed).items()}, name
+        )
+        for seed, name in enumerate(("first", "second"))
+    ]
+    OpenEXR.File(parts).write(str(path))
+    named = "'View.Combined.[RGB]' twice, in its parts 'first' and 'second'"
+    with pytest.raises(PictureError, match=named):
+        read_beauty(path)

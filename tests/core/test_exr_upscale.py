@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from xrds_core import exr_upscale, weights
-from xrds_core.errors import PictureError
+from xrds_core.errors import PictureError, UsageError
 from xrds_core.exr import read_beauty, write_picture
 from xrds_core.exr_upscale import upscale_file
 from xrds_core.network import XRDS, preset_config
@@ -82,6 +82,40 @@ def test_an_output_that_cannot_be_is_told_before_the_work(
     low, guide = folder / "low.exr", folder / "guides.exr"
     with pytest.raises(PictureError, match="cannot write"):
         upscale_file(low, guide, folder / output, weights=folder)
+
+
+@pytest.mark.parametrize("guides", ["fast"])
+@pytest.mark.parametrize("name", ["out.png", "out.jpg", "out"])
+def test_no_exr_is_written_under_another_formats_name(folder: Path, name: str) -> None:
+    low, guide = folder / "low.exr", folder / "guides.exr"
+    with pytest.raises(UsageError, match=rf"{name}' must end in \.exr"):
+        upscale_file(low, guide, folder / name, weights=folder)
+    assert not (folder / name).exists()
+
+
+@pytest.mark.parametrize("guides", ["fast"])
+def test_a_lost_alpha_is_counted_and_told_and_keeps_the_colour(folder: Path) -> None:
+    from xrds_blender.command.upscale import _lines
+
+    colour = planes("", "RGB", 10, 8)
+    for name, alpha in (("lost", np.nan), ("whole", 1.0)):
+        channels = {**colour, "A": np.full((10, 8), alpha, np.float32)}
+        write_picture(folder / f"{name}.exr", channels)
+    told = {
+        name: upscale_file(
+            folder / f"{name}.exr",
+            folder / "guides.exr",
+            folder / f"{name}.out.exr",
+            weights=folder,
+        )
+        for name in ("lost", "whole")
+    }
+    assert (told["lost"]["bad_pixels"], told["whole"]["bad_pixels"]) == (80, 0)
+    assert "replaced 80 bad pixels" in _lines(told["lost"])[1]
+    assert len(_lines(told["whole"])) == 1
+    results = [read_beauty(told[name]["output"]).radiance for name in told]
+    assert results[0].mean() > 0.2
+    np.testing.assert_array_equal(*results)
 
 
 @pytest.mark.parametrize("guides", ["fast"])

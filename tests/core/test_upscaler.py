@@ -117,6 +117,28 @@ def test_radiance_before_denoising_is_seen(fast: Upscaler) -> None:
         fast(low, *guides, noisy=low[:, :11])
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_pixel_without_alpha_keeps_its_colour(fast: Upscaler, bad: float) -> None:
+    low, *guides = picture(12, 12)
+    whole = np.dstack((low, np.ones((12, 12), np.float32)))
+    spoilt = whole.copy()
+    spoilt[5, 7, 3] = bad
+    result = fast(spoilt, *guides)
+    assert result.bad_pixels == 1
+    np.testing.assert_array_equal(result.radiance, fast(whole, *guides).radiance)
+
+
+@pytest.mark.parametrize("size", [1e20, 1e30, np.inf])
+def test_weights_that_give_no_picture_are_told(size: float) -> None:
+    """Finite ones, too: their file is read without complaint."""
+    broken = make(preset="paper")
+    with torch.no_grad():
+        for weight in broken.network.tail.parameters():
+            weight.fill_(size)
+    with pytest.raises(WeightsError, match="its weights are damaged"):
+        broken(*picture(8, 8))
+
+
 def test_flipped_views_and_other_floats_are_taken(fast: Upscaler) -> None:
     inputs = picture(8, 8)
     expected = fast(*inputs).radiance

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 LAST_FRAME = 1048574  # Blender's MAXFRAME
-LARGEST_SIDE = 65536  # pixels; Blender's largest resolution
+SMALLEST_SIDE, LARGEST_SIDE = 4, 65536  # pixels; Blender takes the nearest of these
 
 
 def positive(text: str) -> int:
@@ -112,9 +112,10 @@ def size(text: str) -> tuple[int, int]:
     if not match:
         raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 1920x1080")
     width, height = int(match[1]), int(match[2])
-    if not (0 < width <= LARGEST_SIDE and 0 < height <= LARGEST_SIDE):
+    if not all(SMALLEST_SIDE <= x <= LARGEST_SIDE for x in (width, height)):
         raise argparse.ArgumentTypeError(
-            f"{text} is not a size that Blender takes: 1 to {LARGEST_SIDE} pixels"
+            f"{text} is not a size that Blender takes: each side has {SMALLEST_SIDE} "
+            f"to {LARGEST_SIDE} pixels"
         )
     return width, height
 

@@ -79,4 +79,10 @@ def _upscale(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _lines(result: dict[str, Any]) -> list[str]:
-    return [f"{result['output']}: {result['seconds']:.1f} s"]
+    lines = [f"{result['output']}: {result['seconds']:.1f} s"]
+    if result["bad_pixels"]:
+        lines.append(
+            f"  replaced {result['bad_pixels']} bad pixels of the input: NaN, "
+            "infinities or negative light"
+        )
+    return lines

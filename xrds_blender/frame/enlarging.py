@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from xrds_core.arrays import Array
-from xrds_core.errors import OutOfMemory
+from xrds_core.errors import OutOfMemory, WeightsError
 
 from ..cycles.colour import converted, to_rec709, working_space
 from ..cycles.rendered import Beauty, Guides
@@ -62,7 +62,7 @@ def enlarge(
             progress=progress,
             skip_idle=skip_idle,
         )
-    except (OutOfMemory, RuntimeError, MemoryError) as error:  # as torch raises
+    except (OutOfMemory, WeightsError, RuntimeError, MemoryError) as error:
         reason = str(error).partition("\n")[0] or "out of memory"
         message = (
             f"the network failed ({reason}); the picture is the low-resolution render"

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..arrays import float_array
 from ..errors import PictureError
-from ..holes import clean_radiance, fill_holes
+from ..holes import clean_alpha, clean_radiance, fill_holes
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -51,7 +51,7 @@ def check(radiance: Any, albedo: Any, normal: Any) -> Pictures:
                 "give both of one render"
             )
     light, bad_pixels = clean_radiance(whole[..., :3])
-    alpha, holes = fill_holes(whole[..., 3:])
+    alpha, holes = clean_alpha(whole[..., 3:])
     filled = {name: fill_holes(guide) for name, guide in guides.items()}
     bad_pixels += holes + sum(count for _, count in filled.values())
     return Pictures(light, alpha, {k: v for k, (v, _) in filled.items()}, bad_pixels)

@@ -20,15 +20,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .panorama import Around, around
-
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..arrays import Array
     from .frame import Camera, Matrix, Stored
-
-    Passage = Array | Around
 
 # Pixels by which motion there and motion back may differ; for things that move by
 # themselves, whose edges are known less well, half as much.
@@ -85,9 +81,9 @@ class Pair:
 
     here: Stored
     there: Stored
-    forth: Passage
-    back: Passage
-    extent: tuple[Array, Array]
+    forth: Array
+    back: Array
+    around: tuple[Array, Array]
     detour: Detour | None = None
 
 
@@ -130,15 +126,12 @@ def pixels_of(camera: Camera) -> Matrix:
     return np.vstack([screen @ camera.project @ camera.view, near])
 
 
-def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Passage:
+def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Array:
     """Return (4, 4): (x, y, 1, nearness) here -> (x w, y w, w, nearness w) there.
 
-    `moved` (4, 4) is what the object did to world points in between. Panoramas have a
-    passage of their own.
+    `moved` (4, 4) is what the object did to world points in between.
     """
     between = np.eye(4) if moved is None else moved
-    if here.sphere is not None and there.sphere is not None:
-        return around(here, there, between)
     return (pixels_of(there) @ between @ world_of(here)).astype(np.float32)
 
 
@@ -146,15 +139,15 @@ def pair(
     here: Stored,
     there: Stored,
     detour: Detour | None = None,
-    extent: tuple[Array, Array] | None = None,
+    around: tuple[Array, Array] | None = None,
 ) -> Pair:
     """Return what `places` needs to know of two frames.
 
-    `extent` is `surroundings` of `here`, for callers with many pairs.
+    `around` is `surroundings` of `here`, for callers with many pairs.
     """
     forth = passage(here.camera, there.camera)
     back = passage(there.camera, here.camera)
-    return Pair(here, there, forth, back, extent or surroundings(here), detour)
+    return Pair(here, there, forth, back, around or surroundings(here), detour)
 
 
 def surroundings(frame: Stored) -> tuple[Array, Array]:
@@ -195,11 +188,9 @@ def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Gri
 
 
 def carry(
-    passage: Passage, x: Array, y: Array, nearness: Array
+    passage: Array, x: Array, y: Array, nearness: Array
 ) -> tuple[Array, Array, Array]:
     """Return (x, y, nearness) there of pixels (n,) here; NaN behind the camera."""
-    if isinstance(passage, Around):
-        return passage.carry(x, y, nearness)
     across, down, w, near = (
         row[0] * x + row[1] * y + row[3] * nearness + row[2] for row in passage
     )
@@ -225,7 +216,7 @@ def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
     back_x += x - grid.x - centre_x
     back_y += y - grid.y - centre_y
     left = back_x**2 + back_y**2
-    least, most = (part[grid.pixels] for part in pair.extent)
+    least, most = (part[grid.pixels] for part in pair.around)
     seen = found.seen & (left < _AGREEMENT**2) & (near >= least) & (near <= most)
     left[~seen] = 0.0
     apart = found.apart + np.float32(_AS_DISTANCE) * left
