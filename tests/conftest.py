@@ -70,6 +70,14 @@ def new_scene(width: int, height: int, samples: int) -> Any:
     return scene
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--every-change",
+        action="store_true",
+        help="try every change of the guide cache's table, not only some of each kind",
+    )
+
+
 @pytest.fixture(autouse=True)
 def no_guides_of_before() -> None:
     """What one test rendered is not to serve another."""

@@ -178,10 +178,13 @@ def stored(key: str, folder: Path) -> Path:
     return folder / "xrds-guides" / f"{key}.guides.npz"
 
 
+PROBE = np.linspace(0.0, 1.0, 6, dtype=np.float32)
+
+
 def some(value: float, samples: int = 1, side: int = 8) -> CachedGuides:
     pixels = np.full((side, side, 3), value, np.float32)
     passes = {("", ALBEDO): pixels, ("", NORMAL): pixels, ("", "Depth"): pixels}
-    return CachedGuides(samples, passes, {"": pixels[..., 0]})
+    return CachedGuides(samples, passes, {"": pixels[..., 0]}, PROBE)
 
 
 def test_the_mean_is_weighted_by_samples() -> None:
@@ -196,13 +199,26 @@ def test_memory_is_bounded_and_the_oldest_goes() -> None:
     cache = GuideCache(memory_limit=int(2.5 * some(0).nbytes))
     cache.put("a", some(1.0))
     cache.put("b", some(2.0))
-    cache.get("a")
+    cache.get("a", PROBE)
     cache.put("c", some(3.0))
-    assert cache.get("b") is None
-    assert cache.get("a") is not None
+    assert cache.get("b", PROBE) is None
+    assert cache.get("a", PROBE) is not None
     cache.put("large", some(4.0, side=64))
-    assert cache.get("large") is None
-    assert cache.get("c") is not None
+    assert cache.get("large", PROBE) is None
+    assert cache.get("c", PROBE) is not None
+
+
+def test_guides_of_another_probe_count_as_none_and_as_a_hole(tmp_path: Path) -> None:
+    cache = GuideCache()
+    cache.put("a", some(1.0), tmp_path)
+    other = PROBE + np.float32(0.01) * (PROBE > 0.9)
+    stored_alone = GuideCache()
+    for each in (cache, stored_alone):
+        assert each.get("a", other, tmp_path) is None
+        assert each.get("a", PROBE[1:], tmp_path) is None
+        assert each.get("b", PROBE, tmp_path) is None
+        assert each.get("a", PROBE + np.float32(1e-5), tmp_path) is not None
+        assert (each.hits, each.misses, each.holes) == (1, 3, 2)
 
 
 def test_a_folder_is_bounded(tmp_path: Path) -> None:
@@ -314,16 +330,16 @@ def test_a_damaged_file_is_named_and_replaced(
 ) -> None:
     GuideCache().put("key", some(1.0), tmp_path)
     path = stored("key", tmp_path)
-    assert GuideCache().get("key", tmp_path, (8, 8)) is not None
+    assert GuideCache().get("key", PROBE, tmp_path, (8, 8)) is not None
     damage(path)
     cache = GuideCache()
     assert not capsys.readouterr().err
-    assert cache.get("key", tmp_path, (8, 8)) is None
+    assert cache.get("key", PROBE, tmp_path, (8, 8)) is None
     told = capsys.readouterr().err
     assert str(path) in told
     assert "damaged" in told
     cache.put("key", some(3.0), tmp_path)
-    found = GuideCache().get("key", tmp_path, (8, 8))
+    found = GuideCache().get("key", PROBE, tmp_path, (8, 8))
     assert found is not None
     assert found.passes["", ALBEDO].mean() == 3.0
 
@@ -331,5 +347,5 @@ def test_a_damaged_file_is_named_and_replaced(
 def test_bad_pixels_are_kept_in_memory_alone(tmp_path: Path) -> None:
     cache = GuideCache()
     cache.put("key", some(float("nan")), tmp_path)
-    assert cache.get("key") is not None
+    assert cache.get("key", PROBE) is not None
     assert not stored("key", tmp_path).exists()

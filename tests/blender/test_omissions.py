@@ -13,7 +13,7 @@ bpy = pytest.importorskip("bpy")
 from xrds_blender import run_job
 from xrds_blender.frame.facts import find_facts
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.frame.rendering import evaluate
+from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import plan
 from xrds_lab.studio import traps
@@ -105,7 +105,7 @@ def test_a_pass_after_the_guides_has_its_lights_again() -> None:
 
 
 def decided(scene: Any) -> plan.Plan:
-    facts = evaluate(scene, lambda graph: find_facts(graph, RenderJob()))
+    facts = call_engine(scene, lambda _, graph: find_facts(graph, RenderJob()))
     return plan.decide(replace(facts, has_denoiser=True))
 
 

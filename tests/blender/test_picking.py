@@ -12,7 +12,9 @@ import pytest
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
 from xrds_blender.frame import picking
+from xrds_blender.frame.explain import explain
 from xrds_blender.frame.job import RenderJob
+from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
 from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import UsageError, XRDSError
@@ -136,6 +138,29 @@ def test_nothing_is_promised_where_nothing_denoises(
     monkeypatch.setattr(picking.denoisers, "is_there", lambda: False)
     with pytest.raises(XRDSError, match=r"has Open Image Denoise.*install XRDS"):
         render(still_life(64, 48), time_budget=5.0)
+
+
+@pytest.mark.parametrize("best", ["xrds", "plain", "full"])
+@pytest.mark.parametrize("goal", [{"time_budget": 500.0}, {"quality": 39.0}])
+def test_the_plan_told_is_the_one_rendered(
+    still_life: Callable[..., Any],
+    only: Callable[..., None],
+    best: str,
+    goal: dict[str, float],
+) -> None:
+    only(**{name: 40.0 if name == best else 20.0 for name in ("xrds", "plain", "full")})
+    ensure_registered()
+    scene = still_life(64, 48)
+    told = explain(scene, RenderJob(**goal))
+    picture = render(scene, **goal)
+    before = [(each["decision"], each["value"]) for each in told["decisions"]]
+    decided = [(each.decision, each.value) for each in picture.plan]
+    assert before == decided[: len(before)]
+    assert before[0][0] == next(iter(goal)).replace("_", " ")
+    assert told["facts"]["scale"] == picture.job.scale
+    # What is left is what only a render can know.
+    rest = {decision for decision, _ in decided[len(before) :]}
+    assert rest <= {"guide cache", "sessions", "guide prefilter"}
 
 
 def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(

@@ -5,6 +5,8 @@ Arrays are float32 (height, width, channels), scene-linear, row 0 on top.
 
 from __future__ import annotations
 
+import math
+import time
 from contextlib import nullcontext
 
 import numpy as np
@@ -21,12 +23,14 @@ from .layer_session import LayerSession
 from .low_camera import LowGrid, Region
 from .low_samples import LowPlace, LowSamples
 from .pass_names import ALBEDO, DEPTH, NOISY, NORMAL
-from .rendered import Beauty, Guides, InProcess
+from .rendered import Beauty, Guides, InProcess, Probe
 from .samples import read_samples
-from .settings import set_denoising, set_portion, set_sampling
+from .settings import set_denoising, set_portion, set_repeatable, set_sampling
 
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
+# What a probe of the guides is enlarged by, where it keeps this many pixels.
+PROBE_SCALE, PROBE_PIXELS = 8, 4096
 
 
 class CyclesPasses(LayerSession):
@@ -169,7 +173,7 @@ class CyclesPasses(LayerSession):
             view: self._read_guides(view, full, samples, seconds) for view in self.views
         }
 
-    def probe_guides(self, scale: int, samples: int) -> dict[str, float]:
+    def time_guides(self, scale: int, samples: int) -> dict[str, float]:
         """Seconds (sync, guides) of guides at 1/scale of the size; no pixels."""
         settings = guide_settings(self._depsgraph, GuideRender(shadows=False))
         with Borrowed() as borrowed, settings:
@@ -177,6 +181,26 @@ class CyclesPasses(LayerSession):
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             clock = self._run_low(borrowed, self._grid(scale), exact=False)
         return {"sync": clock.sync, "guides": clock.render}
+
+    def probe(self, how: GuideRender) -> Probe:
+        """Tiny guides of one sample: the same for the same scene.
+
+        Every pixel looks along one ray through a random place of its block, so about
+        one pixel in 64 of a large picture is looked at.
+        """
+        started = time.perf_counter()
+        pixels = self.region.width * self.region.height
+        grid = self._grid(max(1, min(PROBE_SCALE, math.isqrt(pixels // PROBE_PIXELS))))
+        with Borrowed() as borrowed, guide_settings(self._depsgraph, how):
+            set_repeatable(borrowed, self._scene)
+            set_denoising(borrowed, self._scene, self._layer_eval, False)
+            self._run_low(borrowed, grid, exact=False)
+        window = grid.rendered(self._size)
+        kept = [self._radiance(view, False)[..., 3:] for view in self.views]
+        kept += [pixels for _, pixels in sorted(self.data_passes().items())]
+        values = [self._read_corner(pixels, window).ravel() for pixels in kept]
+        seconds = time.perf_counter() - started
+        return Probe(np.concatenate(values), window.width, window.height, seconds)
 
     def _set_samples(
         self,

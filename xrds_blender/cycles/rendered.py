@@ -46,3 +46,17 @@ class Guides:
     radiance: Array | None
     samples: int | None
     seconds: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Tiny guides, to compare with those of another render.
+
+    `values` (N,) are all that guides keep, one pass after the other; `width` and
+    `height` the size in pixels, `seconds` what the probe took.
+    """
+
+    values: Array
+    width: int
+    height: int
+    seconds: float

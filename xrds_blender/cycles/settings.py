@@ -29,6 +29,21 @@ def set_sampling(
         )
 
 
+def set_repeatable(borrowed: Borrowed, scene: Any) -> None:
+    """One sample that no render before it in the session has a say in.
+
+    Cycles' usual patterns come from a table or a sequence that is laid out for the
+    most samples that a session was asked for; Sobol-Burley's are computed.
+    """
+    set_sampling(borrowed, scene, 1, 0)
+    borrowed.set(
+        scene.cycles,
+        sampling_pattern="TABULATED_SOBOL",
+        scrambling_distance=1.0,
+        auto_scrambling_distance=False,
+    )
+
+
 def set_portion(borrowed: Borrowed, scene: Any, portion: Portion) -> None:
     """Take a part of a sample sequence."""
     set_sampling(borrowed, scene, portion.whole, portion.seed)

@@ -26,9 +26,26 @@ from ..cycles.pass_names import ALBEDO, NORMAL
 
 MEMORY_LIMIT = 1 << 30  # bytes
 FOLDER_LIMIT = 8 << 30
-_SAMPLES, _ALPHA = "samples", "alpha"
+_SAMPLES, _ALPHA, _PROBE = "samples", "alpha", "probe"
 _SUBFOLDER, _SUFFIX = "xrds-guides", ".guides.npz"
 _MARK = "xrds guides 1"  # the first array of each file, which holds its key
+# What two probes of one scene differ by at most: some modifiers round their texture
+# coordinates in another order each time.
+TOLERANCE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class GuideName:
+    """Which scene guides are of: its key, and the probe that proves it."""
+
+    key: str
+    probe: Array
+
+    def is_same(self, other: GuideName | None) -> bool:
+        """Whether guides of both names are samples of one and the same thing."""
+        if other is None or self.key != other.key:
+            return False
+        return _agree(self.probe, other.probe)
 
 
 @dataclass(frozen=True)
@@ -36,18 +53,24 @@ class CachedGuides:
     """All that a guide render left: passes (H, W, channels) by (view, name).
 
     `alphas` (H, W) are by view; albedo, normal and alpha are the mean of `samples`
-    samples. Other passes are those of the first render.
+    samples. Other passes are those of the first render. `probe` (values,) proves
+    which scene they are of.
     """
 
     samples: int
     passes: dict[tuple[str, str], Array]
     alphas: dict[str, Array]
+    probe: Array
 
     def copy(self) -> CachedGuides:
         """Arrays that others may change."""
         passes = {key: pixels.copy() for key, pixels in self.passes.items()}
         alphas = {view: pixels.copy() for view, pixels in self.alphas.items()}
-        return CachedGuides(self.samples, passes, alphas)
+        return CachedGuides(self.samples, passes, alphas, self.probe)
+
+    def is_of(self, probe: Array) -> bool:
+        """Whether a probe render shows the scene that these guides are of."""
+        return _agree(self.probe, probe)
 
     def merged(self, other: CachedGuides) -> CachedGuides:
         """The mean of both, each with the weight of its samples."""
@@ -62,12 +85,12 @@ class CachedGuides:
             for key, mine in self.passes.items()
         }
         alphas = {v: mean(mine, other.alphas[v]) for v, mine in self.alphas.items()}
-        return CachedGuides(total, passes, alphas)
+        return CachedGuides(total, passes, alphas, self.probe)
 
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        arrays = [*self.passes.values(), *self.alphas.values()]
+        arrays = [*self.passes.values(), *self.alphas.values(), self.probe]
         return sum(array.nbytes for array in arrays)
 
 
@@ -79,26 +102,30 @@ class GuideCache:
     ) -> None:
         self.memory_limit, self.folder_limit = memory_limit, folder_limit
         self._kept: OrderedDict[str, CachedGuides] = OrderedDict()
+        self.hits = self.misses = self.holes = 0
 
     def get(
         self,
         key: str,
+        probe: Array,
         folder: Path | None = None,
         size: tuple[int, int] | None = None,
     ) -> CachedGuides | None:
         """The guides of a key, from memory or from the folder; None if there are none.
 
         A damaged file, or one of another `size` (height, width), counts as none and is
-        told of on stderr.
+        told of on stderr. Guides of another probe count as none, too, and as a hole.
         """
-        if key in self._kept:
-            self._kept.move_to_end(key)
-            return self._kept[key].copy()
-        stored = None if folder is None else _find(key, folder, size)
-        if stored is not None:
-            self._keep(key, stored)
-            return stored.copy()
-        return None
+        kept = self._kept.get(key)
+        if kept is None and folder is not None:
+            kept = _find(key, folder, size)
+        if kept is None or not kept.is_of(probe):
+            self.misses += 1
+            self.holes += kept is not None
+            return None
+        self.hits += 1
+        self._keep(key, kept)
+        return kept.copy()
 
     def put(self, key: str, guides: CachedGuides, folder: Path | None = None) -> None:
         """Keep guides in place of what the key had.
@@ -120,6 +147,7 @@ class GuideCache:
     def clear(self) -> None:
         """Forget what is in memory."""
         self._kept.clear()
+        self.hits = self.misses = self.holes = 0
 
     def _keep(self, key: str, guides: CachedGuides) -> None:
         self._kept.pop(key, None)
@@ -134,6 +162,12 @@ class GuideCache:
 CACHE = GuideCache()
 
 
+def _agree(first: Array, second: Array) -> bool:
+    return first.shape == second.shape and np.allclose(
+        first, second, TOLERANCE, TOLERANCE, equal_nan=True
+    )
+
+
 def _path(key: str, folder: Path) -> Path:
     return folder / _SUBFOLDER / f"{key}{_SUFFIX}"
 
@@ -142,6 +176,7 @@ def _write(path: Path, key: str, guides: CachedGuides) -> None:
     arrays = {_MARK: np.array(key), _SAMPLES: np.array(guides.samples)}
     arrays |= {f"{view}/{name}": array for (view, name), array in guides.passes.items()}
     arrays |= {f"{view}/{_ALPHA}": array for view, array in guides.alphas.items()}
+    arrays[_PROBE] = guides.probe
     with replacing(path) as part, part.open("wb") as file:
         np.savez(file, **arrays)
 
@@ -187,11 +222,11 @@ def _read(path: Path, key: str, size: tuple[int, int] | None) -> CachedGuides:
         arrays = dict(file)
     if str(arrays.pop(_MARK)) != key:
         raise ValueError("of another key")
-    samples = int(arrays.pop(_SAMPLES))
+    samples, probe = int(arrays.pop(_SAMPLES)), arrays.pop(_PROBE)
     named = {tuple(name.split("/", 1)): array for name, array in arrays.items()}
     alphas = {view: array for (view, name), array in named.items() if name == _ALPHA}
     passes = {key: array for key, array in named.items() if key[1] != _ALPHA}
-    guides = CachedGuides(samples, passes, alphas)
+    guides = CachedGuides(samples, passes, alphas, probe)
     _check(guides, size)
     return guides
 

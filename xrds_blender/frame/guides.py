@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, replace
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,23 +16,40 @@ from xrds_core.temporal.samples import Portion
 
 from ..cycles.pass_names import ALBEDO, NORMAL, is_lasting
 from ..cycles.passes import CyclesPasses
-from ..cycles.rendered import Beauty, Guides
+from ..cycles.rendered import Beauty, Guides, Probe
 from ..planning.facts import Facts
 from ..planning.plan import Decision, Plan
 from ..scene.guide_key import NotFollowed, guide_key
 from . import guide_cache
-from .guide_cache import CachedGuides
+from .guide_cache import CachedGuides, GuideName
 from .job import RenderJob
 
 _NAME = "guide cache"
 
 
+@dataclass(frozen=True)
+class _Look:
+    """What a look into the cache was for, and what it took; its text tells a user."""
+
+    key: str
+    probe: Probe
+    has_hole: bool
+    seconds: float
+
+    def __str__(self) -> str:
+        cache, probe = guide_cache.CACHE, self.probe
+        return (
+            f"a probe of {probe.width}x{probe.height} pixels took {probe.seconds:.2f} s"
+            f" ({cache.hits} of {cache.hits + cache.misses} looks found guides)"
+        )
+
+
 class GuideSource:
     """Guides of one frame.
 
-    `decision` tells afterwards where they came from, and `key`, where it is known, what
-    they show: guides of one key hold each other's samples. `portion` says which samples
-    are new, where frames of a shot continue one sequence.
+    `decision` tells afterwards where they came from, and `name`, where it is known,
+    what they show: guides of the same name hold each other's samples. `portion` says
+    which samples are new, where frames of a shot continue one sequence.
     """
 
     def __init__(
@@ -41,12 +59,14 @@ class GuideSource:
         job: RenderJob,
         chosen: Plan,
         facts: Facts,
+        report: Callable[[set[str], str], None],
         portion: Portion | None = None,
     ) -> None:
         self._passes, self._graph, self._job = passes, depsgraph, job
+        self._report = report
         self._chosen, self._facts = chosen, facts
         self._portion = portion
-        self.key: str | None = None
+        self.name: GuideName | None = None
         self._folder = None if job.guide_cache is None else Path(job.guide_cache)
         self.decision = Decision(_NAME, "off", "as requested")
 
@@ -62,23 +82,27 @@ class GuideSource:
             return self._render(self._chosen.guide_samples)
         started = time.perf_counter()
         try:
-            key = self.key = self._key()
+            key = self._key()
         except NotFollowed as reason:
             self.decision = Decision(
                 _NAME, "not used", f"the cache cannot track {reason}"
             )
             return self._render(self._chosen.guide_samples)
+        probe = self._passes.probe(self._chosen.guides)
+        self.name = GuideName(key, probe.values)
         region = self._passes.region
         size = region.height, region.width
-        kept = guide_cache.CACHE.get(key, self._folder, size)
-        looked = time.perf_counter() - started
+        holes = guide_cache.CACHE.holes
+        kept = guide_cache.CACHE.get(key, probe.values, self._folder, size)
+        has_hole = guide_cache.CACHE.holes > holes
+        look = _Look(key, probe, has_hole, time.perf_counter() - started)
         missing = self._missing(0 if kept is None else kept.samples)
         if not missing:
             assert kept is not None
             self._passes.put_back(kept.passes)
-            self._report_hit(kept.samples, looked)
-            return _guides(kept, {"sync": 0.0, "guides": looked})
-        return self._add(key, kept, missing, looked)
+            self._report_hit(kept.samples, look)
+            return _guides(kept, {"sync": 0.0, "guides": look.seconds})
+        return self._add(look, kept, missing)
 
     def _of_background(self, low: dict[str, Beauty]) -> dict[str, Guides]:
         """What Cycles writes where it sees nothing: its light as albedo, no normal."""
@@ -135,15 +159,16 @@ class GuideSource:
         )
 
     def _add(
-        self, key: str, kept: CachedGuides | None, samples: int, looked: float
+        self, look: _Look, kept: CachedGuides | None, samples: int
     ) -> dict[str, Guides]:
         """Render samples, join them with those kept, and keep the result."""
         rendered = self._render(samples, 0 if kept is None else kept.samples)
         seconds = dict(next(iter(rendered.values())).seconds)
-        seconds["guides"] += looked
+        seconds["guides"] += look.seconds
         alphas = {view: guides.alpha for view, guides in rendered.items()}
-        guides = CachedGuides(samples, self._passes.data_passes(), alphas)
-        reason = "no kept guides match this camera, geometry and materials"
+        passes = self._passes.data_passes()
+        guides = CachedGuides(samples, passes, alphas, look.probe.values)
+        reason = self._why_missed(look)
         value = f"kept {samples} samples"
         if kept is not None:
             guides = kept.merged(guides)
@@ -151,20 +176,31 @@ class GuideSource:
             reason = f"{samples} more samples of the same view"
             value = f"gathered {guides.samples} samples"
         try:
-            guide_cache.CACHE.put(key, guides, self._folder)
+            guide_cache.CACHE.put(look.key, guides, self._folder)
         except OSError as error:  # the picture is worth more than the guides kept
             reason = (
                 f"in memory only: cannot write to {self._folder} ({error.strerror})"
             )
             warn(f"guides are kept {reason}")
-        self.decision = Decision(_NAME, value, reason)
+        self.decision = Decision(_NAME, value, f"{reason}; {look}")
         return _guides(guides, seconds)
 
-    def _report_hit(self, samples: int, looked: float) -> None:
+    def _why_missed(self, look: _Look) -> str:
+        if not look.has_hole:
+            return "no kept guides match this camera, geometry and materials"
+        reason = (
+            "nothing XRDS looks at has changed, but a probe render shows other guides"
+        )
+        self._report({"INFO"}, f"XRDS: {_NAME}: {reason}; they are rendered anew")
+        return reason
+
+    def _report_hit(self, samples: int, look: _Look) -> None:
         reason = "camera, geometry, materials and textures are unchanged"
         expected = self._facts.guide_seconds
-        saving = None if expected is None else max(0.0, expected - looked)
-        self.decision = Decision(_NAME, f"used {samples} samples", reason, saving)
+        saving = None if expected is None else max(0.0, expected - look.seconds)
+        self.decision = Decision(
+            _NAME, f"used {samples} samples", f"{reason}; {look}", saving
+        )
 
 
 def _guides(kept: CachedGuides, seconds: dict[str, float]) -> dict[str, Guides]:

@@ -11,7 +11,7 @@ from . import history, progress
 from .full_size import render_full_size
 from .job import Picture, RenderJob
 from .networks import load_upscaler
-from .picking import pick
+from .picking import pick, picked_decisions
 from .plain import render_plain
 from .super_resolution import render_enlarged
 
@@ -56,7 +56,7 @@ def _render_picked(
         engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
         picture = render_layer(engine, depsgraph, picked)
     seconds = picture.seconds | {"total": time.perf_counter() - start}
-    rest = () if picked.plain else picture.plan  # its reason stands above
-    picture = replace(picture, seconds=seconds, plan=(decision, *rest), job=picked)
+    decisions = picked_decisions(picked, decision, picture.plan)
+    picture = replace(picture, seconds=seconds, plan=decisions, job=picked)
     history.keep(place, picked, picture)
     return picture

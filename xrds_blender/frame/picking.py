@@ -71,6 +71,16 @@ def foresee(scene: Any, job: RenderJob, networks: Sequence[Network]) -> Picked |
     return _choose(job, costs, model, known)
 
 
+def picked_decisions(
+    job: RenderJob, choice: Decision, rest: tuple[Decision, ...]
+) -> tuple[Decision, ...]:
+    """The decisions of a job that was picked: why it was, and what it then leaves out.
+
+    Of plain Cycles the choice says all.
+    """
+    return (choice,) if job.plain else (choice, *rest)
+
+
 def _denoisers() -> tuple[Denoiser, ...]:
     """Those that can denoise here.
 
@@ -134,7 +144,7 @@ def probe(
     slope = _slope(passes, scale, None if has_denoiser() else ours)
     whole = scale**2
     beauty = passes.beauty(scale, 1, denoise=False).seconds["beauty"] * whole
-    guide = passes.probe_guides(scale, 1)["guides"] * whole
+    guide = passes.time_guides(scale, 1)["guides"] * whole
     denoise = 0.0
     if has_denoiser():
         denoise = max(slope * whole - beauty, 0.0)

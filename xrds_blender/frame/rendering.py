@@ -54,14 +54,6 @@ def run_job(
     return call_engine(scene, work, layer)
 
 
-def evaluate(scene: Any, look: Callable[[Any], T]) -> T:
-    """Return what `look` finds in the dependency graph of a render of `scene`.
-
-    Nothing is rendered. Raises SceneError without a camera.
-    """
-    return call_engine(scene, lambda _, depsgraph: look(depsgraph))
-
-
 def render_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
     """Do the work that waits for the engine, or what Blender asks of it: `asked`."""
     if _task is not None:

@@ -90,7 +90,7 @@ def render_inputs(engine: Any, depsgraph: Any, job: RenderJob) -> Inputs:
         chosen = job.plan(facts)
         if not chosen.motion_blur:
             passes.hold_still()
-        source = GuideSource(passes, depsgraph, job, chosen, facts)
+        source = GuideSource(passes, depsgraph, job, chosen, facts, engine.report)
         renders = _Renders(engine, job, chosen, passes, source)
         render = renders.guides_first if job.guides == "full" else renders.light_first
         beauties, guides, exposure = render()

@@ -8,6 +8,7 @@ from typing import Any
 
 from ..planning.facts import SceneFacts
 from .closures import Closures, of_tree, reachable
+from .key_structs import TIMED_NODES
 
 _SURFACES = {
     "MESH",
@@ -30,7 +31,6 @@ _STILL_MODIFIERS = (
     "UV_WARP VERTEX_WEIGHT_EDIT VERTEX_WEIGHT_MIX VERTEX_WEIGHT_PROXIMITY WARP "
     "WEIGHTED_NORMAL WELD WIREFRAME"
 )
-_TIMED_NODES = {"INPUT_SCENE_TIME", "SIMULATION_INPUT", "SIMULATION_OUTPUT"}
 _NAMED = 3  # of what moves; more would not help a reader
 
 
@@ -224,7 +224,7 @@ def shapes_move(depsgraph: Any) -> bool:
 
 
 def _is_timed(tree: Any) -> bool:
-    return any(node.type in _TIMED_NODES for node in tree.nodes)
+    return any(node.type in TIMED_NODES for node in tree.nodes)
 
 
 def _is_simulated(item: Any) -> bool:

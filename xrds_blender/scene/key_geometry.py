@@ -22,23 +22,60 @@ _ATTRIBUTES: dict[str, tuple[str, int, Any]] = {
     "QUATERNION": ("value", 4, np.float32),
     "FLOAT4X4": ("value", 16, np.float32),
 }
+# Numbers per particle.
+_PARTICLE = {
+    "location": 3,
+    "velocity": 3,
+    "angular_velocity": 3,
+    "rotation": 4,
+    "size": 1,
+    "birth_time": 1,
+    "die_time": 1,
+    "lifetime": 1,
+}
+
+
+# Bevel rounds texture coordinates in another order each time it is evaluated.
+_UNSTABLE = {"BEVEL"}
+
+
+def mesh(item: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """Arrays of an evaluated mesh object by name, and of the mesh it was made from.
+
+    Generated coordinates come from the mesh before its modifiers, and so do texture
+    coordinates whose last bits are not the same each time; what modifiers do to these
+    their settings tell. Raises TypeError for an attribute of an unknown type.
+    """
+    import bpy
+
+    kinds = {each.type for each in item.modifiers}
+    stable = not kinds & _UNSTABLE or "NODES" in kinds
+    left_out = "" if stable else "FLOAT2"
+    yield from geometry(item.data, "MESH", left_out=left_out)
+    original = item.original.data if item.original else None
+    if isinstance(original, bpy.types.Mesh):
+        only = "position" if stable else ""
+        yield from geometry(original, "MESH", only=only)
 
 
 def geometry(
-    data: Any, kind: str, *, shape_alone: bool = False
+    data: Any, kind: str, *, only: str = "", left_out: str = ""
 ) -> Iterator[tuple[str, np.ndarray]]:
-    """Arrays by name. Raises TypeError for an attribute of an unknown type."""
+    """Arrays by name, of one attribute alone or without those of one type.
+
+    Raises TypeError for an attribute of an unknown type.
+    """
     if data is None or kind == "VOLUME":
         return
     if kind in {"CURVES", "POINTCLOUD"}:
         if kind == "CURVES":
             yield "offsets", _array(data.curve_offset_data, "value", 1, np.int32)
-        yield from _attributes(data, "")
+        yield from _attributes(data, only, left_out)
         return
     yield "faces", _array(data.polygons, "loop_start", 1, np.int32)
     yield "texture space", np.array([*data.texspace_location, *data.texspace_size])
-    yield from _attributes(data, "position" if shape_alone else "")
-    if shape_alone:
+    yield from _attributes(data, only, left_out)
+    if only:
         return
     layers = [layer.name for layer in data.uv_layers if layer.active_render]
     colours = data.color_attributes
@@ -48,9 +85,34 @@ def geometry(
         yield "normals", _array(data.corner_normals, "vector", 3, np.float32)
 
 
-def _attributes(data: Any, only: str) -> Iterator[tuple[str, np.ndarray]]:
+def pose(item: Any) -> np.ndarray:
+    """Matrices of an armature's bones, (bones, 4, 4), float32."""
+    bones = item.pose.bones if item.pose else ()
+    return np.array([bone.matrix for bone in bones], np.float32)
+
+
+def particles(system: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """What shaders can ask of each particle of a system, by name."""
+    for name, count in _PARTICLE.items():
+        yield name, _array(system.particles, name, count, np.float32)
+
+
+def vertex_group(item: Any, name: str) -> np.ndarray:
+    """Weights of a vertex group by vertex, (vertices,), 0 outside it."""
+    index = item.vertex_groups[name].index
+    weights = np.zeros(len(item.data.vertices), np.float32)
+    for number, vertex in enumerate(item.data.vertices):
+        for each in vertex.groups:
+            if each.group == index:
+                weights[number] = each.weight
+    return weights
+
+
+def _attributes(
+    data: Any, only: str, left_out: str
+) -> Iterator[tuple[str, np.ndarray]]:
     for attribute in data.attributes:
-        if only and attribute.name != only:
+        if (only and attribute.name != only) or attribute.data_type == left_out:
             continue
         if attribute.data_type not in _ATTRIBUTES:
             raise TypeError(f"attribute {attribute.name} is {attribute.data_type}")

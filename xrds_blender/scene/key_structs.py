@@ -1,40 +1,55 @@
-"""Blender's structs to a hash, property by property, whatever their type."""
+"""Blender's structs to a hash, property by property, whatever their type.
+
+What is left out is named here; all else counts, so a property that nobody thought of
+makes a key differ and costs a render, never a wrong picture.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from typing import Any
 
+from .key_files import file_digest
+
 # What of each type no pixel depends on, or what is added by other means: matrices of
-# objects, pixels of images, geometry. Everything else counts.
-_BLOCK = (
-    "name name_full original users use_fake_user use_extra_user is_embedded_data "
-    "is_evaluated is_library_indirect is_missing is_runtime_data is_editable tag "
-    "session_uid library library_weak_reference asset_data override_library preview "
-    "animation_data id_type cycles"
-)
+# objects, pixels of images, geometry.
 _LEFT_OUT = {
-    "ID": _BLOCK,
+    "ID": "name name_full original users use_fake_user use_extra_user tag library "
+    "is_embedded_data is_evaluated is_library_indirect is_missing is_runtime_data "
+    "is_editable session_uid library_weak_reference asset_data override_library "
+    "preview animation_data id_type",
     "Object": "location scale rotation_euler rotation_quaternion rotation_axis_angle "
     "rotation_mode delta_location delta_scale delta_rotation_euler "
     "delta_rotation_quaternion matrix_basis matrix_local matrix_world "
     "matrix_parent_inverse bound_box dimensions mode active_material "
     "active_material_index active_shape_key active_shape_key_index motion_path "
-    "animation_visualization pose hide_viewport hide_select lightgroup",
+    "animation_visualization pose hide_viewport hide_select lightgroup constraints "
+    "vertex_groups users_collection children children_recursive particle_systems "
+    "active_selection_set selection_sets",
+    "Mesh": "total_vert_sel total_edge_sel total_face_sel is_editmode shape_keys",
+    "Collection": "all_objects children_recursive",
+    "Camera": "background_images",
     "Node": "location location_absolute width height width_hidden dimensions label "
-    "parent select color use_custom_color internal_links "
+    "parent select color use_custom_color internal_links inputs outputs "
     "debug_zone_lazy_function_graph debug_zone_body_lazy_function_graph",
-    "Image": "pixels packed_file bindcode is_dirty has_data depth channels size "
-    "resolution frame_duration filepath_raw",
-    "Material": "texture_paint_images paint_active_slot paint_clone_slot lineart "
-    "grease_pencil",
+    "Image": "pixels packed_file packed_files bindcode is_dirty has_data depth "
+    "channels size resolution frame_duration filepath_raw render_slots layers",
+    "Material": "texture_paint_images texture_paint_slots paint_active_slot "
+    "paint_clone_slot lineart grease_pencil",
     "Modifier": "execution_time is_active persistent_uid show_expanded "
-    "show_in_editmode show_on_cage show_viewport use_pin_to_last",
+    "show_in_editmode show_on_cage show_viewport use_pin_to_last panels "
+    "node_warnings",
+    "ParticleSettings": "active_dupliweight active_instanceweight",
 }
 _INTERFACE = {"ID": ("show_", "display_", "empty_", "lock_", "preview_")}
-_COLLECTIONS = {"elements", "curves", "points", "tiles"}
+# Their elements are geometry, or what moved it; what they point at is often their own
+# arrays, and reading those of evaluated data can crash Blender.
+_SHAPES = "Mesh Curve MetaBall Curves PointCloud Volume Lattice Armature"
+_ARRAYS = "Mesh Curves PointCloud"
 # Settings of Blender's own and of this add-on that lie among the custom properties.
 _OWN = {"cycles", "cycles_visibility", "xrds"}
+# Nodes that give another value in every frame, or at every place of the time line.
+TIMED_NODES = {"INPUT_SCENE_TIME", "SIMULATION_INPUT", "SIMULATION_OUTPUT", "BAKE"}
 
 
 class StructHash:
@@ -42,8 +57,13 @@ class StructHash:
 
     def __init__(self, add: Callable[..., None], refer: Callable[[Any], None]) -> None:
         self._add_values, self._refer = add, refer
-        self._trees: set[str] = set()
-        self._known: dict[Any, list[tuple[str, str]]] = {}
+        self._trees: set[int] = set()
+        self._inside: set[tuple[type, int]] = set()
+        self._known: dict[type, list[tuple[str, str]]] = {}
+        self.attributes: set[tuple[str, str]] = set()
+        """Type and name of what Attribute nodes read."""
+        self.is_timed = False
+        """Whether something seen here changes with the frame, whatever else does."""
 
     def add(
         self,
@@ -52,42 +72,56 @@ class StructHash:
         prefixes: tuple[str, ...] = (),
     ) -> None:
         """Every value of a struct and of the structs inside, but for those named."""
-        if struct is None:
-            return
-        values = []
+        values: list[tuple[str, Any]] = []
+        nested: list[Any] = []
         for name, kind in self._properties(struct):
             if name in left_out or (prefixes and name.startswith(prefixes)):
                 continue
             value = getattr(struct, name)
-            if kind == "VALUE":
-                values.append((name, value))
+            if kind in {"POINTER", "COLLECTION"}:
+                items = value if kind == "COLLECTION" else [value]
+                values.append((name, kind))
+                nested += [item for item in items if item is not None]
             elif kind == "ARRAY":
                 values.append((name, tuple(_flat(value))))
-            elif kind == "SET":
-                values.append((name, sorted(value)))
-            elif value is not None:
-                values.append((name, kind))
-                self._nested(kind, value)
+            elif kind == "PATH":
+                library = getattr(struct, "library", None)
+                values.append((name, value and file_digest(value, library)))
+            else:
+                values.append((name, sorted(value) if kind == "SET" else value))
         self._add_values(type(struct).__name__, values)
+        if not _is_a(type(struct), "PropertyGroup"):  # its properties came above
+            self.custom(struct)
+        for item in nested:
+            self._pointed(item)
 
     def custom(self, struct: Any) -> None:
-        """Custom properties, which shaders can read as attributes."""
-        for name in sorted(set(struct.keys()) - _OWN):
+        """Custom properties: shaders read them, and nodes of geometry take them."""
+        try:
+            names = sorted(set(struct.keys()) - _OWN)
+        except TypeError:  # this type of struct has none
+            return
+        for name in names:
             value = struct[name]
             for plain in ("to_dict", "to_list"):
                 value = getattr(value, plain)() if hasattr(value, plain) else value
+            if _is_data_block(value):
+                self._refer(value)
+                value = value.name_full
             self._add_values("custom", name, value)
 
     def tree(self, tree: Any) -> None:
         """A node tree: nodes, sockets, links and the trees of its groups."""
         # A material's own tree has a name like any other's; its owner is hashed.
-        key = f"{tree.name_full} {tree.as_pointer()}"
-        if key in self._trees:
+        if tree.as_pointer() in self._trees:
             return
-        self._trees.add(key)
+        self._trees.add(tree.as_pointer())
         for node in tree.nodes:
             self._add_values("node", node.name, node.type, node.mute)
-            self.add(node, ("inputs", "outputs"))
+            self.is_timed |= node.type in TIMED_NODES
+            if node.type == "ATTRIBUTE":
+                self.attributes.add((node.attribute_type, node.attribute_name))
+            self.add(node)
             for socket in [*node.inputs, *node.outputs]:
                 self._socket(socket)
         for link in tree.links:
@@ -105,32 +139,30 @@ class StructHash:
         else:
             self._add_values(value)
 
-    def _nested(self, kind: str, value: Any) -> None:
-        if kind == "POINTER":
-            self._pointed(value)
-        else:
-            for item in value:
-                self._pointed(item)
-
     def _pointed(self, value: Any) -> None:
-        if value is None:
-            return
         if _is_data_block(value):
             self._refer(value)
-        else:
+            return
+        # Some structs point back at the one that holds them.
+        place = type(value), value.as_pointer()
+        if place not in self._inside:
+            self._inside.add(place)
             self.add(value)
+            self._inside.remove(place)
 
     def _properties(self, struct: Any) -> list[tuple[str, str]]:
         """Names and kinds of what counts; looked up once per type."""
         kind = type(struct)
         if kind not in self._known:
             names, prefixes = _left_out(kind)
+            nested = {"COLLECTION"} if _is_a(kind, _SHAPES) else set()
+            nested |= {"POINTER"} if _is_a(kind, _ARRAYS) else set()
             self._known[kind] = [
                 (item.identifier, _kind(item))
                 for item in struct.bl_rna.properties
                 if item.identifier not in names
                 and not item.identifier.startswith(prefixes)
-                and _kind(item)
+                and item.type not in nested
             ]
         return self._known[kind]
 
@@ -139,21 +171,27 @@ def _left_out(kind: type) -> tuple[set[str], tuple[str, ...]]:
     """Names and prefixes of the properties that do not count."""
     import bpy
 
-    bases = [n for n in _LEFT_OUT if issubclass(kind, getattr(bpy.types, n))]
+    bases = [base for base in _LEFT_OUT if _is_a(kind, base)]
     names = {name for base in bases for name in _LEFT_OUT[base].split()}
     prefixes = [each for base in bases for each in _INTERFACE.get(base, ())]
     always_on = {"use_nodes"} if bpy.app.version >= (5,) else set()
     return names | always_on | {"rna_type", "bl_rna"}, ("bl_", *prefixes)
 
 
+def _is_a(kind: type, names: str) -> bool:
+    import bpy
+
+    types = [getattr(bpy.types, name, None) for name in names.split()]
+    return any(each is not None and issubclass(kind, each) for each in types)
+
+
 def _kind(item: Any) -> str:
-    if item.type == "POINTER":
-        return "POINTER"
-    if item.type == "COLLECTION":
-        # Small lists inside of nodes; geometry and sockets come by themselves.
-        return "COLLECTION" if item.identifier in _COLLECTIONS else ""
+    if item.type in {"POINTER", "COLLECTION"}:
+        return str(item.type)
     if item.type == "ENUM" and item.is_enum_flag:
         return "SET"
+    if item.type == "STRING" and item.subtype in {"FILE_PATH", "DIR_PATH"}:
+        return "PATH"
     return "ARRAY" if getattr(item, "is_array", False) else "VALUE"
 
 

@@ -24,6 +24,7 @@ from ..cycles.view import low_view
 from ..frame import progress
 from ..frame.enlarging import enlarge
 from ..frame.facts import find_facts
+from ..frame.guide_cache import GuideName
 from ..frame.guides import GuideSource
 from ..frame.job import NetworkFailed, Picture, RenderJob, Temporal
 from ..frame.memory import peak_memory
@@ -40,13 +41,13 @@ if TYPE_CHECKING:
 class View:
     """One view of a frame as the window keeps it.
 
-    `place` is that of the light's pixels. Guides of one `guide_key` hold each other's
-    samples: they are not added up.
+    `place` is that of the light's pixels. Guides of the same `guide_name` hold each
+    other's samples: they are not added up.
     """
 
     light: Stored
     guides: Stored
-    guide_key: str | None
+    guide_name: GuideName | None
     place: LowPlace
     exposure: float | None
     plan: Plan
@@ -79,7 +80,9 @@ def sample_enlarged(
         progress.begin(engine, f"{progress.GUIDES} {name}", 2)
         portion = how.portion(chosen.guide_samples, other=1)
         wanted = _guide_job(job, how, chosen.guide_samples)
-        source = GuideSource(passes, depsgraph, wanted, chosen, facts, portion)
+        source = GuideSource(
+            passes, depsgraph, wanted, chosen, facts, engine.report, portion
+        )
         noisy = {
             view: low.place.beauty(low.samples.picture) for view, low in light.items()
         }
@@ -89,7 +92,7 @@ def sample_enlarged(
             view: View(
                 _stored_light(how, job, low, view),
                 _stored_guides(how, guides[view], passes, view, chosen),
-                source.key,
+                source.name,
                 low.place,
                 exposure,
                 seen,
@@ -214,10 +217,10 @@ def _denoised(own: View, gathered: Accumulated, denoiser: Denoiser) -> Beauty:
 
 
 def _gathered_guides(own: View, lenders: Sequence[View], movement: Movement) -> Guides:
-    """Guides with the samples of other frames; the richest of those of one key."""
+    """Guides with the samples of other frames; the richest of those of one name."""
     target, others = own.guides, list(lenders)
-    if own.guide_key is not None:
-        same = [own, *(x for x in lenders if x.guide_key == own.guide_key)]
+    if own.guide_name is not None:
+        same = [own, *(x for x in lenders if own.guide_name.is_same(x.guide_name))]
         target = max((each.guides for each in same), key=lambda each: each.samples)
         others = [each for each in lenders if each not in same]
     found = accumulate(target, [each.guides for each in others], movement)

@@ -1,0 +1,64 @@
+"""Which pixels an image or a file on disk holds, without reading more than needed."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+
+def image_digest(image: Any) -> tuple[Any, ...]:
+    """What tells an image's pixels apart from all it could hold otherwise."""
+    image = image.original or image
+    if image.is_dirty or image.source == "VIEWER":
+        return "painted", _pixels(image)
+    if image.packed_files:
+        packed = [each.packed_file for each in image.packed_files]
+        return "packed", *(_hash(each.data) for each in packed if each)
+    if image.source == "GENERATED":
+        return ("generated",)  # its settings, hashed elsewhere, decide
+    return file_digest(image.filepath, image.library, image.source == "SEQUENCE")
+
+
+def file_digest(
+    path: str, library: Any = None, is_sequence: bool = False
+) -> tuple[Any, ...]:
+    """Name, size and times of a file, or of all tiles and frames of one."""
+    import bpy
+
+    where = Path(bpy.path.abspath(path, library=library))
+    pattern = re.escape(where.name)
+    for word in ("<UDIM>", "<UVTILE>"):
+        pattern = pattern.replace(re.escape(word), ".*")
+    if is_sequence:
+        # The last number of the name, whatever its digits, counts the frames.
+        pattern = re.sub(r"\d+(?=\D*$)", r"\\d+", pattern)
+    if pattern == re.escape(where.name):
+        return (_stat(where),)
+    try:
+        files = [x for x in where.parent.iterdir() if re.fullmatch(pattern, x.name)]
+    except OSError:
+        return (_stat(where),)
+    return tuple(_stat(file) for file in sorted(files))
+
+
+def _stat(file: Path) -> tuple[str, int, int, int]:
+    """Beside the time of writing, which can be set, that of the last change."""
+    try:
+        status = file.stat()
+    except (OSError, ValueError):
+        return str(file), -1, -1, -1
+    return str(file), status.st_size, status.st_mtime_ns, status.st_ctime_ns
+
+
+def _pixels(image: Any) -> str:
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    return _hash(pixels.data)
+
+
+def _hash(data: Any) -> str:
+    return hashlib.blake2b(data, digest_size=20).hexdigest()
