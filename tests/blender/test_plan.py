@@ -91,5 +91,5 @@ def test_the_plan_of_a_shot_names_what_lends_less() -> None:
     assert lent(moving=(), volumes=True) == {"accumulation": "3 frames to each side"}
     assert lent(cuts=(9, 5))["cuts"] == "frame 5, 9"
     assert lent(cuts=tuple(range(9)))["cuts"] == "frame 0, 1, 2, 3, 4, 5 and 3 more"
-    panorama = lending(replace(FACTS, exact_camera=False), 3)
+    panorama = lending(replace(FACTS, lends=False), 3)
     assert [each.value for each in panorama] == ["none"]

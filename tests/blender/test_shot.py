@@ -292,9 +292,41 @@ def test_frames_by_number_are_rendered_by_themselves(
     assert len(list((blend.parent / "f12").iterdir())) == 2
 
 
-def test_a_panorama_is_rendered_frame_by_frame(blend: Path) -> None:
+def panorama(kind: str) -> Any:
+    camera = bpy.context.scene.camera.data
+    camera.type = "PANO"
+    held = camera if hasattr(camera, "panorama_type") else camera.cycles
+    held.panorama_type = kind
+    return held
+
+
+def test_equirectangular_frames_lend_by_direction(blend: Path) -> None:
+    """Also under a camera that turns: places, normals and the frame's edges agree."""
     bpy.ops.wm.open_mainfile(filepath=str(blend))
-    bpy.context.scene.camera.data.type = "PANO"
+    scene = bpy.context.scene
+    held = panorama("EQUIRECTANGULAR")
+    held.longitude_min, held.longitude_max, held.latitude_max = -1.2, 1.0, 0.2
+    for frame in (1, 5):
+        scene.camera.rotation_euler.z = 0.05 * frame
+        scene.camera.keyframe_insert("rotation_euler", frame=frame)
+    job = RenderJob(scale=1, samples=16, temporal_radius=0)
+    method = shot.method_of(job)
+    here, there = (
+        call_engine(scene, method.sample).views[""]
+        for _ in map(scene.frame_set, (1, 4))
+    )
+    alone, both = finishing.accumulate(here, []), finishing.accumulate(here, [there])
+    assert both.rejected < 0.25
+    hit = np.abs(alone.normal).sum(-1) > 0.5
+    lent = hit & (both.samples > 20.0)
+    assert lent.sum() > 0.2 * hit.sum()
+    apart = np.abs(both.normal - alone.normal)[lent]
+    assert np.median(apart) < 0.001
+
+
+def test_other_panoramas_are_rendered_frame_by_frame(blend: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    panorama("FISHEYE_EQUISOLID")
     bpy.ops.wm.save_mainfile()
     result = render(blend, "pano", frames=[1, 2])
     assert [frame["temporal"] for frame in result["frames"]] == [None, None]

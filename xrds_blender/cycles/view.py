@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.temporal.frame import Camera
+from xrds_core.temporal.frame import Camera, Sphere
 
 from ..planning.forecast import low_size
 from .borrowed import Borrowed
@@ -17,10 +17,10 @@ from .size import border_start, frame_size, picture_size
 def cameras_of(engine: Any, depsgraph: Any) -> dict[str, Camera]:
     """The cameras of a render by view; without stereo there is one view.
 
-    Empty under a camera that no matrix describes, as a panorama.
+    Empty under a camera whose frames cannot lend to each other: see `can_track`.
     """
     camera = depsgraph.scene_eval.camera
-    if camera is None or camera.data.type not in {"PERSP", "ORTHO"}:
+    if camera is None or not can_track(depsgraph.scene_eval):
         return {}
     # The method of this name hides the property, so it is asked for by path.
     render = engine.path_resolve("render")
@@ -37,16 +37,45 @@ def cameras_of(engine: Any, depsgraph: Any) -> dict[str, Camera]:
     return cameras
 
 
+def can_track(scene: Any) -> bool:
+    """Whether it is known where a camera of this kind shows a place.
+
+    Of panoramas only of equirectangular ones, without stereo: that moves the camera
+    from pixel to pixel.
+    """
+    data = scene.camera.data
+    if data.type == "PANO":
+        kind = _panorama(data).panorama_type
+        return bool(kind == "EQUIRECTANGULAR" and not scene.render.use_multiview)
+    return data.type in {"PERSP", "ORTHO"}
+
+
+def _panorama(data: Any) -> Any:
+    """What holds a camera's panorama settings, before Blender 5.0 and from then on."""
+    return data if hasattr(data, "panorama_type") else data.cycles
+
+
+def _sphere(data: Any) -> Sphere | None:
+    if data.type != "PANO":
+        return None
+    held = _panorama(data)
+    return Sphere(
+        (held.longitude_min, held.longitude_max), (held.latitude_min, held.latitude_max)
+    )
+
+
 def _camera(depsgraph: Any, render: Any, place: Any) -> Camera:
     camera = depsgraph.scene_eval.camera
     width, height = frame_size(render)
-    project = camera.calc_matrix_camera(
-        depsgraph,
-        x=width,
-        y=height,
-        scale_x=render.pixel_aspect_x,
-        scale_y=render.pixel_aspect_y,
-    )
+    project = np.zeros((4, 4))
+    if camera.data.type != "PANO":
+        project = camera.calc_matrix_camera(
+            depsgraph,
+            x=width,
+            y=height,
+            scale_x=render.pixel_aspect_x,
+            scale_y=render.pixel_aspect_y,
+        )
     window = (0, 0)
     if render.use_border:
         left, bottom = border_start(render)
@@ -57,14 +86,16 @@ def _camera(depsgraph: Any, render: Any, place: Any) -> Camera:
         size=(width, height),
         window=window,
         name=camera.name_full,
+        sphere=_sphere(camera.data),
     )
 
 
 def low_view(camera: Camera, scale: int, window: tuple[int, int]) -> Camera:
     """The camera of pixels `scale` times as large, as `low_camera.widen` makes it.
 
-    Its frame covers whole pixels and keeps the top left corner; `window` is the (x, y)
-    of the arrays' top-left pixel in it.
+    Its frame covers whole pixels and keeps the top left corner; that of a panorama,
+    which cannot be widened, stays. `window` is the (x, y) of the arrays' top-left pixel
+    in it.
     """
     width, height = camera.size
     size = low_size(width, height, scale)

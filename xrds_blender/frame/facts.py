@@ -7,6 +7,7 @@ from typing import Any
 
 from ..cycles import low_camera, session
 from ..cycles.size import frame_size
+from ..cycles.view import can_track
 from ..planning.facts import Facts, SceneFacts
 from ..scene.facts import scene_facts
 from . import denoisers
@@ -32,6 +33,7 @@ def join_facts(scene: Any, job: RenderJob, scene_facts: SceneFacts) -> Facts:
         guides=job.guides,
         max_bounces=scene.cycles.max_bounces,
         has_denoiser=session.has_denoiser() or denoisers.is_there(),
+        lends=camera is None or can_track(scene),
         exact_camera=camera is None or low_camera.is_exact(camera.data),
         guide_samples=job.guide_samples,
         scene=scene_facts,

@@ -56,6 +56,8 @@ class Facts:
     max_bounces: int
     has_denoiser: bool
     exact_camera: bool
+    lends: bool = True
+    """Whether it is known where the camera shows a place in another frame."""
     guide_samples: int = 4
     scene: SceneFacts = SceneFacts()
     guide_seconds: float | None = None

@@ -21,8 +21,8 @@ def lending(
     `cuts` are the frames at which another camera begins.
     """
     name, scene = "accumulation", facts.scene
-    if not facts.exact_camera:
-        reason = "no matrix describes a panoramic camera: frames are rendered alone"
+    if not facts.lends:
+        reason = "nothing tells where this panorama shows a place: each frame is alone"
         return (Decision(name, "none", reason),)
     value = f"{radius} frames to each side"
     if not scene.moving:

@@ -13,7 +13,7 @@ from xrds_core.temporal.frame import Camera, Frame, store
 from xrds_core.temporal.samples import Portion, continued
 
 from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
-from ..cycles.view import cameras_of
+from ..cycles.view import cameras_of, can_track
 from ..frame import progress
 from ..frame.job import RenderJob
 from ..scene.facts import scene_facts, shapes_move, stands_still
@@ -75,11 +75,11 @@ class Sampling:
 def can_lend(scene: Any, job: RenderJob) -> bool:
     """Whether frames can lend to each other.
 
-    Not under a panoramic camera, and full guides hold light of full size, too.
+    Not under most panoramic cameras, and full guides hold light of full size, too.
     """
     if job.is_enlarged and job.guides != "fast":
         return False
-    return scene.camera is not None and scene.camera.data.type in {"PERSP", "ORTHO"}
+    return scene.camera is not None and can_track(scene)
 
 
 def sampling_of(
@@ -94,7 +94,7 @@ def sampling_of(
     scene = depsgraph.scene_eval
     cameras = cameras_of(engine, depsgraph)
     if not cameras:
-        raise SceneError("a panorama has no neighbours; set the temporal radius to 0")
+        raise SceneError("such panoramas lend nothing; set the temporal radius to 0")
     if not job.temporal_radius or not stands_still(scene.camera):
         place = None
     geometry = _geometry(depsgraph)

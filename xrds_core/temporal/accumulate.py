@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..arrays import Array
-    from .frame import Camera, Stored
+    from .frame import Camera, Matrix, Stored
     from .motion import Pair
 
     Mask = NDArray[np.bool_]
@@ -236,13 +236,20 @@ def _unpacked(
 
 
 def _turn(here: Camera, there: Camera) -> Array | None:
-    """Return (3, 3) that takes normals of `there` to `here`; None if they agree.
-
-    Z points away from the viewer in both, against what view matrices say.
-    """
-    away = np.diag([1.0, 1.0, -1.0])
-    turn = away @ here.view[:3, :3] @ np.linalg.inv(there.view[:3, :3]) @ away
+    """Return (3, 3) that takes normals of `there` to `here`; None if they agree."""
+    turn = here.view[:3, :3] @ np.linalg.inv(there.view[:3, :3])
+    turn = _axes(here) @ turn @ _axes(there).T
     return None if np.allclose(turn, np.eye(3), atol=1e-7) else turn.astype(np.float32)
+
+
+def _axes(camera: Camera) -> Matrix:
+    """Return (3, 3): from the axes of view matrices to those of Cycles' normals.
+
+    There Z points away from the viewer; in panoramas X does, and Z upwards.
+    """
+    if camera.sphere is None:
+        return np.diag([1.0, 1.0, -1.0])
+    return np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def _floats(x: NDArray[Any]) -> Array:

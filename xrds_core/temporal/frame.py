@@ -32,15 +32,28 @@ _OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "index": ()}
 
 
 @dataclass(frozen=True)
-class Camera:
-    """A perspective or orthographic camera and the part of its frame that arrays hold.
+class Sphere:
+    """What part of the directions around a camera its frame holds, in radians.
 
-    A panoramic camera has no such matrices: its frames cannot lend to each other.
-    `view` (4, 4) takes world points to the camera's axes, `project` (4, 4) those to
-    OpenGL clip space (in Blender: `Object.calc_matrix_camera`). `size` is (width,
-    height) of the whole frame in pixels, `window` the (x, y) of the arrays' top-left
-    pixel in it: (0, 0) where no border crops the frame. Frames of cameras of different
-    names lend nothing to each other.
+    Longitude grows to the right and is 0 straight ahead (-Z), latitude grows upwards.
+    Cycles: the camera's `longitude_min` and so on.
+    """
+
+    longitude: tuple[float, float] = (-np.pi, np.pi)
+    latitude: tuple[float, float] = (-np.pi / 2, np.pi / 2)
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera and the part of its frame that arrays hold.
+
+    Perspective, orthographic, or with a `sphere` an equirectangular panorama, whose
+    `project` is of no use; frames of other panoramas cannot lend to each other. `view`
+    (4, 4) takes world points to the camera's axes, `project` (4, 4) those to OpenGL
+    clip space (in Blender: `Object.calc_matrix_camera`). `size` is (width, height) of
+    the whole frame in pixels, `window` the (x, y) of the arrays' top-left pixel in it:
+    (0, 0) where no border crops the frame. Frames of cameras of different names lend
+    nothing to each other.
     """
 
     view: Matrix
@@ -48,19 +61,22 @@ class Camera:
     size: tuple[int, int]
     window: tuple[int, int] = (0, 0)
     name: str = ""
+    sphere: Sphere | None = None
 
     def same(self, other: Camera) -> bool:
         """Whether both show the same on the same pixels."""
+        kind, others = (
+            (each.size, each.window, each.name, each.sphere) for each in (self, other)
+        )
         return (
-            (self.size, self.window, self.name)
-            == (other.size, other.window, other.name)
+            kind == others
             and np.array_equal(self.view, other.view)
             and np.array_equal(self.project, other.project)
         )
 
     @property
     def orthographic(self) -> bool:
-        return bool(self.project[3, 3] != 0.0)
+        return self.sphere is None and bool(self.project[3, 3] != 0.0)
 
     def depth(self, position: Array) -> Array:
         """Return the depth (H, W) of points in world space (H, W, 3).
@@ -68,9 +84,13 @@ class Camera:
         Points of exactly 0 are no hits, as in Cycles' Position pass: infinitely far.
         """
         origin = np.linalg.inv(self.view)[:3, 3]
-        near = (position - origin.astype(np.float32)) @ self.view[2, :3]
+        away = position - origin.astype(np.float32)
+        if self.sphere is None:
+            depth = -(away @ self.view[2, :3])
+        else:
+            depth = np.linalg.norm(away, axis=-1)
         hit = (position != 0.0).any(axis=-1)
-        return np.where(hit, -near, np.inf).astype(np.float32)
+        return np.where(hit, depth, np.inf).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -83,7 +103,8 @@ class Frame:
     pair). `samples` per pixel weigh the frame against others. `normal` is in the
     camera's axes, but with Z pointing away from the viewer, as in Cycles' `Denoising
     Normal`. `depth` (H, W) is the distance of the first hit from the camera, along the
-    camera's axis, at each pixel's centre; infinite, or above 1e9, without a hit.
+    camera's axis (of a panorama along the ray), at each pixel's centre; infinite, or
+    above 1e9, without a hit.
 
     `still` says that nothing at all moves or changes from frame to frame, no light
     either: frames of equal cameras differ in their noise alone.

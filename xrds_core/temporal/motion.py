@@ -20,11 +20,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .panorama import Around, around
+
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..arrays import Array
     from .frame import Camera, Matrix, Stored
+
+    Passage = Array | Around
 
 # Pixels by which motion there and motion back may differ; for things that move by
 # themselves, whose edges are known less well, half as much.
@@ -81,9 +85,9 @@ class Pair:
 
     here: Stored
     there: Stored
-    forth: Array
-    back: Array
-    around: tuple[Array, Array]
+    forth: Passage
+    back: Passage
+    extent: tuple[Array, Array]
     detour: Detour | None = None
 
 
@@ -126,12 +130,15 @@ def pixels_of(camera: Camera) -> Matrix:
     return np.vstack([screen @ camera.project @ camera.view, near])
 
 
-def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Array:
+def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Passage:
     """Return (4, 4): (x, y, 1, nearness) here -> (x w, y w, w, nearness w) there.
 
-    `moved` (4, 4) is what the object did to world points in between.
+    `moved` (4, 4) is what the object did to world points in between. Panoramas have a
+    passage of their own.
     """
     between = np.eye(4) if moved is None else moved
+    if here.sphere is not None and there.sphere is not None:
+        return around(here, there, between)
     return (pixels_of(there) @ between @ world_of(here)).astype(np.float32)
 
 
@@ -139,15 +146,15 @@ def pair(
     here: Stored,
     there: Stored,
     detour: Detour | None = None,
-    around: tuple[Array, Array] | None = None,
+    extent: tuple[Array, Array] | None = None,
 ) -> Pair:
     """Return what `places` needs to know of two frames.
 
-    `around` is `surroundings` of `here`, for callers with many pairs.
+    `extent` is `surroundings` of `here`, for callers with many pairs.
     """
     forth = passage(here.camera, there.camera)
     back = passage(there.camera, here.camera)
-    return Pair(here, there, forth, back, around or surroundings(here), detour)
+    return Pair(here, there, forth, back, extent or surroundings(here), detour)
 
 
 def surroundings(frame: Stored) -> tuple[Array, Array]:
@@ -188,9 +195,11 @@ def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Gri
 
 
 def carry(
-    passage: Array, x: Array, y: Array, nearness: Array
+    passage: Passage, x: Array, y: Array, nearness: Array
 ) -> tuple[Array, Array, Array]:
     """Return (x, y, nearness) there of pixels (n,) here; NaN behind the camera."""
+    if isinstance(passage, Around):
+        return passage.carry(x, y, nearness)
     across, down, w, near = (
         row[0] * x + row[1] * y + row[3] * nearness + row[2] for row in passage
     )
@@ -216,7 +225,7 @@ def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
     back_x += x - grid.x - centre_x
     back_y += y - grid.y - centre_y
     left = back_x**2 + back_y**2
-    least, most = (part[grid.pixels] for part in pair.around)
+    least, most = (part[grid.pixels] for part in pair.extent)
     seen = found.seen & (left < _AGREEMENT**2) & (near >= least) & (near <= most)
     left[~seen] = 0.0
     apart = found.apart + np.float32(_AS_DISTANCE) * left

@@ -26,6 +26,8 @@ def is_cut(before: Camera, after: Camera) -> bool:
     """Return whether something new begins between two frames beside each other."""
     if _kind(before) != _kind(after):
         return True
+    if before.sphere is not None:  # it sees all around
+        return False
     old, new = (np.abs(np.diag(c.project)[:2]) for c in (before, after))
     if (np.maximum(old / new, new / old) > _ZOOM).any():
         return True
@@ -54,4 +56,4 @@ def same_take(target: Stored, others: Sequence[Stored]) -> list[Stored]:
 
 
 def _kind(camera: Camera) -> tuple[object, ...]:
-    return camera.name, camera.orthographic, camera.size
+    return camera.name, camera.orthographic, camera.sphere, camera.size

@@ -1,0 +1,69 @@
+"""Equirectangular panoramas: pixels are directions, and depth is distance.
+
+A panorama's passage to another frame is not linear in its pixels as that of other
+cameras is, but in their directions: unit vectors in the camera's own axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ..arrays import Array
+    from .frame import Camera, Matrix
+
+
+@dataclass(frozen=True)
+class Around:
+    """How pixels pass from one panorama to another.
+
+    `turn` (4, 4) takes points in the axes of the one to those of the other.
+    """
+
+    here: Camera
+    there: Camera
+    turn: Matrix
+
+    def carry(self, x: Array, y: Array, nearness: Array) -> tuple[Array, Array, Array]:
+        """Return (x, y, nearness) there of pixels (n,) here."""
+        ray = _directions(self.here, x, y)
+        turn = self.turn.astype(np.float32)
+        seen = turn[:3, :3] @ ray + turn[:3, 3:] * nearness
+        length = np.sqrt(np.square(seen).sum(0))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            across, down = _pixels(self.there, seen / length)
+            return across, down, nearness / length
+
+
+def around(here: Camera, there: Camera, moved: Matrix) -> Around:
+    """Return the passage between two panoramas; `moved` is as in `motion.passage`."""
+    return Around(here, there, there.view @ moved @ np.linalg.inv(here.view))
+
+
+def _directions(camera: Camera, x: Array, y: Array) -> Array:
+    """Return unit vectors (3, n) in the camera's axes."""
+    sphere, (width, height) = camera.sphere, camera.size
+    assert sphere is not None
+    (left, right), (low, high) = sphere.longitude, sphere.latitude
+    longitude = left + (x + camera.window[0]) * np.float32((right - left) / width)
+    latitude = high - (y + camera.window[1]) * np.float32((high - low) / height)
+    level = np.cos(latitude)
+    ahead = -level * np.cos(longitude)
+    return np.stack([level * np.sin(longitude), np.sin(latitude), ahead])
+
+
+def _pixels(camera: Camera, ray: Array) -> tuple[Array, Array]:
+    """Return the pixels (x, y) that show unit vectors (3, n)."""
+    sphere, (width, height) = camera.sphere, camera.size
+    assert sphere is not None
+    (left, right), (low, high) = sphere.longitude, sphere.latitude
+    longitude = np.arctan2(ray[0], -ray[2])
+    # the same direction, counted from the frame's left edge
+    turned = np.mod(longitude - np.float32(left), np.float32(2 * np.pi))
+    latitude = np.arcsin(np.clip(ray[1], -1.0, 1.0))
+    x = turned * np.float32(width / (right - left)) - camera.window[0]
+    y = (high - latitude) * np.float32(height / (high - low)) - camera.window[1]
+    return x.astype(np.float32), y.astype(np.float32)
