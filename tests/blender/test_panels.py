@@ -104,7 +104,8 @@ def test_a_new_scene_says_which_way_it_takes() -> None:
     pytest.importorskip("mitsuba_oidn")
     told = drawn(panels.XRDS_PT_settings)
     assert told[0] == "Automatic (Full Size)"
-    assert {"full_size", "x2", "x4", "x8", "plain"} <= set(told)
+    names = ["Full Size", "Super-Resolution", "2×", "4×", "8×", "Plain"]
+    assert [text for text in told if text in names] == names
     assert "best" in told
     assert "About" not in told  # no seconds are known before the first render
     assert {"use_time_budget", "Samples", "temporal_radius"} <= set(told)
@@ -116,7 +117,7 @@ def test_a_new_scene_says_which_way_it_takes() -> None:
     [
         ("full_size", {"denoise", "temporal_radius", "Samples"}),
         ("x2", {"Samples per Small Pixel", "guide_samples", "use_exposure"}),
-        ("plain", {"Samples", "plain"}),
+        ("plain", {"Samples", "Plain"}),
     ],
 )
 def test_each_way_shows_its_own_settings(way: str, named: set[str]) -> None:
@@ -139,7 +140,8 @@ def test_other_networks_are_offered_where_their_weights_are(
     told = drawn(panels.XRDS_PT_settings, panels.XRDS_PT_guides)
     assert {"fast", "paper", "full"} <= set(told)
     assert "balanced" not in told
-    assert "x4" not in told  # no weights
+    assert "2×" in told
+    assert "4×" not in told  # no weights
 
 
 def test_a_time_budget_leaves_way_and_samples_open() -> None:
@@ -161,7 +163,7 @@ def test_the_table_tells_seconds_after_a_render() -> None:
     bpy.ops.render.render()
     told = drawn(panels.XRDS_PT_settings)
     assert "About" in told
-    row = told.index("full_size")
+    row = told.index("Full Size")
     assert told[row + 1].endswith(" s")
     last = dict(summary.last_render(history.last(scene)))
     assert last["Way"] == "Full Size, 1 sample"

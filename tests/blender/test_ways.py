@@ -128,6 +128,13 @@ def test_a_render_at_full_size_tells_of_all_ways() -> None:
     assert quarter == pytest.approx(39.667 / 4, rel=0.01)
 
 
+def test_a_small_render_tells_nothing_of_a_large_one() -> None:
+    known = learn(None, Way.FULL_SIZE, ASKED, PIXELS // 100, FULL, MODEL)
+    assert known.seconds(Way.FULL_SIZE, ASKED, PIXELS // 30, MODEL) is not None
+    assert known.seconds(Way.FULL_SIZE, ASKED, PIXELS, MODEL) is None
+    assert known.costs(PIXELS, MODEL) is None
+
+
 def test_guides_and_network_are_taken_from_their_own_render() -> None:
     small = {"sync": 1.0, "beauty": 8.0, "denoise": 1.5, "guides": 4.0, "network": 3.0}
     known = learn(None, Way.X2, ASKED, PIXELS, small, MODEL)

@@ -24,7 +24,7 @@ _WAYS = [
         Way.FULL_SIZE,
         "Full Size",
         "Cycles renders every pixel and XRDS denoises the picture. The best choice for "
-        "final frames, and the only one whose animation frames help each other",
+        "final frames, stills and animations alike",
     ),
     (
         Way.X2,

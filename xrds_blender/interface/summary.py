@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .facts_cache import FactsCache
 
 Row = tuple[str, str]
-MOST_ROWS = 6
+MOST_ROWS = 5
 _STAGES = {
     "sync": "Scene",
     "beauty": "Samples",
@@ -33,7 +33,6 @@ _STAGES = {
     "total": "Total",
 }
 _QUALITIES = {"best": "Best", "high": "High", "balanced": "Balanced", "fast": "Fast"}
-_PRESETS = {"fast": "Fast", "balanced": "Balanced", "paper": "Paper"}
 
 
 @lru_cache(maxsize=1)
@@ -51,7 +50,7 @@ def forget() -> None:
 
 
 def next_render(scene: Any, job: RenderJob, at_hand: Means) -> list[Row]:
-    """Name and value of what the render will do, take and leave out; six at most."""
+    """Name and value of what the render will do, take and leave out; five at most."""
     size = frame_size(scene.render)
     if job.is_picked:
         return [("Picture", _size(*size)), ("About", _foreseen(scene, job, at_hand))]
@@ -102,7 +101,6 @@ def _enlarged(scene: Any, job: RenderJob) -> list[Row]:
     rows = [
         ("Small Picture", _sampled(*small, scene.cycles.samples)),
         ("Guides", guides if chosen.render_guides else translated("none")),
-        ("Network", f"{translated(_PRESETS[job.preset])}, {job.scale}×"),
         ("Memory", f"≤ {_amount(taken)}"),
         *_neighbours(size, job),
     ]

@@ -31,14 +31,19 @@ def draw(layout: Any, settings: Any, best: Way, looks: list[Outlook]) -> None:
         seconds.label(text="About", text_ctxt=CONTEXT)
     quality.label(text="Quality", text_ctxt=CONTEXT)
     found = {look.way: look for look in looks}
-    for each in WAYS:
-        if each in found or settings.way == each:
-            _draw_way(column, settings, found.get(each, Outlook(each)), timed)
+    shown = [way for way in WAYS if way in found or settings.way == way]
+    enlarged = [way for way in shown if way.is_enlarged]
+    for each in shown:
+        if each in enlarged[:1]:
+            column.label(text="Super-Resolution", text_ctxt=CONTEXT)
+        _draw_way(column, settings, found.get(each, Outlook(each)), timed)
 
 
 def _draw_way(column: Any, settings: Any, look: Outlook, timed: bool) -> None:
     way, seconds, quality = _cells(column, timed)
-    way.prop_enum(settings, "way", look.way.value)
+    # Short: in a narrow panel three buttons would else read the same.
+    name = f"{look.way.scale}×" if look.way.is_enlarged else translated(NAMES[look.way])
+    way.prop_enum(settings, "way", look.way.value, text=name, translate=False)
     if timed:
         told = "" if look.seconds is None else duration(look.seconds)
         seconds.label(text=told, translate=False)
@@ -46,10 +51,10 @@ def _draw_way(column: Any, settings: Any, look: Outlook, timed: bool) -> None:
 
 
 def _cells(layout: Any, timed: bool) -> tuple[Any, Any, Any]:
-    """Three columns; the middle one is empty where no seconds are known."""
-    split = layout.split(factor=0.58 if timed else 0.7, align=True)
+    """Three columns, or the outer two where no seconds are known."""
+    split = layout.split(factor=0.42 if timed else 0.6, align=True)
     way = split.row(align=True)
-    rest = split.split(factor=0.5) if timed else split
+    rest = split.split(factor=0.44) if timed else split
     cells = [rest.row() for _ in range(2 if timed else 1)]
     for cell in cells:
         cell.alignment = "RIGHT"
@@ -67,7 +72,8 @@ def _quality(look: Outlook) -> str:
         return translated("noisy") if look.way is Way.PLAIN else "?"
     if look.decibels > -SAME:
         return translated("best")
-    return f"{look.decibels:.1f} dB".replace("-", "−")
+    digits = 1 if look.decibels > -1 else 0
+    return f"{look.decibels:.{digits}f} dB".replace("-", "−")
 
 
 def duration(seconds: float) -> str:

@@ -13,6 +13,9 @@ from .budget import Choice, Costs, Model, Network
 from .denoiser import DEFAULT_DENOISER, Denoiser
 from .ways import Asked, Way, choice_of
 
+# A frame of more pixels than this many times those measured is not told of: what a
+# small one takes to begin would count too much.
+MOST_GROWTH = 4
 # A guide sample's seconds over a full one's, where no guides were rendered yet: 0.56 to
 # 0.73 in the scenes of docs/performance.md.
 GUIDE_SHARE = 0.65
@@ -106,7 +109,7 @@ def _of_enlarged(
 ) -> Measured:
     area = way.scale**2
     denoise = now.denoise
-    if denoise is None and seconds["denoise"]:
+    if denoise is None and seconds["denoise"] and area <= MOST_GROWTH:
         denoise = seconds["denoise"] * area / model.denoiser_speed[Denoiser.XRDS_HIGH]
     network = {asked.network(way.scale): seconds["network"]}
     return replace(
@@ -131,8 +134,10 @@ def _of_plain(now: Measured, asked: Asked, spent: float, model: Model) -> Measur
 
 
 def _resized(known: Measured, pixels: int) -> Measured:
-    """The same for another number of pixels."""
+    """The same for another number of pixels; nothing where that is far larger."""
     size = pixels / known.pixels
+    if size > MOST_GROWTH:
+        return Measured(pixels)
 
     def of(value: float | None) -> float | None:
         return None if value is None else value * size
