@@ -240,7 +240,7 @@ def test_other_denoising_passes_are_warned_of_above_scale_one(
     settings = bpy.context.scene.xrds
     for way in ("x2", "full_size", "plain"):
         settings.way = way
-        told = ("INFO", remarks.OTHER_PASSES) in remarks_of(ALL)
+        told = ("ERROR", remarks.OTHER_PASSES) in remarks_of(ALL)
         assert told == (warns and way == "x2")
 
 

@@ -52,7 +52,9 @@ def remarks(scene: Any, job: RenderJob, at_hand: Means) -> list[Remark]:
         ("INFO", text) for text in sorted(not_offered) if ("ERROR", text) not in told
     ]
     if job.is_enlarged:
-        told += [("INFO", sentence) for sentence in _enlarged(scene, job)]
+        if not _knows_passes(job):
+            told.append(("ERROR", OTHER_PASSES))
+        told += [("INFO", sentence) for sentence in support.notes(scene)]
     return told
 
 
@@ -63,13 +65,6 @@ def _wrong(scene: Any, way: Way, at_hand: Means) -> list[str]:
     if at_hand.any_denoiser:
         return []
     return [NOISY_INPUT if way.is_enlarged else NO_DENOISER]
-
-
-def _enlarged(scene: Any, job: RenderJob) -> list[str]:
-    found = list(support.notes(scene))
-    if not _knows_passes(job):
-        found.insert(0, OTHER_PASSES)
-    return found
 
 
 def _knows_passes(job: RenderJob) -> bool:
