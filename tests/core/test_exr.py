@@ -380,11 +380,11 @@ CLAIM = """
 import resource, sys
 from xrds_core.errors import PictureError
 from xrds_core.exr import read_beauty
+resource.setrlimit(resource.RLIMIT_AS, (4 << 30, 4 << 30))
 try:
     read_beauty(sys.argv[1])
 except PictureError as error:
     print(error)
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
@@ -397,10 +397,8 @@ def test_windows_that_claim_more_than_the_file_holds_take_no_memory(path: Path) 
         text=True,
         check=True,
     )
-    told, _, kilobytes = done.stdout.strip().partition("\n")
-    assert "claims 51.5 GB of pixels" in told
-    assert "--read-limit" in told
-    assert int(kilobytes) < 500_000
+    assert "claims 51.5 GB of pixels" in done.stdout
+    assert "--read-limit" in done.stdout
 
 
 @pytest.mark.parametrize("shadowed", [False, True])
