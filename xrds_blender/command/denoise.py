@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import XRDSError
 from xrds_core.frames import in_words
+from xrds_core.notices import warn
 from xrds_core.sequence.names import PASSES, PassNames
 
 from ..frame.job import QUALITIES
@@ -30,7 +30,7 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         "--frames",
         type=arguments.frames,
         metavar="A-B",
-        help="first and last frame, such as 1-24 (default: all that are there)",
+        help="first and last frame, such as 1-24, or 1,3,5-10 (default: all)",
     )
     add(
         "--temporal-radius",
@@ -123,7 +123,7 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
         radius=options.temporal_radius,
         reading=reading,
         resume=options.resume,
-        say=lambda line: print(line, file=sys.stderr, flush=True),
+        say=warn,
     )
 
 

@@ -204,6 +204,7 @@ def _temporal_radius(options: argparse.Namespace) -> int:
             raise UsageError(f"--temporal-radius cannot be had with {hindrance}")
         return asked
     several = len(getattr(options, "frames", None) or ()) > 1
+    several |= getattr(options, "keep_samples", None) is not None
     return RADIUS if several and not hindrance else 0
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import UsageError
@@ -20,6 +21,13 @@ def add_render(commands: Any) -> argparse.ArgumentParser:
     add_output(command, help="an .exr or .png file; #### stands for the frame number")
     add("--explain", action="store_true", help="print the plan without rendering")
     add("--resume", action="store_true", help="skip frames whose files are complete")
+    add(
+        "--keep-samples",
+        type=Path,
+        metavar="DIR",
+        help="folder for frames' samples, which are not rendered again then; without "
+        "-o for xrds denoise to finish",
+    )
     which = command.add_mutually_exclusive_group()
     which.add_argument(
         "--frame",
@@ -50,7 +58,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
     if options.explain:
         return _plan(options)
     need_blender("render")
-    if options.out is None:
+    if options.out is None and options.keep_samples is None:
         raise UsageError("name the output with -o, or ask for the plan with --explain")
     from .render_file import render_file
 
@@ -62,6 +70,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
         choice=choice_of(options),
         encoding=encoding_of(options),
         resume=options.resume,
+        keep_samples=options.keep_samples,
     )
 
 
@@ -88,6 +97,11 @@ def _lines(result: dict[str, Any]) -> list[str]:
     if "decisions" in result:
         return _plan_lines(result)
     lines = [f"frame {number}: skipped, complete" for number in result["kept"]]
+    if samples := result["samples"]:
+        lines.append(
+            f"{samples['folder']}: samples of {len(samples['rendered'])} frames "
+            f"rendered, {len(samples['read'])} were there"
+        )
     lines += [
         f"{frame['output']}: {frame['seconds']['total']:.1f} s"
         for frame in result["frames"]

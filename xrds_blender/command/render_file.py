@@ -9,17 +9,20 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from xrds_core.errors import PictureError, XRDSError
+from xrds_core.errors import PictureError, UsageError, XRDSError
 from xrds_core.exr_encoding import FLOAT_ZIP, Encoding
 from xrds_core.frames import frame_path
+from xrds_core.notices import warn
+from xrds_core.time_left import Clock
 
 from ..cycles.size import picture_size
 from ..frame.denoisers import load_denoiser
 from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.networks import known_networks, load_upscaler
 from ..frame.rendering import render
+from ..shot.keeping import Keeper, keeper_of
 from ..shot.sampling import can_lend
-from ..shot.shot import render_shot
+from ..shot.shot import keep_shot, render_shot
 from . import picture_file
 from .scene_file import AS_SAVED, SceneChoice, open_scene
 from .whole_file import is_whole
@@ -27,24 +30,28 @@ from .whole_file import is_whole
 
 def render_file(
     path: Path,
-    output: str,
+    output: str | None,
     job: RenderJob,
     *,
     frames: Sequence[int] | None = None,
     choice: SceneChoice = AS_SAVED,
     encoding: Encoding = FLOAT_ZIP,
     resume: bool = False,
+    keep_samples: Path | None = None,
 ) -> dict[str, Any]:
     """Render frames of a .blend file and return what `xrds render --json` prints.
 
     Args:
         path: the .blend file; whatever Blender has open is replaced by it.
-        output: .exr or .png; # stands for digits of the frame number.
+        output: .exr or .png; # stands for digits of the frame number. None keeps
+            samples alone.
         job: scale, samples and the rest.
         frames: numbers of the frames; the file's current one by default.
         choice: what comes in the place of what the file was saved with.
         encoding: of .exr files.
         resume: leave frames as they are that lie there whole and of their size.
+        keep_samples: a folder for the samples of every frame, at scale 1; those that
+            it has already are read, not rendered.
 
     Raises:
         UsageError, SceneError, PictureError, WeightsError: before anything is
@@ -52,19 +59,26 @@ def render_file(
             cannot be written, NetworkFailed; both name the file that holds what was
             rendered, and the frames before are complete.
     """
-    picture_file.check_output(output, frames or [0])
+    if keep_samples is not None:
+        _check_keeping(job)
+    if output is not None:
+        picture_file.check_output(output, frames or [0])
     scene = open_scene(path, choice)
     _check_libraries(job)
     numbers = list(frames or [scene.frame_current])
     size = picture_size(scene.render)
+    keeper = keep_samples and _keeper(scene, job, keep_samples)
 
     def is_done(number: int) -> bool:
         # asked anew for each: another render may be writing the same frames
-        return resume and is_whole(frame_path(output, number), size)
+        return resume and is_whole(frame_path(str(output), number), size)
 
     written, last = [], None
-    for number, last in _pictures(scene, job, output, numbers, is_done):
-        written.append(_write(scene, output, number, last, encoding))
+    if output is not None:
+        for number, last in _pictures(scene, job, output, numbers, is_done, keeper):
+            written.append(_write(scene, output, number, last, encoding))
+    if keeper:
+        _keep_others(scene, job, numbers, keeper)
     job = (last and last.job) or job
     rendered = {entry["frame"] for entry in written}
     return {
@@ -74,7 +88,8 @@ def render_file(
         "preset": job.preset if job.is_enlarged else None,
         "device": last.device if last else "",
         "frames": written,
-        "kept": [number for number in numbers if number not in rendered],
+        "kept": [n for n in numbers if n not in rendered] if output else [],
+        "samples": keeper and keeper.told(numbers),
         "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
     }
 
@@ -95,17 +110,48 @@ def _pictures(
     output: str,
     numbers: Sequence[int],
     is_done: Callable[[int], bool],
+    keeper: Keeper | None,
 ) -> Iterator[tuple[int, Picture]]:
     """Number and picture of every frame that is not done."""
-    if job.temporal_radius and len(numbers) > 1 and can_lend(scene, job):
+    is_shot = job.temporal_radius and len(numbers) > 1 and can_lend(scene, job)
+    if is_shot or keeper:
         try:
-            yield from render_shot(scene, job, numbers, is_done)
+            yield from render_shot(scene, job, numbers, is_done, keeper)
         except NetworkFailed as error:
             raise _kept(error, scene, output, error.number or 0) from error
         return
     for number in numbers:
         if not is_done(number):
             yield number, _picture(scene, job, output, number)
+
+
+def _check_keeping(job: RenderJob) -> None:
+    """Raise UsageError for a job that has no samples to keep."""
+    if job.plain or job.is_picked or job.scale > 1:
+        raise UsageError(
+            "--keep-samples needs --scale 1, without --plain, --time-budget and "
+            "--quality"
+        )
+
+
+def _keeper(scene: Any, job: RenderJob, folder: Path) -> Keeper:
+    """What keeps samples; raises UsageError where they could lend nothing."""
+    if not can_lend(scene, job):
+        raise UsageError(
+            "frames of such a panoramic camera, or with full guides, lend nothing to "
+            "each other: leave out --keep-samples"
+        )
+    return keeper_of(scene, job, folder, warn)
+
+
+def _keep_others(
+    scene: Any, job: RenderJob, numbers: Sequence[int], keeper: Keeper
+) -> None:
+    """Render the samples of frames that no picture has asked for."""
+    clock = Clock()
+    for number in keep_shot(scene, job, numbers, keeper):
+        left = sum(n > number for n in numbers)
+        warn(f"frame {number}: samples kept, {clock.lap(left)}")
 
 
 def _picture(scene: Any, job: RenderJob, output: str, number: int) -> Picture:

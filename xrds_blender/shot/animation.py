@@ -207,9 +207,10 @@ def _sample(
 ) -> Sampled:
     """Sample the frame that the dependency graph is at.
 
-    Under a camera that stands still frames continue one sequence. Passes that its first
-    sample writes alone are the first frame's then, or else, where they are asked for
-    and things move, each frame has a seed of its own.
+    Under a camera that stands still frames continue one sequence, as `place_of` says.
+    Where passes are asked for that its first sample writes alone, the first frame
+    begins it, and its passes are all others', too; where things move then, each frame
+    has a seed of its own.
     """
     scene = depsgraph.scene_eval
     asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
@@ -217,7 +218,7 @@ def _sample(
         return window.method.sample(engine, depsgraph)
     number, camera = scene.frame_current, scene.camera.name_full
     first, kept = window.first.get(camera, (number, {}))
-    place = (number - first) // scene.frame_step
+    place = (number - first if asked else number) // scene.frame_step
     sampled = window.method.sample(engine, depsgraph, place)
     names = set().union(*(_OF_ONE_SAMPLE[each] for each in asked))
     if camera in window.first:

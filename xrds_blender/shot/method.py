@@ -15,7 +15,7 @@ from ..frame.job import Picture, RenderJob
 from ..frame.networks import load_upscaler
 from .enlarged import finish_enlarged, sample_enlarged
 from .finishing import finish
-from .sampling import Sampled, sample_frame
+from .sampling import Keep, Sampled, sample_frame
 
 Report = Callable[[float], bool]
 """Takes how far a stage is, from 0 to 1; False once the user has stopped it."""
@@ -24,17 +24,18 @@ Report = Callable[[float], bool]
 class FullSize:
     """Samples at full size, denoised; one object serves a whole shot.
 
-    Raises XRDSError where the denoiser cannot be loaded.
+    `keep` takes each frame that is sampled. Raises XRDSError where the denoiser cannot
+    be loaded.
     """
 
-    def __init__(self, job: RenderJob) -> None:
-        self._job = job
+    def __init__(self, job: RenderJob, keep: Keep | None = None) -> None:
+        self._job, self._keep = job, keep
         self._denoiser = load_denoiser(job)
         self._movement = Movement()
 
     def sample(self, engine: Any, depsgraph: Any, place: int | None = None) -> Sampled:
         """Render the frame that the dependency graph is at, as `sample_frame`."""
-        return sample_frame(engine, depsgraph, self._job, place)
+        return sample_frame(engine, depsgraph, self._job, place, self._keep)
 
     def finish(
         self,
@@ -104,6 +105,9 @@ class Enlarged(FullSize):
         return progress.reporter(engine)
 
 
-def method_of(job: RenderJob) -> FullSize:
-    """The method of a job; raises XRDSError where its parts cannot be loaded."""
-    return FullSize(job) if job.scale == 1 else Enlarged(job)
+def method_of(job: RenderJob, keep: Keep | None = None) -> FullSize:
+    """The method of a job; raises XRDSError where its parts cannot be loaded.
+
+    Frames are kept at full size alone.
+    """
+    return FullSize(job, keep) if job.scale == 1 else Enlarged(job)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,10 @@ from ..scene.facts import scene_facts, shapes_move, stands_still
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
 LARGEST_SEED = 2**31 - 1
+
+
+Keep = Callable[[Mapping[str, Frame]], object]
+"""Takes a frame's samples by view, to be used another time."""
 
 
 @dataclass(frozen=True)
@@ -111,10 +115,19 @@ def sampling_of(
 
 
 def sample_frame(
-    engine: Any, depsgraph: Any, job: RenderJob, place: int | None = None
+    engine: Any,
+    depsgraph: Any,
+    job: RenderJob,
+    place: int | None = None,
+    keep: Keep | None = None,
 ) -> Sampled:
-    """Render a frame as `noisy_frame` does and pack it for the window."""
+    """Render a frame as `noisy_frame` does and pack it for the window.
+
+    `keep` takes its views before that.
+    """
     frames, seconds = noisy_frame(engine, depsgraph, job, place)
+    if keep is not None:
+        keep(frames)
     views = {view: store(frame, np.float16) for view, frame in frames.items()}
     return Sampled(views, dict.fromkeys(progress.STAGES, 0.0) | seconds)
 

@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from xrds_core.temporal.window import Shot, slide
+from xrds_core.temporal.window import Shot, place_of, slide
 
 from ..frame import progress
 from ..frame.job import Picture, RenderJob
 from ..frame.rendering import call_engine
 from ..scene.cuts import cuts
+from .keeping import Keeper
 from .method import FullSize, method_of
 from .sampling import Sampled
 
@@ -25,24 +26,28 @@ def render_shot(
     job: RenderJob,
     frames: Sequence[int],
     is_done: Callable[[int], bool] = lambda _: False,
+    keeper: Keeper | None = None,
 ) -> Iterator[tuple[int, Picture]]:
     """Render frames of a scene, each with its neighbours' samples, in order.
 
     Frames that `is_done` says are there only lend, and only where a neighbour needs
-    them. Yields numbers and pictures, of stereo the first view's; the scene stays at
-    the last frame rendered. Raises what `render` raises.
+    them. A `keeper` keeps the samples of every frame rendered; what it has already is
+    not rendered again, and lends to these frames from beyond their ends, too. Yields
+    numbers and pictures, of stereo the first view's; the scene stays at the last frame
+    rendered. Raises what `render` raises.
     """
-    method = method_of(job)
+    method = method_of(job, keeper and keeper.write)
     todo = tuple(number for number in frames if not is_done(number))
-    begun = cuts(scene, sorted(frames))
-    shot = Shot(todo, job.temporal_radius, begun, lending=tuple(frames))
+    beside = keeper.beside(frames, job.temporal_radius) if keeper else []
+    lending = sorted({*frames, *beside})
+    shot = Shot(todo, job.temporal_radius, cuts(scene, lending), lending=tuple(lending))
 
-    def sample(number: int) -> Sampled:
-        scene.frame_set(number)
-        place = shot.order.index(number)
-        return call_engine(scene, lambda *given: _sample(method, *given, place))
+    def load(number: int) -> Sampled | None:
+        if keeper and (kept := keeper.read(number)):
+            return kept
+        return _sample(scene, method, frames, number) if number in frames else None
 
-    for number, own, lenders in slide(shot, sample):
+    for number, own, lenders in slide(shot, load):
         if is_done(number):  # another machine was quicker
             continue
         view = next(iter(own.views))
@@ -52,8 +57,31 @@ def render_shot(
         yield number, replace(picture, seconds=seconds)
 
 
-def _sample(method: FullSize, engine: Any, depsgraph: Any, place: int) -> Sampled:
-    try:
-        return method.sample(engine, depsgraph, place)
-    finally:
-        progress.end()
+def keep_shot(
+    scene: Any, job: RenderJob, frames: Sequence[int], keeper: Keeper
+) -> Iterator[int]:
+    """Render the samples of frames that are not kept yet; yields their numbers.
+
+    Raises what `render` raises.
+    """
+    method = method_of(job, keeper.write)
+    for number in frames:
+        if keeper.read(number) is None:
+            _sample(scene, method, frames, number)
+            yield number
+
+
+def _sample(
+    scene: Any, method: FullSize, frames: Sequence[int], number: int
+) -> Sampled:
+    """Sample a frame of a shot, the same way whatever part of the shot `frames` are."""
+    scene.frame_set(number)
+    place = place_of(number, frames)
+
+    def work(engine: Any, depsgraph: Any) -> Sampled:
+        try:
+            return method.sample(engine, depsgraph, place)
+        finally:
+            progress.end()
+
+    return call_engine(scene, work)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..temporal.frame import Camera
+from ..temporal.frame import Camera, Sphere
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,16 +26,22 @@ if TYPE_CHECKING:
 VIEW, NDC = "worldToCamera", "worldToNDC"
 PROJECT = "xrds/project"
 """`Camera.project` for row vectors, exact where NDC is rounded."""
+SPHERE = "xrds/sphere"
+"""Of an equirectangular panorama: `Camera.sphere` in words, in the place of NDC."""
 _AHEAD = np.diag([1.0, 1.0, -1.0, 1.0])  # to and from a camera that looks along +Z
 _SKEW = 1e-3
 _SENSOR = 36.0  # mm, of a camera in JSON that names none
 
 
-def to_header(camera: Camera) -> dict[str, list[list[float]]]:
+def to_header(camera: Camera) -> dict[str, list[list[float]] | str]:
     """Return the attributes that tell a camera."""
+    view = {VIEW: (_AHEAD @ camera.view).T.tolist()}
+    if camera.sphere is not None:
+        angles = (*camera.sphere.longitude, *camera.sphere.latitude)
+        return {**view, SPHERE: " ".join(repr(float(x)) for x in angles)}
     ndc = np.array([[0.5, 0, 0, 0.5], [0, -0.5, 0, 0.5], [0, 0, 1, 0], [0, 0, 0, 1]])
     return {
-        VIEW: (_AHEAD @ camera.view).T.tolist(),
+        **view,
         NDC: (ndc @ camera.project @ camera.view).T.tolist(),
         PROJECT: camera.project.T.tolist(),
     }
@@ -47,9 +53,13 @@ def from_header(attributes: Mapping[str, Any], size: tuple[int, int]) -> Camera 
     `size` is (width, height) of the display window. Raises ValueError for matrices that
     are no camera's.
     """
-    if VIEW not in attributes or not {NDC, PROJECT} & set(attributes):
+    if VIEW not in attributes or not {NDC, PROJECT, SPHERE} & set(attributes):
         return None
     view = _matrix(attributes[VIEW]).T
+    if SPHERE in attributes:
+        west, east, south, north = map(float, attributes[SPHERE].split())
+        sphere = Sphere((west, east), (south, north))
+        return Camera(_AHEAD @ view, np.zeros((4, 4)), size, sphere=sphere)
     if PROJECT in attributes:
         return Camera(_AHEAD @ view, _matrix(attributes[PROJECT]).T, size)
     seen: Matrix = _matrix(attributes[NDC]).T @ _inverse(view)

@@ -17,6 +17,7 @@ from ..files import check_folder, check_place
 from ..frames import frame_numbers, frame_path
 from ..temporal.moving import Movement
 from ..temporal.window import Shot, slide
+from ..time_left import Clock
 from .finishing import Finished, finish_frame
 from .lenders import Lenders
 from .loading import Loader
@@ -125,7 +126,7 @@ def denoise_sequence(
     lending = _beside(files.source, numbers, radius)
     shot = Shot(tuple(todo), radius, lending=(*numbers, *lending))
     entries = []
-    clock, lenders, movement = _Clock(), Lenders(say), Movement()
+    clock, lenders, movement = Clock(), Lenders(say), Movement()
     for number, own, beside in slide(shot, loader.load):
         if not (resume and files.is_done(number)):  # another machine was quicker
             others = lenders.of(number, own, beside)
@@ -187,29 +188,3 @@ def _entry(
         },
         "bad_pixels": finished.denoised.bad_pixels,
     }
-
-
-class _Clock:
-    """Tells how long a frame took, and about how long the others will take."""
-
-    def __init__(self) -> None:
-        self._done = 0
-        self._start = self._last = time.perf_counter()
-
-    def lap(self, left: int) -> str:
-        """Say so of a frame that is finished; `left` are still to come."""
-        now = time.perf_counter()
-        took, self._last = now - self._last, now
-        self._done += 1
-        if not left:
-            return f"{took:.1f} s"
-        rest = _words((now - self._start) / self._done * left)
-        return f"{took:.1f} s; {left} left, about {rest}"
-
-
-def _words(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes} min"
-    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

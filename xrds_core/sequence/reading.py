@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     from ..arrays import Array
     from ..exr_library import Part, Window
 
-SAMPLES, KEY, RADIUS, NAME = "xrds/samples", "xrds/key", "xrds/radius", "cameraLabel"
+SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
+NAME = "cameraLabel"
 """Attributes: samples per pixel; what the frame was rendered from, in letters; the
-radius that its samples were laid out for; the camera's name."""
+radius that its samples were laid out for; 1 where nothing at all moves in the shot; the
+camera's name."""
 _UNTOLD_SAMPLES = 16
 _FITS = 2.0  # pixels by which a Position pass may lie beside its own pixel
 _SPOTS = 4096  # pixels that are asked whether it does
@@ -53,11 +55,11 @@ class FrameFile:
     """A frame as it lies in a file.
 
     `stored` covers the display window and all that the picture's data window has
-    beyond it; `inner` cuts the data window out of its arrays. `part` is where the
-    picture lies and `channels` are those that it takes, R, G, B and, where the file has
-    alpha, A. `key`: of equal ones the render settings are the same; "" if untold.
-    `radius`: what the file recommends, or None. `lends` is False where nobody can tell
-    where its pixels were.
+    beyond it, or the data window alone; `inner` cuts the latter out of its arrays.
+    `part` is where the picture lies and `channels` are those that it takes, R, G, B
+    and, where the file has alpha, A. `key`: of equal ones the render settings are the
+    same; "" if untold. `radius`: what the file recommends, or None. `lends` is False
+    where nobody can tell where its pixels were.
     """
 
     stored: Stored
@@ -81,11 +83,11 @@ def read_frame(
     found = find(file.names, reading.names)
     number_of_part, channels = _target(file, found)
     part = file.parts[number_of_part]
-    file.window = _union(part.data_window, part.display_window)
+    file.window = _window(part)
     camera = _camera(file, part, number, reading)
     depth = None
     if camera is not None:
-        depth = _depth(file, found, camera, reading)
+        depth = _depth(file, part, found, camera, reading)
     if lends and (camera is None or depth is None):
         lacking = "camera" if camera is None else "depth"
         raise NotLending(f"{path} has no {lacking}", _REMEDY[lacking])
@@ -100,6 +102,7 @@ def read_frame(
         samples=_samples(part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
         vector=_vector(file, found, reading),
+        still=bool(part.attributes.get(STILL, 0)),
     )
     return FrameFile(
         stored=store(frame, np.float16),
@@ -139,11 +142,16 @@ def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | N
     if camera is None or file.window is None:
         return None
     (x, y), _ = file.window
-    return replace(camera, window=(x - left, y - top))
+    name = str(told.get(NAME, ""))
+    return replace(camera, window=(x - left, y - top), name=name)
 
 
-def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array | None:
+def _depth(
+    file: File, part: Part, found: Found, camera: Camera, reading: Reading
+) -> Array | None:
     """Depth (H, W) along the camera's axis, infinite without a hit."""
+    if KEY in part.attributes:  # our own
+        return file.plane(found.depth[0])
     position, depth = found.position, found.depth
     if depth and position and _is_half(file, position):
         position = []  # half floats tell a place in the world by centimetres
@@ -154,7 +162,8 @@ def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array 
     if reading.position_space == "camera":
         return _from_depth(points[..., 2])
     result = camera.depth(points)
-    _check_fit(file, camera, points, result)
+    if camera.sphere is None:
+        _check_fit(file, camera, points, result)
     return result
 
 
@@ -240,9 +249,16 @@ def _is_half(file: File, names: list[str]) -> bool:
     return any(file.pixels(name).dtype == np.float16 for name in names)
 
 
-def _union(one: Window, two: Window) -> Window:
-    (a, b), (c, d) = one
-    (e, f), (g, h) = two
+def _window(part: Part) -> Window:
+    """What the arrays of a frame cover.
+
+    Renderers may crop each frame to what it shows, and then the display window is what
+    frames have in common. Ours are all cropped alike.
+    """
+    if KEY in part.attributes:
+        return part.data_window
+    (a, b), (c, d) = part.data_window
+    (e, f), (g, h) = part.display_window
     return (min(a, e), min(b, f)), (max(c, g), max(d, h))
 
 

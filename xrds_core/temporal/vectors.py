@@ -46,7 +46,8 @@ class Trails:
     """
 
     def __init__(self) -> None:
-        self._moving: WeakKeyDictionary[Stored, Mask] = WeakKeyDictionary()
+        self._moving: WeakKeyDictionary[Stored, dict[bool, Mask]]
+        self._moving = WeakKeyDictionary()
 
     def detours(self, here: Stored, others: Sequence[Stored]) -> dict[int, Detour]:
         """Return, by position in `others`, the places of what moved by itself.
@@ -110,21 +111,18 @@ class Trails:
     def moving(self, frame: Stored, frames: Mapping[int, Stored]) -> Mask:
         """Return (H W): where the Vector pass is not what the cameras alone explain.
 
-        All is taken to move where no camera beside the frame is known.
+        The camera after the frame is asked, or the one before it where `frames` end;
+        nothing that was asked earlier, so that a shot's parts agree with the whole. All
+        is taken to move where no camera beside the frame is known.
         """
-        mask = self._moving.get(frame)
-        if mask is None and (mask := _moving(frame, frames)) is not None:
-            self._moving[frame] = mask
-        everything = np.full(frame.nearness.shape, frame.vector is not None)
-        return everything if mask is None else mask
-
-
-def _moving(frame: Stored, frames: Mapping[int, Stored]) -> Mask | None:
-    for forward in (True, False):
-        beside = frames.get(frame.number + (1 if forward else -1))
-        if beside is not None and frame.vector is not None:
-            return _unexplained(frame, beside.camera, forward)
-    return None
+        known = self._moving.setdefault(frame, {})
+        for forward in (True, False):
+            beside = frames.get(frame.number + (1 if forward else -1))
+            if beside is not None and frame.vector is not None:
+                if forward not in known:
+                    known[forward] = _unexplained(frame, beside.camera, forward)
+                return known[forward]
+        return np.full(frame.nearness.shape, frame.vector is not None)
 
 
 def _unexplained(frame: Stored, beside: Camera, forward: bool) -> Mask:

@@ -9,12 +9,13 @@ is there.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
 
 from ..errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
 
 Kept = TypeVar("Kept")
 
@@ -66,6 +67,17 @@ class Shot:
     def most_kept(self) -> int:
         """The most frames that `slide` ever keeps at once."""
         return min(2 * self.radius + 1, len(self.order))
+
+
+def place_of(frame: int, frames: Sequence[int]) -> int:
+    """Return a frame's place in its shot, of which `frames` may be any part.
+
+    Frames in even steps are counted from frame 0, so that parts of a shot that are
+    rendered apart agree. Others are counted from the first one.
+    """
+    order = sorted(set(frames))
+    steps = {after - before for before, after in pairwise(order)}
+    return frame // max(steps, default=1) if len(steps) < 2 else order.index(frame)
 
 
 def slide(

@@ -1,0 +1,89 @@
+"""Frames as a render keeps them, in the form that `reading` reads.
+
+One OpenEXR file of Cycles' pass names holds what accumulation works on: light, guides
+and motion in half floats, as a window keeps them in memory, and depth in full. So a
+frame that was read lends and is finished as if it had just been rendered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import exr
+from ..exr_library import Part
+from ..temporal.frame import LARGEST_HALF
+from .cameras import to_header
+from .names import CAMERA_NORMAL, NOISY
+from .reading import KEY, NAME, RADIUS, SAMPLES, STILL
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ..arrays import Array
+    from ..temporal.frame import Frame
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a frame was rendered from and how.
+
+    `key` is the same for frames of one file and one set of settings; `layer` is the
+    view layer; `radius` what the samples were laid out for.
+    """
+
+    key: str
+    layer: str = ""
+    radius: int = 0
+
+
+def write_kept(path: Path, frame: Frame, origin: Origin) -> None:
+    """Write a frame, whole or not at all; raises PictureError where it cannot."""
+    height, width = frame.shape
+    x, y = frame.camera.window
+    right, bottom = (side - 1 for side in frame.camera.size)
+    attributes: dict[str, Any] = {
+        **to_header(frame.camera),
+        SAMPLES: int(frame.samples),
+        KEY: origin.key,
+        RADIUS: origin.radius,
+        STILL: int(frame.still),
+        NAME: frame.camera.name,
+    }
+    part = Part(
+        "",
+        ((x, y), (x + width - 1, y + height - 1)),
+        ((0, 0), (right, bottom)),
+        _channels(frame, f"{origin.layer}." if origin.layer else ""),
+        attributes,
+    )
+    exr.write_part(path, part)
+
+
+def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
+    assert frame.radiance is not None
+    passes: list[tuple[str, str, Array]] = [
+        (NOISY, "RGB", frame.radiance),
+        ("Denoising Albedo", "RGB", frame.albedo),
+        (CAMERA_NORMAL, "XYZ", frame.normal),
+    ]
+    if frame.alpha is not None:
+        passes.append((NOISY, "A", frame.alpha[..., None]))
+    if frame.vector is not None:
+        passes.append(("Vector", "XYZW", frame.vector))
+    channels: dict[str, NDArray[Any]] = {
+        f"{layer}{name}.{letter}": _half(array[..., i])
+        for name, letters, array in passes
+        for i, letter in enumerate(letters)
+    }
+    return channels | {f"{layer}Depth.Z": frame.depth.astype(np.float32)}
+
+
+def _half(x: Array) -> NDArray[np.float16]:
+    """As `frame.store` packs it: cut to the largest half; infinities stay."""
+    cut = np.clip(x, -LARGEST_HALF, LARGEST_HALF)
+    return np.where(np.isfinite(x), cut, x).astype(np.float16)
