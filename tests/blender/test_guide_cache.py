@@ -306,9 +306,9 @@ def test_code_in_a_file_does_not_run(tmp_path: Path) -> None:
     mark = tmp_path / "it ran"
     path = stored("key", tmp_path)
     changed(path, lambda a: a.update({"/Depth": np.array([Trigger(mark)], object)}))
-    assert GuideCache().get("key", tmp_path) is None
+    assert GuideCache().get("key", PROBE, tmp_path) is None
     path.write_bytes(pickle.dumps(Trigger(mark)))
-    assert GuideCache().get("key", tmp_path) is None
+    assert GuideCache().get("key", PROBE, tmp_path) is None
     assert not mark.exists()
 
 

@@ -68,7 +68,7 @@ def test_unknown_names_are_told(blend: Path, choice: SceneChoice, told: str) -> 
 
 def with_script(path: Path, mark: Path) -> None:
     """Save a file whose text block is run when the file is opened, if it may."""
-    bpy.ops.wm.read_factory_settings()
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
     text = bpy.data.texts.new("start.py")
     text.write(f"open({str(mark)!r}, 'w').close()")
     text.use_module = True
@@ -77,7 +77,7 @@ def with_script(path: Path, mark: Path) -> None:
 
 def with_driver(path: Path, mark: Path) -> None:
     """Save a file with a driver that no simple expression is."""
-    bpy.ops.wm.read_factory_settings()
+    bpy.ops.wm.read_homefile(use_factory_startup=True)
     cube = bpy.data.objects["Cube"]
     driver = cube.driver_add("location", 0).driver
     driver.expression = f"bool(open({str(mark)!r}, 'w')) and 1.0"
@@ -88,10 +88,10 @@ def with_driver(path: Path, mark: Path) -> None:
 @pytest.fixture
 def trusting() -> Iterator[None]:
     """A user whose preferences let every file run its Python."""
-    files = bpy.context.preferences.filepaths
-    files.use_scripts_auto_execute = True
+    bpy.ops.wm.read_factory_settings()
+    bpy.context.preferences.filepaths.use_scripts_auto_execute = True
     yield
-    files.use_scripts_auto_execute = False
+    bpy.ops.wm.read_factory_settings()
 
 
 @pytest.mark.usefixtures("trusting")
@@ -119,6 +119,7 @@ def test_the_laboratory_trusts_no_file_either(tmp_path: Path) -> None:
     windows = pytest.importorskip("xrds_lab.bench.windows")
     path, mark = tmp_path / "scene.blend", tmp_path / "it ran"
     with_script(path, mark)
+    assert bpy.context.preferences.filepaths.use_scripts_auto_execute
     inputs.open_scene(path, windows.Window(64, 36, 0, 0, 64, 36))
     assert not mark.exists()
 
