@@ -76,6 +76,11 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         action="store_true",
         help="try every change of the guide cache's table, not only some of each kind",
     )
+    parser.addoption(
+        "--record-decibels",
+        action="store_true",
+        help="make what the golden scene has now what it must have from now on",
+    )
 
 
 @pytest.fixture(autouse=True)
