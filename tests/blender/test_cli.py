@@ -467,3 +467,29 @@ def test_nothing_printed_can_steer_a_terminal(
     assert err.count("\n") == 3
     assert out.count("\n") == 1
     assert (out + err).replace("\n", "").isprintable()
+
+
+# --- after a kill ---------------------------------------------------------------------
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGKILL")
+def test_any_command_sweeps_up_what_a_killed_one_left(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames, temporary = tmp_path / "frames", tmp_path / "temporary"
+    frames.mkdir()
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    code = f"""
+    import os, signal
+    from pathlib import Path
+    from xrds_core.atomic import replacing
+    with replacing(Path({str(frames)!r}, "1.exr")) as part:
+        part.write_text("half")
+        os.kill(os.getpid(), signal.SIGKILL)
+    """
+    assert run(code).returncode == -signal.SIGKILL
+    assert list(frames.iterdir())
+    words = [sys.executable, "-m", "xrds_blender.command.main", "--version"]
+    subprocess.run(words, check=True, capture_output=True)
+    assert not [*frames.iterdir(), *temporary.iterdir()]

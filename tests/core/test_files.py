@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -79,6 +80,21 @@ def test_an_input_is_no_output(tmp_path: Path) -> None:
 def test_the_longest_name_is_taken(tmp_path: Path) -> None:
     check_output(tmp_path / "new" / ("x" * 251 + ".exr"))
     assert not list((tmp_path / "new").iterdir())
+
+
+def test_many_may_begin_one_shot_together(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also on machines where they have the same process number, as in containers."""
+    monkeypatch.setattr(os, "getpid", lambda: 7)
+    with ThreadPoolExecutor(16) as pool:
+        begun = [
+            pool.submit(check_output, tmp_path / "new" / "folder" / "1.exr")
+            for _ in range(400)
+        ]
+        for each in begun:
+            each.result()
+    assert not list((tmp_path / "new" / "folder").iterdir())
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="POSIX only")
