@@ -60,7 +60,7 @@ def own_wheel(folder: Path) -> Path:
         ignored = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
     options = ["--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]
-    _run("-m", "pip", "wheel", *options, str(folder), str(source))
+    _run("-P", "-m", "pip", "wheel", *options, str(folder), str(source))
     (wheel,) = folder.glob("xrds-*.whl")
     return wheel
 

@@ -128,7 +128,7 @@ def _look_up(target: Target, requirement: Requirement) -> dict[str, Any]:
 
 
 def _pip(*words: str) -> str:
-    command = [sys.executable, "-m", "pip", *words, "--quiet"]
+    command = [sys.executable, "-P", "-m", "pip", *words, "--quiet"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         errors = [ln for ln in done.stderr.splitlines() if ln.startswith("ERROR")]

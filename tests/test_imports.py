@@ -195,3 +195,16 @@ def test_files_and_functions_stay_small(path: Path) -> None:
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             assert node.end_lineno - node.lineno < 80, node.name
+
+
+def test_no_child_process_runs_what_lies_in_the_working_folder() -> None:
+    """`python -m` and `-c` look there first, unless -P comes before them."""
+    folders = [ROOT / name for name in (*PACKAGES, "extension")]
+    for path in (path for folder in folders for path in folder.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Call | ast.List):
+                continue
+            given = node.args if isinstance(node, ast.Call) else node.elts
+            words = [x.value for x in given if isinstance(x, ast.Constant)]
+            safe = "-P" in words or "run_python" in ast.unparse(node)
+            assert safe or not {"-m", "-c"} & set(words), f"{path}:{node.lineno}"
