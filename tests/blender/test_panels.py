@@ -396,7 +396,7 @@ def test_the_status_bar_tells_the_frames_left() -> None:
     assert progress.current() == "Frame 12 (36 left, about 13 min). XRDS 1/2: Samples"
     progress.end()
     assert progress.current() is None
-    progress.begin_frame(48, 0, None)
+    progress.begin_frame(48, 0)
     progress.begin(Engine(), "Samples", 1, 2)
     assert progress.current() == "Frame 48 (the last one). XRDS 1/2: Samples"
     progress.end()

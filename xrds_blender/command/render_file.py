@@ -113,7 +113,7 @@ def _pictures(
     keeper: Keeper | None,
 ) -> Iterator[tuple[int, Picture]]:
     """Number and picture of every frame that is not done."""
-    is_shot = job.temporal_radius and len(numbers) > 1 and can_lend(scene, job)
+    is_shot = len(numbers) > 1 and can_lend(scene, job)
     if is_shot or keeper:
         try:
             yield from render_shot(scene, job, numbers, is_done, keeper)

@@ -38,15 +38,19 @@ def cameras_of(engine: Any, depsgraph: Any) -> dict[str, Camera]:
 
 
 def can_track(scene: Any) -> bool:
-    """Whether it is known where a camera of this kind shows a place.
+    """Whether it is known where the scene's cameras show a place.
 
     Of panoramas only of equirectangular ones, without stereo: that moves the camera
-    from pixel to pixel.
+    from pixel to pixel. Cameras that markers bind count, too.
     """
-    data = scene.camera.data
+    bound = [m.camera for m in scene.timeline_markers if m.camera]
+    cameras = [each.data for each in (scene.camera, *bound)]
+    return all(_is_tracked(data, scene.render.use_multiview) for data in cameras)
+
+
+def _is_tracked(data: Any, stereo: bool) -> bool:
     if data.type == "PANO":
-        kind = _panorama(data).panorama_type
-        return bool(kind == "EQUIRECTANGULAR" and not scene.render.use_multiview)
+        return not stereo and _panorama(data).panorama_type == "EQUIRECTANGULAR"
     return data.type in {"PERSP", "ORTHO"}
 
 

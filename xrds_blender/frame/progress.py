@@ -36,7 +36,7 @@ def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
     engine.update_progress(0.0)
 
 
-def begin_frame(number: int, left: int, seconds: float | None) -> None:
+def begin_frame(number: int, left: int, seconds: float | None = None) -> None:
     """Note which frame of an animation has begun, and what is left after it.
 
     `seconds`: an estimate for this frame and those after it; None without one.

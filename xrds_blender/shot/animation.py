@@ -90,6 +90,10 @@ def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
 
     As `render_layer`; in an animation with the samples of its neighbours.
     """
+    if engine.is_animation:
+        scene = depsgraph.scene_eval
+        left = (scene.frame_end - scene.frame_current) // scene.frame_step
+        progress.begin_frame(scene.frame_current, left)
     if not _has_neighbours(engine, depsgraph, job):
         return render_layer(engine, depsgraph, job)
     place = history.place_of(depsgraph)
@@ -102,8 +106,6 @@ def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
 
 
 def _has_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> bool:
-    if job.plain or job.is_picked or not job.temporal_radius:
-        return False
     is_animation = engine.is_animation and not _renders_single_frames()
     return is_animation and can_lend(depsgraph.scene_eval, job)
 

@@ -77,10 +77,12 @@ class Sampling:
 
 
 def can_lend(scene: Any, job: RenderJob) -> bool:
-    """Whether frames can lend to each other.
+    """Whether a job's frames can lend to each other, and are to.
 
     Not under most panoramic cameras, and full guides hold light of full size, too.
     """
+    if job.plain or job.is_picked or not job.temporal_radius:
+        return False
     if job.is_enlarged and job.guides != "fast":
         return False
     return scene.camera is not None and can_track(scene)
