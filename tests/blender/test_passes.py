@@ -13,6 +13,8 @@ bpy = pytest.importorskip("bpy")
 from xrds_blender import run_job
 from xrds_blender.cycles import clock, session  # bpy is asked for first
 from xrds_blender.cycles.borrowed import Borrowed, PipelineSettings
+from xrds_blender.frame.rendering import call_engine
+from xrds_blender.interface.registration import ensure_registered
 from xrds_core.errors import Cancelled, SceneError
 
 Build = Callable[..., Any]
@@ -321,3 +323,26 @@ def test_a_session_ends_only_when_samples_fall(
 
     run_job(still_life(), job)
     assert len(created) == sessions
+
+
+def test_settings_return_where_a_render_evaluates_anew(still_life: Build) -> None:
+    """As for vectors beside a cut: the structs set are not there any more then."""
+    ensure_registered()
+    scene = still_life()
+    other = scene.camera.copy()
+    scene.collection.objects.link(other)
+    for frame, camera in ((1, scene.camera), (2, other)):
+        scene.timeline_markers.new("cut", frame=frame).camera = camera
+    samples = scene.cycles.samples
+
+    def work(engine: Any, depsgraph: Any) -> int:
+        evaluated = depsgraph.scene_eval
+        with Borrowed() as borrowed:
+            borrowed.set(evaluated.cycles, samples=77)
+            borrowed.set(depsgraph.view_layer_eval.cycles, use_denoising=False)
+            engine.frame_set(2, 0.0)
+            engine.frame_set(1, 0.0)
+            evaluated.cycles.samples = 55
+        return int(evaluated.cycles.samples)
+
+    assert call_engine(scene, work) == samples

@@ -118,7 +118,7 @@ def test_guides_of_what_stands_still_are_rendered_a_few_times(
     monkeypatch.setattr(CyclesPasses, "guides_by_view", count)
     monkeypatch.setattr(enlarged, "_gathered_guides", look)
     render(lit, "shot", job={"temporal_radius": 1}, frames=[1, 2, 3, 4, 5, 6])
-    assert rendered == [0, 1, 2]  # and frames 4 to 6 take what is there
+    assert sorted(rendered) == [0, 1, 2]  # and frames 4 to 6 take what is there
     assert samples == [2, 3, 3, 3, 3, 3]
 
 

@@ -7,16 +7,22 @@ to the render pipeline's own copy of the render settings.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 from xrds_core.errors import SceneError
 
 
 class Borrowed:
-    """Attributes set on Blender's structs; the old values return on exit."""
+    """Attributes set on Blender's structs; the old values return on exit.
+
+    A render may evaluate other frames, as for vectors and motion blur: an evaluated
+    data-block stays then, but what it holds is made anew. So structs inside of one are
+    looked up again before they are touched.
+    """
 
     def __init__(self) -> None:
-        self._old: list[tuple[Any, str, Any]] = []
+        self._old: list[tuple[Callable[[], Any], str, Any]] = []
 
     def __enter__(self) -> Borrowed:
         return self
@@ -26,22 +32,36 @@ class Borrowed:
 
     def set(self, owner: Any, **values: Any) -> None:
         """Set attributes of `owner`; those this Blender does not have are skipped."""
+        again = _finder(owner)
         for name, value in values.items():
             if not hasattr(owner, name):
                 continue
             old = getattr(owner, name)
             if old != value:
-                self._old.append((owner, name, old))
+                self._old.append((again, name, old))
                 setattr(owner, name, value)
 
     def give_back(self) -> None:
         while self._old:
-            owner, name, value = self._old.pop()
-            setattr(owner, name, value)
+            again, name, value = self._old.pop()
+            setattr(again(), name, value)
 
     def forget(self) -> None:
         """Give nothing back: the owners are gone, and touching them would crash."""
         self._old.clear()
+
+
+def _finder(owner: Any) -> Callable[[], Any]:
+    """What finds `owner` again in its data-block; itself where it is in none."""
+    block = getattr(owner, "id_data", None)
+    if block is None or block == owner:
+        return lambda: owner
+    for layer in getattr(block, "view_layers", ()):
+        if layer.cycles == owner:  # Blender knows no path to these
+            name = layer.name
+            return lambda: block.view_layers[name].cycles
+    path = owner.path_from_id()
+    return lambda: block.path_resolve(path)
 
 
 class PipelineSettings:

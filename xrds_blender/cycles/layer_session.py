@@ -42,8 +42,7 @@ class LayerSession:
     ) -> None:
         self._engine, self._depsgraph = engine, depsgraph
         self._scene = depsgraph.scene_eval
-        self._layer_eval = depsgraph.view_layer_eval
-        self._layer_name = self._layer_eval.name
+        self._layer_name = depsgraph.view_layer_eval.name
         # The method of this name hides the property, so it is asked for by path.
         self._render = engine.path_resolve("render")
         self._borrowed = Borrowed()
@@ -74,7 +73,6 @@ class LayerSession:
         self._pipeline.set(use_persistent_data=True)
         session.prepare(self._engine, self._depsgraph)
         self._scene = self._depsgraph.scene_eval
-        self._layer_eval = self._depsgraph.view_layer_eval
         for name, letters in self._wanted_passes():
             session.add_pass(self._engine, self._layer_name, name, letters)
         return self
@@ -86,6 +84,11 @@ class LayerSession:
         finally:
             self._borrowed.give_back()
             self._pipeline.give_back()
+
+    @property
+    def _layer_eval(self) -> Any:
+        """Found anew: a render that evaluates other frames makes it anew."""
+        return self._depsgraph.view_layer_eval
 
     def _wanted_passes(self) -> list[tuple[str, str]]:
         wanted = [(name, letters) for name, letters, _ in GUIDE_PASSES]

@@ -211,16 +211,27 @@ def shapes_move(depsgraph: Any) -> bool:
 
     light = bpy.types.Light, bpy.types.World, bpy.types.Material, bpy.types.Scene
     kinds = *light, bpy.types.Camera, bpy.types.Image, bpy.types.ShaderNodeTree
-    camera = depsgraph.scene_eval.camera
+    unseen = {"CAMERA", "LIGHT"}
+    carriers = {
+        parent.name_full
+        for item in depsgraph.ids
+        if isinstance(item, bpy.types.Object) and item.type not in unseen
+        for parent in _parents(item)
+    }
 
     def is_shape(item: Any) -> bool:
         if isinstance(item, bpy.types.Object):
-            return item.type != "LIGHT" and item != camera
+            return item.type not in unseen or item.name_full in carriers
         return not isinstance(item, kinds)
 
     ids = [item for item in depsgraph.ids if is_shape(item)]
     objects = [item for item in ids if isinstance(item, bpy.types.Object)]
     return any(True for _ in _moving(ids, objects))
+
+
+def _parents(item: Any) -> Iterator[Any]:
+    while (item := item.parent) is not None:
+        yield item
 
 
 def _is_timed(tree: Any) -> bool:
