@@ -1,4 +1,4 @@
-"""The Flamenco job type of docs/pipeline, compiled as Flamenco's Manager does."""
+"""The Flamenco job types of docs/pipeline, compiled as Flamenco's Manager does."""
 
 from __future__ import annotations
 
@@ -10,17 +10,13 @@ from typing import Any
 
 import pytest
 
-JOB_TYPE = (
-    Path(__file__).resolve().parents[1]
-    / "docs"
-    / "pipeline"
-    / "xrds_render.flamenco.js"
-)
+JOB_TYPES = Path(__file__).resolve().parents[1] / "docs" / "pipeline"
 # What the Manager gives a job type: chunks of frames, tasks, commands.
 MANAGER = """
 const author = {
-    Task: (name, type) => ({ name, type, commands: [],
-        addCommand(command) { this.commands.push(command); } }),
+    Task: (name, type) => ({ name, type, commands: [], dependencies: [],
+        addCommand(command) { this.commands.push(command); },
+        addDependency(task) { this.dependencies.push(task.name); } }),
     Command: (name, parameters) => ({ name, parameters }),
 };
 function frameChunker(frames, size) {
@@ -40,7 +36,9 @@ function frameChunker(frames, size) {
 """
 
 
-def compile_job(settings: dict[str, Any]) -> list[dict[str, Any]]:
+def compile_job(
+    settings: dict[str, Any], job_type: str = "xrds_render"
+) -> list[dict[str, Any]]:
     """The tasks of a job with these settings; skips the test where there is no node."""
     node = shutil.which("node")
     if node is None:
@@ -50,7 +48,7 @@ const tasks = [];
 compileJob({{ settings: {json.dumps(settings)}, addTask: (task) => tasks.push(task) }});
 console.log(JSON.stringify({{ tasks, type: JOB_TYPE }}));
 """
-    script = MANAGER + JOB_TYPE.read_text() + asks
+    script = MANAGER + (JOB_TYPES / f"{job_type}.flamenco.js").read_text() + asks
     done = subprocess.run(
         [node, "-e", script], capture_output=True, text=True, check=False
     )

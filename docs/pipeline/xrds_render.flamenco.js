@@ -46,6 +46,11 @@ const CHECK = [
 function compileJob(job) {
     const settings = job.settings;
     for (const chunk of frameChunker(settings.frames, settings.chunk_size)) {
+        // An animation lends samples from frame to frame; single frames do not.
+        const [first, last] = chunk.split("-");
+        const which = last && !chunk.includes(",")
+            ? ["--frame-start", first, "--frame-end", last, "--render-anim"]
+            : ["--render-frame", chunk.replace(/-/g, "..")];
         const task = author.Task(`render-${chunk}`, "blender");
         task.addCommand(author.Command("blender-render", {
             exe: "{blender}",
@@ -57,7 +62,7 @@ function compileJob(job) {
                 "--python-expr", CHECK,
                 "--render-output", settings.render_output_path,
                 "--render-format", settings.format,
-                "--render-frame", chunk.replace(/-/g, ".."),
+                ...which,
             ],
         }));
         job.addTask(task);

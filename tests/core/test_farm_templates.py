@@ -12,14 +12,18 @@ from typing import Any
 import pytest
 from flamenco import compile_job
 
+from xrds_blender.command import main
+
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "pipeline"
 TEMPLATE = EXAMPLES / "xrds_render.template.yaml"
+SHOT = EXAMPLES / "xrds_shot.template.yaml"
 OPENJD = str(Path(sys.executable).with_name("openjd"))
 
 
-def test_open_job_description_accepts_the_template() -> None:
+@pytest.mark.parametrize("template", [TEMPLATE, SHOT], ids=lambda path: path.stem)
+def test_open_job_description_accepts_the_template(template: Path) -> None:
     pytest.importorskip("openjd.cli")
-    command = [OPENJD, "check", str(TEMPLATE)]
+    command = [OPENJD, "check", str(template)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "passes validation" in done.stdout
@@ -55,7 +59,10 @@ def test_flamenco_renders_every_chunk(tasks: list[dict[str, Any]]) -> None:
     (command,) = tasks[1]["commands"]
     args = command["parameters"]["args"]
     assert command["name"] == "blender-render"
-    assert args[-2:] == ["--render-frame", "7..9"]
+    told = ["--frame-start", "7", "--frame-end", "9", "--render-anim"]
+    assert args[-5:] == told  # of single frames none would lend to another
+    single = tasks[2]["commands"][0]["parameters"]["args"]
+    assert single[-2:] == ["--render-frame", "10"]
     assert args[args.index("--render-output") + 1] == "/out/######"
 
 
@@ -66,7 +73,7 @@ def test_flamenco_asks_for_the_engine_before_it_renders(
     args = tasks[0]["commands"][0]["parameters"]["args"]
     check = args[args.index("--python-expr") + 1]
     assert args.index("--python-exit-code") < args.index("--python-expr")
-    assert args.index("--python-expr") < args.index("--render-frame")
+    assert args.index("--python-expr") < args.index("--render-anim")
     for engine, there, status in (
         ("XRDS", True, 0),
         ("BLENDER_EEVEE", True, 3),
@@ -88,3 +95,76 @@ exec({check!r})
         [sys.executable, "-c", code], check=False, capture_output=True
     )
     return done.returncode
+
+
+# --- shots ----------------------------------------------------------------------------
+
+
+def parsed(args: list[str]) -> Any:
+    """What our own command understands of Blender's words; fails for wrong ones."""
+    at = args.index("--command")
+    assert args[at + 1] == "xrds"
+    return main._parser(args[at + 2 :]).parse_args(args[at + 2 :])
+
+
+def test_a_flamenco_shot_renders_apart_and_is_denoised_as_one() -> None:
+    settings = {
+        "frames": "1-20",
+        "chunk_size": 4,
+        "temporal_radius": 3,
+        "blendfile": "/shots/a.blend",
+        "render_output_path": "/out/######.exr",
+        "samples_path": "/out/samples",
+    }
+    tasks = compile_job(settings, "xrds_shot")
+    asked = [parsed(each["commands"][0]["parameters"]["args"]) for each in tasks]
+    renders, denoised = asked[:5], asked[5:]
+    for each in renders:
+        assert (each.command, each.scale, each.out) == ("render", 1, None)
+        assert each.keep_samples == Path("/out/samples")
+    assert [each.frames[0] for each in renders] == [1, 5, 9, 13, 17]
+    for each in denoised:
+        assert each.source == f"{renders[0].keep_samples}/####.exr"
+        assert each.out == "/out/######.exr"
+        assert each.picture_only
+        assert each.temporal_radius == renders[0].temporal_radius == 3
+    assert [each.frames for each in denoised] == [each.frames for each in renders]
+    # each waits for all frames that lend to its own
+    for task, frames in zip(tasks[5:], [each.frames for each in denoised], strict=True):
+        waits = [
+            renders[int(tasks.index(t))]
+            for t in tasks
+            if t["name"] in task["dependencies"]
+        ]
+        rendered = {n for each in waits for n in each.frames}
+        needed = {n for f in frames for n in range(f - 3, f + 4) if 1 <= n <= 20}
+        assert needed <= rendered
+
+
+def test_an_open_job_shot_runs_in_chunks(tmp_path: Path) -> None:
+    """Run as a farm runs it, with a stand-in for Blender that notes what it is told."""
+    pytest.importorskip("openjd.cli")
+    notes, worker = tmp_path / "notes", tmp_path / "blender.sh"
+    worker.write_text(f'#!/bin/bash\necho "$@" >> {notes}\n')
+    worker.chmod(0o755)
+    told = {
+        "BlendFile": tmp_path / "a.blend",
+        "Frames": "1-20",
+        "ChunkSize": 10,
+        "SamplesFolder": tmp_path / "samples",
+        "OutputFolder": tmp_path / "out",
+        "Blender": worker,
+    }
+    words = [word for k, v in told.items() for word in ("-p", f"{k}={v}")]
+    command = [OPENJD, "run", str(SHOT), "--step", "Denoise", "--run-dependencies"]
+    done = subprocess.run(
+        [*command, *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    asked = [parsed(line.split()) for line in notes.read_text().splitlines()]
+    assert [each.command for each in asked] == ["render"] * 2 + ["denoise"] * 2
+    for each in (asked[:2], asked[2:]):
+        assert [x.frames[0] for x in each] == [1, 11]
+        assert [n for x in each for n in x.frames] == list(range(1, 21))
+    assert asked[0].keep_samples == tmp_path / "samples"
+    assert asked[2].source == f"{tmp_path}/samples/####.exr"
