@@ -137,9 +137,13 @@ def _read(path: str | Path, limit: int) -> list[Part]:
 
 
 def _read_headers(path: str | Path) -> list[Part]:
+    return [_part(each, {}) for each in _whole_headers(path)]
+
+
+def _whole_headers(path: str | Path) -> Any:
     try:
         with _silent_library():
-            return [_part(each, {}) for each in _headers(path)]
+            return _headers(path)
     except _FAULTS as error:
         raise _incomplete(path, error) from error
 
@@ -245,9 +249,13 @@ def _copy(
 ) -> None:
     import OpenEXR
 
-    file = _opened(source, limit)
-    part = file.parts[number]
-    channels = {} if alone else part.channels
+    if alone:
+        part = _whole_headers(source)[number]
+        channels: dict[str, Any] = {}
+    else:
+        file = _opened(source, limit)
+        part = file.parts[number]
+        channels = part.channels
     for name, pixels in planes.items():
         if name in channels:
             old = channels[name].pixels

@@ -43,7 +43,9 @@ def scene_file(program: Program, engine: str) -> Path:
     return path
 
 
-def run(program: Program, engine: str) -> subprocess.CompletedProcess[str]:
+def run(
+    program: Program, engine: str, template: str, step: str, **more: object
+) -> subprocess.CompletedProcess[str]:
     """Submit two frames of the default scene with `openjd run`."""
     pytest.importorskip("openjd.cli")
     share = program.share
@@ -65,12 +67,12 @@ def run(program: Program, engine: str) -> subprocess.CompletedProcess[str]:
         "Frames": "1-2",
         "OutputFolder": share / f"farm_{engine}",
         "Blender": wrapper,
+        **more,
     }
     told = [word for k, v in parameters.items() for word in ("-p", f"{k}={v}")]
-    command = [OPENJD, "run"]
-    template = str(TEMPLATE / "xrds_render.template.yaml")
+    command = [OPENJD, "run", str(TEMPLATE / f"{template}.template.yaml")]
     return subprocess.run(
-        [*command, template, "--step", "Render", *told],
+        [*command, "--step", step, "--run-dependencies", *told],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,
@@ -80,7 +82,7 @@ def run(program: Program, engine: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_frames_are_rendered_with_progress(installed: Program) -> None:
-    done = run(installed, "XRDS")
+    done = run(installed, "XRDS", "xrds_render", "Render")
     assert done.returncode == 0, done.stdout
     frames = sorted((installed.share / "farm_XRDS").iterdir())
     assert [path.name for path in frames] == ["0001.exr", "0002.exr"]
@@ -91,7 +93,7 @@ def test_frames_are_rendered_with_progress(installed: Program) -> None:
 
 
 def test_a_file_of_another_engine_fails_at_once(installed: Program) -> None:
-    done = run(installed, "CYCLES")
+    done = run(installed, "CYCLES", "xrds_render", "Render")
     assert done.returncode != 0
     assert "the file is not set to XRDS" in done.stdout
     assert not (installed.share / "farm_CYCLES").exists()
@@ -122,3 +124,32 @@ def test_a_flamenco_worker_renders_its_chunk(installed: Program, engine: str) ->
         assert done.returncode == 3
         assert "not set to XRDS" in done.stdout
         assert not folder.exists()
+
+
+def test_a_shot_is_rendered_apart_and_denoised_as_one(installed: Program) -> None:
+    """By Open Job Description's steps and by Flamenco's tasks: the same frames."""
+    share = installed.share
+    settings = {"SamplesFolder": share / "samples", "ChunkSize": 1}
+    done = run(installed, "CYCLES", "xrds_shot", "Denoise", **settings)
+    assert done.returncode == 0, done.stdout
+    assert len(list((share / "samples").glob("*.exr"))) == 2
+    frames = sorted((share / "farm_CYCLES").iterdir())
+    assert [path.name for path in frames] == ["0001.exr", "0002.exr"]
+    tasks = compile_job(
+        {
+            "frames": "1-2",
+            "chunk_size": 2,
+            "temporal_radius": 4,
+            "blendfile": installed.seen(scene_file(installed, "CYCLES")),
+            "render_output_path": f"{installed.seen(share / 'shot')}/####.exr",
+            "samples_path": installed.seen(share / "flamenco samples"),
+        },
+        "xrds_shot",
+    )
+    for task in tasks:
+        (command,) = task["commands"]
+        told = command["parameters"]
+        done = installed.run("blender", *told["args"], timeout=900)
+        assert done.returncode == 0, done.stdout
+    for path in frames:
+        assert (share / "shot" / path.name).read_bytes() == path.read_bytes()

@@ -142,7 +142,7 @@ def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | N
     if camera is None or file.window is None:
         return None
     (x, y), _ = file.window
-    name = str(told.get(NAME, ""))
+    name = str(told.get(NAME) or told.get("Camera", ""))  # as Blender writes it
     return replace(camera, window=(x - left, y - top), name=name)
 
 
