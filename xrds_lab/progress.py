@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
+from xrds_core.errors import printable
+
 Progress = Callable[[str], object]
 
 
@@ -14,4 +16,4 @@ def silent(line: str) -> None:
 
 def report_line(line: str) -> None:
     """Print a line beside the result, on stderr."""
-    print(line, file=sys.stderr, flush=True)
+    print(printable(line), file=sys.stderr, flush=True)

@@ -322,6 +322,15 @@ def test_memory_limit_holds() -> None:
     assert free[1] == limited[1]
 
 
+def test_a_limit_beyond_any_memory_is_none() -> None:
+    _, noisy, albedo, normal = render(60, 50)
+    pictures = [
+        Denoiser("fast", memory_limit=limit)(noisy, albedo, normal).radiance
+        for limit in (None, 2**62)
+    ]
+    np.testing.assert_array_equal(*pictures)
+
+
 def test_little_memory_takes_rows_as_they_are() -> None:
     _, noisy, albedo, normal = render(60, 50)
     result = Denoiser("fast", memory_limit=0)(noisy, albedo, normal).radiance

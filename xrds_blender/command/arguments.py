@@ -7,27 +7,31 @@ argparse then makes a line of wrong usage.
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+LARGEST_NUMBER = 2**31 - 1  # Blender and the libraries count in 32 bits
 LAST_FRAME = 1048574  # Blender's MAXFRAME
 SMALLEST_SIDE, LARGEST_SIDE = 4, 65536  # pixels; Blender takes the nearest of these
 
 
 def positive(text: str) -> int:
     """A whole number above 0."""
-    value = int(text)
-    if value < 1:
-        raise argparse.ArgumentTypeError(f"{value} must be at least 1")
-    return value
+    return _within(int(text), 1)
 
 
 def whole(text: str) -> int:
     """A whole number, 0 or above."""
-    value = int(text)
-    if value < 0:
-        raise argparse.ArgumentTypeError(f"{value} must be at least 0")
+    return _within(int(text), 0)
+
+
+def _within(value: int, least: int) -> int:
+    if not least <= value <= LARGEST_NUMBER:
+        raise argparse.ArgumentTypeError(
+            f"{value} must be from {least} to {LARGEST_NUMBER}"
+        )
     return value
 
 
@@ -42,6 +46,8 @@ def factor(text: str) -> float:
 def pair(text: str) -> tuple[float, float]:
     """Two numbers, such as 1,-1."""
     first, second = (float(part) for part in text.split(","))
+    if not (math.isfinite(first) and math.isfinite(second)):
+        raise argparse.ArgumentTypeError(f"{text} must be two numbers")
     return first, second
 
 
@@ -143,4 +149,7 @@ def size_in_bytes(text: str) -> int:
         raise argparse.ArgumentTypeError(
             f"{text!r} is not an amount such as 500M or 4G"
         )
-    return int(match[1]) << {"": 0, "K": 10, "M": 20, "G": 30}[match[2]]
+    size = int(match[1]) << {"": 0, "K": 10, "M": 20, "G": 30}[match[2]]
+    if not 0 < size < 2**63:
+        raise argparse.ArgumentTypeError(f"{text} is no amount that memory can have")
+    return size

@@ -56,7 +56,7 @@ def add_job(command: argparse.ArgumentParser) -> None:
     )
     add(
         "--temporal-radius",
-        type=int,
+        type=arguments.whole,
         metavar="N",
         help="frames before and after that lend their samples (default: 4 for several "
         "frames)",
@@ -70,7 +70,7 @@ def add_job(command: argparse.ArgumentParser) -> None:
     add("--guide-cache", type=Path, metavar="DIR", help="folder to cache guides in")
     add(
         "--guide-limit",
-        type=int,
+        type=arguments.whole,
         default=0,
         help="samples up to which repeated renders improve the cached guides",
     )
@@ -81,7 +81,11 @@ def add_job(command: argparse.ArgumentParser) -> None:
         metavar="WxH",
         help="size in pixels, in place of the file's",
     )
-    add("--seed", type=int, help="seed of Cycles' noise, in place of the file's")
+    add(
+        "--seed",
+        type=arguments.whole,
+        help="seed of Cycles' noise, in place of the file's",
+    )
     add("--scene", dest="scene_name", metavar="NAME", help="a scene of the file")
     add("--view-layer", metavar="NAME", help="a view layer (default: the first used)")
     add("--camera", metavar="NAME", help="a camera of the scene, for all frames")

@@ -49,6 +49,7 @@ _RANGE = {"albedo": (0.0, 1.0), "normal": (-1.0, 1.0)}  # beyond which OIDN sees
 _SECONDS = {"albedo": 0.4, "normal": 0.4, "picture": 1.0, "second picture": 1.0}
 _WITH_PREFILTER = ("best", "high")
 _NO_ALBEDO = 0.5  # what Cycles gives with a normal alone: OIDN wants both
+_MOST_MEBIBYTES = 2**31 - 1  # the library counts them in 32 bits
 _MEBIBYTE = 1 << 20
 
 _open: WeakSet[Denoiser] = WeakSet()
@@ -255,7 +256,8 @@ class Denoiser:
     def _limit(self, task: Any, held: int) -> None:
         """Leave a filter the memory that the `held` bytes of guides do not take."""
         if self._memory_limit is not None:
-            task.max_memory_mb = max(0, self._memory_limit - held) // _MEBIBYTE
+            left = max(0, self._memory_limit - held) // _MEBIBYTE
+            task.max_memory_mb = min(left, _MOST_MEBIBYTES)
 
     def _execute(
         self, task: Any, images: dict[str, Image], output: Image, stages: Stages

@@ -228,7 +228,7 @@ def _add_shots(group: Any) -> None:
     )
     add(
         "--pair-samples",
-        type=int,
+        type=arguments.whole,
         default=64,
         help="of the frame that flicker under a moving camera is judged by; 0: none",
     )

@@ -66,7 +66,7 @@ def add_dataset(commands: Any) -> argparse.ArgumentParser:
     command = commands.add_parser("dataset", help="render a training set")
     add = command.add_argument
     add("-o", "--out", type=arguments.folder, required=True)
-    add("--seed", type=int, default=0, help="first scene's seed")
+    add("--seed", type=arguments.whole, default=0, help="first scene's seed")
     add("--count", type=arguments.positive, default=1, help="number of scenes")
     add("--assets", type=Path, help="folder of models, textures and skies")
     add("--scales", type=arguments.integers, default=(2, 4, 8), help="as 2,4,8")
@@ -121,7 +121,7 @@ def add_train_filter(commands: Any) -> argparse.ArgumentParser:
     add("data", type=Path, nargs="+", metavar="DATASET", help="folders of `dataset`")
     add("-o", "--out", type=Path, required=True, metavar="guide_filter.safetensors")
     add("--steps", type=arguments.positive, default=10_000)
-    add("--seed", type=int, default=0)
+    add("--seed", type=arguments.whole, default=0)
     lines = lines_of("xrds_lab.training.guide_filter")
     command.set_defaults(work=_train_filter, lines=lines)
     return command
