@@ -76,6 +76,8 @@ class Layout:
     def label(self, text: str, **_: object) -> None:
         self.drawn.append(text)
 
+    def separator(self, **_: object) -> None: ...
+
     def column(self, **_: object) -> Layout:
         return self
 

@@ -34,6 +34,8 @@ def draw(layout: Any, settings: Any, best: Way, looks: list[Outlook]) -> None:
     shown = [way for way in WAYS if way in found or settings.way == way]
     enlarged = [way for way in shown if way.is_enlarged]
     for each in shown:
+        if each is Way.PLAIN:
+            column.separator(factor=0.5)
         if each in enlarged[:1]:
             column.label(text="Super-Resolution", text_ctxt=CONTEXT)
         _draw_way(column, settings, found.get(each, Outlook(each)), timed)
