@@ -15,6 +15,7 @@ import re
 import secrets
 import shutil
 import tempfile
+import threading
 import time
 import uuid
 from collections.abc import Iterator
@@ -28,6 +29,7 @@ from . import children
 _NAME = re.compile(r"\.xrds-(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-\w+\.unfinished")
 _DEAD = 3600.0  # seconds without a byte written, after which no machine writes any more
 _unfinished: set[Path] = set()
+_beginning = threading.Lock()
 
 
 @contextmanager
@@ -69,7 +71,11 @@ def try_folder(folder: Path) -> None:
 
 
 def abandon() -> None:
-    """Remove what this process is writing now: it is about to end on the spot."""
+    """Remove what this process is writing: it is about to end on the spot.
+
+    Nothing new can be begun from now on: whoever tries waits for the end.
+    """
+    _beginning.acquire()
     children.kill_all()
     for path in list(_unfinished):
         _remove(path)
@@ -97,11 +103,12 @@ def _registered(folder: Path) -> Iterator[Path]:
     mark = f"{_machine()}-{os.getpid()}-{secrets.token_hex(4)}"
     path = folder / f".xrds-{mark}.unfinished"
     link = Path(tempfile.gettempdir(), path.name)
-    if link.parent != folder:
-        with suppress(OSError):  # no permission, or no links: `folder` alone is swept
-            link.symlink_to(path.absolute())
-            _unfinished.add(link)
-    _unfinished.add(path)
+    with _beginning:
+        _unfinished.add(path)
+        if link.parent != folder:
+            with suppress(OSError):  # no permission or no links: `folder` is swept
+                link.symlink_to(path.absolute())
+                _unfinished.add(link)
     try:
         yield path
     finally:

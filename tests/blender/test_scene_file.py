@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import OpenEXR
 import pytest
 
 from xrds_blender.command import main
@@ -127,10 +128,15 @@ def test_the_laboratory_trusts_no_file_either(tmp_path: Path) -> None:
 def test_the_options_lead_there(
     blend: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    words = "--scene Second --camera Right --view-layer Foreground --resolution 32x18"
+    words = (
+        "--scene Second --camera Right --view-layer Foreground --resolution 32x18 "
+        "--exr-depth half --exr-codec piz"
+    )
     line = f"render {blend} -o {tmp_path}/#.exr --plain --samples 1 --threads 1"
     assert main.main([*line.split(), *words.split(), "--frames", "1-3x2"]) == 0
     assert {path.name for path in tmp_path.glob("*.exr")} == {"1.exr", "3.exr"}
+    header = OpenEXR.File(str(tmp_path / "3.exr"), header_only=True).parts[0].header
+    assert header["compression"] == OpenEXR.PIZ_COMPRESSION
     assert bpy.data.scenes["Second"].camera.name == "Right"
     assert bpy.data.scenes["Second"].render.threads == 1
     assert main.main([*line.split(), "--scene", "Third"]) == 1

@@ -192,12 +192,28 @@ def test_a_link_that_leads_to_a_foreign_file_takes_nothing_along(
     assert precious.exists()
 
 
-def test_a_process_that_ends_on_the_spot_leaves_nothing(tmp_path: Path) -> None:
-    def write() -> None:
-        with replacing(tmp_path / "frame.exr") as part:
-            part.write_text("half")
-            atomic.abandon()
+ENDING = """
+import os, sys, threading
+from pathlib import Path
+from xrds_core.atomic import abandon, replacing
 
-    with pytest.raises(FileNotFoundError):
-        write()
+folder = Path(sys.argv[1])
+with replacing(folder / "frame.exr") as part:
+    part.write_text("half")
+    abandon()
+
+    def write_more() -> None:
+        with replacing(folder / "other.exr") as part:
+            part.write_text("half")
+
+    thread = threading.Thread(target=write_more, daemon=True)
+    thread.start()
+    thread.join(0.2)
+    os._exit(3)
+"""
+
+
+def test_a_process_that_ends_on_the_spot_leaves_nothing(tmp_path: Path) -> None:
+    done = subprocess.run([sys.executable, "-c", ENDING, str(tmp_path)], check=False)
+    assert done.returncode == 3
     assert not names(tmp_path)
