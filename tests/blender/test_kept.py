@@ -25,7 +25,9 @@ from xrds_blender.shot import method
 from xrds_core import exr
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError, UsageError
+from xrds_core.sequence import cameras
 from xrds_core.sequence.denoise import Files, denoise_sequence
+from xrds_core.sequence.reading import Reading, read_frame
 
 FRAMES = range(1, 49)
 CHUNKS = [range(first, first + 8) for first in (17, 1, 41, 9, 33, 25)]
@@ -195,6 +197,24 @@ def test_what_a_kept_file_holds(blend: Path) -> None:
     ahead = scene.camera.matrix_world @ type(scene.camera.location)((0, 0, -3))
     x, y, _, w = np.array([*ahead, 1.0]) @ np.array(told["worldToNDC"])
     np.testing.assert_allclose([x / w, y / w], [0.5, 0.5], atol=1e-5)
+
+
+def test_cameras_of_a_file_are_those_of_its_samples(blend: Path) -> None:
+    """For frames that plain Cycles has rendered, whose headers tell no camera."""
+    bpy.context.scene.camera.data.shift_x = 0.1
+    saved(blend.parent)
+    keep(blend, [5])
+    told = blend.parent / "cameras.json"
+    assert main.main(["cameras", str(blend), "-o", str(told), "--frames", "4-6"]) == 0
+    known = cameras.read_cameras(told)
+    assert list(known) == [4, 5, 6]
+    ours = cameras.told_camera(known, 5, (32, 24))
+    path = blend.parent / "samples" / "0005.exr"
+    theirs = read_frame(path, 5, Reading()).stored.camera
+    assert ours is not None
+    np.testing.assert_allclose(ours.view, theirs.view, atol=1e-6)
+    np.testing.assert_array_equal(ours.project, theirs.project)
+    assert ours.name == theirs.name
 
 
 def test_a_killed_render_is_resumed(blend: Path) -> None:

@@ -107,6 +107,10 @@ def test_a_file_tells_the_camera(tmp_path: Path, kind: str) -> None:
     assert found is not None
     np.testing.assert_allclose(seen(found), seen(camera), atol=1e-9)
     assert cameras.told_camera(known, 8, SIZE) is None
+    path.write_text(json.dumps({"7": cameras.to_json(camera)}))
+    exact = cameras.told_camera(cameras.read_cameras(path), 7, SIZE)
+    assert exact is not None
+    np.testing.assert_allclose(seen(exact), seen(camera), atol=1e-9)
     path.write_text(json.dumps({"all": told}))
     assert cameras.told_camera(cameras.read_cameras(path), 8, SIZE) is not None
 

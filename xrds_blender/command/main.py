@@ -15,7 +15,7 @@ from typing import Any, NoReturn
 from xrds_core.errors import UsageError
 from xrds_core.version import package_version
 
-from . import console, denoise, info, render, upscale
+from . import cameras, console, denoise, info, render, upscale
 from .deferred import no_lines
 
 AddCommand = Callable[[Any], argparse.ArgumentParser]
@@ -107,6 +107,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         render.add_render,
         render.add_plan,
         denoise.add_denoise,
+        cameras.add_cameras,
         upscale.add_upscale,
         info.add_info,
     )

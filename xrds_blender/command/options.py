@@ -20,8 +20,8 @@ DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
 
 def add_job(command: argparse.ArgumentParser) -> None:
     """Add what `RenderJob` holds."""
+    add_scene(command)
     add = command.add_argument
-    add("scene", type=Path, metavar="SCENE.blend")
     size = command.add_mutually_exclusive_group()
     size.add_argument(
         "--scale",
@@ -76,15 +76,22 @@ def add_job(command: argparse.ArgumentParser) -> None:
     )
     add("--keep-all", action="store_true", help="skip nothing that could be skipped")
     add(
+        "--seed",
+        type=arguments.whole,
+        help="seed of Cycles' noise, in place of the file's",
+    )
+    add_network(command)
+
+
+def add_scene(command: argparse.ArgumentParser) -> None:
+    """Add the file, and what `SceneChoice` holds but for threads."""
+    add = command.add_argument
+    add("scene", type=Path, metavar="SCENE.blend")
+    add(
         "--resolution",
         type=arguments.size,
         metavar="WxH",
         help="size in pixels, in place of the file's",
-    )
-    add(
-        "--seed",
-        type=arguments.whole,
-        help="seed of Cycles' noise, in place of the file's",
     )
     add("--scene", dest="scene_name", metavar="NAME", help="a scene of the file")
     add("--view-layer", metavar="NAME", help="a view layer (default: the first used)")
@@ -95,7 +102,6 @@ def add_job(command: argparse.ArgumentParser) -> None:
         action="store_true",
         help="trust the file: run its drivers and scripts",
     )
-    add_network(command)
 
 
 def add_network(command: argparse.ArgumentParser) -> None:
@@ -169,7 +175,7 @@ def choice_of(options: argparse.Namespace) -> SceneChoice:
         options.view_layer,
         options.camera,
         options.resolution,
-        options.threads,
+        getattr(options, "threads", None),
         options.enable_autoexec,
     )
 

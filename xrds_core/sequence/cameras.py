@@ -87,6 +87,15 @@ def _project(seen: Matrix, perspective: bool) -> Matrix:
     return project
 
 
+def to_json(camera: Camera) -> dict[str, Any]:
+    """Return a camera as `read_cameras` takes it; not of a panorama."""
+    return {
+        "to_world": np.linalg.inv(camera.view).tolist(),
+        "project": camera.project.tolist(),
+        "name": camera.name,
+    }
+
+
 def read_cameras(path: Path) -> dict[int | None, dict[str, Any]]:
     """Read cameras by frame number from a JSON file; None is for all other frames.
 
@@ -94,7 +103,9 @@ def read_cameras(path: Path) -> dict[int | None, dict[str, Any]]:
     takes points of a camera that looks along -Z, Y up, to the world (the columns are
     its axes and its place); `focal_length` and `sensor_width` in one unit, or
     `ortho_width` in the world's; optional `shift`, two shares of the width by which the
-    frame lies to the right and up. Raises UsageError.
+    frame lies to the right and up. In the place of these `project`, 4 rows of 4
+    numbers, takes the camera's points to OpenGL clip space. Frames of cameras of
+    another `name` lend nothing to each other. Raises UsageError.
     """
     try:
         told = json.loads(path.read_text("utf-8"))
@@ -128,6 +139,10 @@ def told_camera(
 def _told_camera(
     told: Mapping[str, Any], size: tuple[int, int], aspect: float
 ) -> Camera:
+    view = _inverse(_matrix(told["to_world"]))
+    name = str(told.get("name", ""))
+    if "project" in told:
+        return Camera(view, _matrix(told["project"]), size, name=name)
     width, height = size[0] * aspect, size[1]
     project = np.zeros((4, 4))
     shift_x, shift_y = told.get("shift", (0.0, 0.0))
@@ -141,7 +156,7 @@ def _told_camera(
         project[2, 2], project[2, 3], project[3, 2] = -1.0, -1.0, -1.0
         project[:2, 2] = shift
     project[0, 0], project[1, 1] = across, across * width / height
-    return Camera(_inverse(_matrix(told["to_world"])), project, size)
+    return Camera(view, project, size, name=name)
 
 
 def _matrix(rows: Any) -> Matrix:

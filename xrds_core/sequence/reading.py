@@ -142,7 +142,8 @@ def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | N
     if camera is None or file.window is None:
         return None
     (x, y), _ = file.window
-    name = str(told.get(NAME) or told.get("Camera", ""))  # as Blender writes it
+    # Blender writes `Camera`
+    name = camera.name or str(told.get(NAME) or told.get("Camera", ""))
     return replace(camera, window=(x - left, y - top), name=name)
 
 
