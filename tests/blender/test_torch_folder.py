@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from xrds_blender.frame import torch_folder
-from xrds_core.errors import UsageError
+from xrds_core.errors import UsageError, XRDSError
 
 VERSION = "from typing import Optional\n__version__ = '2.9.1+cu128'\n"
 CUDA = VERSION + "cuda: Optional[str] = '12.8'\nhip: Optional[str] = None\n"
@@ -45,7 +45,7 @@ def test_another_python_or_platform_is_refused(folder: Path) -> None:
 
 def test_an_empty_folder_tells_how_to_fill_it(tmp_path: Path) -> None:
     with pytest.raises(
-        UsageError, match=r"holds no PyTorch; install it with pip install"
+        UsageError, match=r"holds no PyTorch; install it with .* -m pip install"
     ):
         torch_folder.inspect(tmp_path)
 
@@ -89,3 +89,57 @@ def test_preferences_show_what_is_used(folder: Path) -> None:
     wrong = preferences.torch_status(folder / "nowhere")
     assert wrong[0][0] == "ERROR"
     assert "holds no PyTorch" in wrong[0][1]
+
+
+@pytest.mark.parametrize(
+    ("build", "cards"), [("CPU", []), ("CUDA 12.8", ["cuda:0"]), ("ROCm 6", ["cuda:0"])]
+)
+def test_only_devices_that_are_there_are_offered(
+    monkeypatch: pytest.MonkeyPatch, build: str, cards: list[str]
+) -> None:
+    from xrds_blender.interface import preferences
+
+    torch = torch_folder.Torch("2.13", build, Path())
+    monkeypatch.setattr(torch_folder, "available", lambda: torch)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    monkeypatch.setattr(sys, "platform", "linux")
+    names = [name for name, *_ in preferences._devices(None, None)]
+    assert names == ["auto", "cpu", *cards]
+    monkeypatch.setattr(sys, "platform", "darwin")
+    names = [name for name, *_ in preferences._devices(None, None)]
+    assert names == ["auto", "cpu", "mps", *cards]
+
+
+def test_a_folder_is_found_again_after_the_add_on_was_off(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from xrds_blender.interface import get_torch
+
+    monkeypatch.setattr(get_torch, "_home", lambda: tmp_path / "home")
+    assert get_torch.remembered() == ""
+    get_torch.remember(str(folder))
+    assert get_torch.remembered() == str(folder)
+    (folder / "torch" / "version.py").unlink()
+    assert get_torch.remembered() == ""  # it is not there any more
+    get_torch.remember("")
+    assert not list((tmp_path / "home").iterdir())
+
+
+def test_the_command_is_whole_and_for_the_processor() -> None:
+    from xrds_blender.interface import get_torch
+
+    command = get_torch.command()
+    assert f'--target "{get_torch.folder()}"' in command
+    assert "FOLDER" not in command
+    assert command.endswith("torch safetensors OpenEXR")
+    if sys.platform == "linux":
+        assert "/whl/cpu" in command
+
+
+def test_what_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual = torch_folder._where
+    monkeypatch.setattr(
+        torch_folder, "_where", lambda n: None if n == "safetensors" else usual(n)
+    )
+    with pytest.raises(XRDSError, match=r"^XRDS needs safetensors, which"):
+        torch_folder.load("no_such_module")

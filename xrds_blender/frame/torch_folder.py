@@ -11,12 +11,17 @@ import importlib
 import sys
 from dataclasses import dataclass
 from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import UsageError, XRDSError
 
-NEEDED = ("torch", "safetensors")
+NEEDED = {"torch": "PyTorch", "safetensors": "safetensors"}
+CPU_INDEX = (
+    "--index-url https://download.pytorch.org/whl/cpu "
+    "--extra-index-url https://pypi.org/simple"
+)
 
 
 @dataclass(frozen=True)
@@ -73,12 +78,17 @@ def _constants(path: Path) -> dict[str, object]:
 
 
 def install(folder: Path) -> str:
-    """The command that fills a folder with what this Blender's Python needs."""
-    python = f"{sys.version_info.major}.{sys.version_info.minor}"
-    return (
-        f"pip install --python-version {python} --only-binary :all: "
-        f'--target "{folder}" torch safetensors OpenEXR'
-    )
+    """The command that fills a folder with what this Blender's Python needs.
+
+    It is for the CPU: on Linux the package index itself has PyTorch with all of CUDA.
+    """
+    pip = f'"{sys.executable}" -m pip install'
+    if find_spec("pip") is None:  # any other Python's pip does as well
+        python = f"{sys.version_info.major}.{sys.version_info.minor}"
+        pip = f"pip install --python-version {python}"
+    index = f" {CPU_INDEX}" if sys.platform == "linux" else ""
+    packages = "torch safetensors OpenEXR"
+    return f'{pip} --only-binary :all: --target "{folder}"{index} {packages}'
 
 
 def use(folder: Path | None) -> None:
@@ -146,7 +156,9 @@ def load(module: str) -> Any:
         return importlib.import_module(f"xrds_core.{module}")
     except Exception as error:  # OSError, AttributeError: a broken one raises all
         reason = " ".join(str(error).split()) or type(error).__name__
+        missing = [title for name, title in NEEDED.items() if _where(name) is None]
+        what = " and ".join(missing or ["PyTorch"])
         raise XRDSError(
-            f"XRDS needs PyTorch, which cannot be loaded ({reason}); check the PyTorch "
+            f"XRDS needs {what}, which cannot be loaded ({reason}); check the PyTorch "
             "folder in the add-on's preferences, or render at full size"
         ) from error

@@ -25,6 +25,8 @@ class Machine:
     """Folder of weights files; None means the shipped ones."""
     threads: int | None = None
     """Of the network on the processor; None leaves it to PyTorch."""
+    stop_keeps: bool = True
+    """Whether a render that the user stops leaves the picture so far, denoised."""
     torch: Path | None = None
     """Folder that PyTorch is taken from; None means the one that Python finds."""
 
@@ -40,6 +42,7 @@ def machine() -> Machine:
         memory_limit=kept.memory_limit * MEBIBYTE or None,
         weights=folder(kept.weights),
         threads=kept.threads or None,
+        stop_keeps=kept.stop_keeps,
         torch=folder(kept.torch),
     )
 

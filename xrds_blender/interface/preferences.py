@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,45 +12,53 @@ import bpy
 from xrds_core.errors import UsageError
 
 from ..frame import torch_folder
-from . import machine
+from . import get_torch, machine
 from .self_test import XRDS_OT_self_test
 
 # Numbers stay with their devices: a preference holds the number.
-_DEVICES = [
-    (
-        "auto",
-        "Automatic",
-        "A graphics card if PyTorch finds one",
-        0,
-    ),
-    ("cpu", "CPU", "Always the CPU", 1),
-    ("mps", "Metal", "The GPU of an Apple chip", 2),
-]
+_AUTOMATIC = ("auto", "Automatic", "The fastest device that PyTorch finds", 0)
+_CPU = ("cpu", "CPU", "The processor, for the denoiser too", 1)
+_METAL = ("mps", "Metal", "The GPU of an Apple chip", 2)
+_CARDS = ("CUDA", "ROCm")
 _MOST_CARDS = 16
-_cards: list[tuple[str, str, str, int]] = []
+_offered: list[tuple[str, str, str, int]] = []
 
 
 def _devices(_: Any, __: Any) -> list[tuple[str, str, str, int]]:
-    """The devices to choose from; graphics cards by name once torch is loaded."""
+    """The devices that this machine's PyTorch can use, graphics cards by name."""
+    # Blender keeps no reference to the texts of a list made on the fly.
+    _offered[:] = [_AUTOMATIC, _CPU, *_graphics_devices()]
+    return _offered
+
+
+def _graphics_devices() -> Iterator[tuple[str, str, str, int]]:
+    if sys.platform == "darwin":
+        yield _METAL
+    try:
+        build = torch_folder.available().build.partition(" ")[0]
+    except UsageError:
+        return
+    if build not in _CARDS:
+        return
+    names = {0: "First graphics card"}  # nothing is loaded only to be offered
     torch = sys.modules.get("torch")
-    names = {0: "First graphics card"}
-    if torch is not None and torch.cuda.is_available():
+    if torch is not None:
         cards = range(min(torch.cuda.device_count(), _MOST_CARDS))
         names = {i: torch.cuda.get_device_name(i) for i in cards}
-    # Blender keeps no reference to the texts of a list made on the fly.
-    _cards[:] = [
-        (f"cuda:{i}", name, "A graphics card (CUDA or ROCm)", 10 + i)
-        for i, name in names.items()
-    ]
-    return [*_DEVICES, *_cards]
+    for i, name in names.items():
+        yield f"cuda:{i}", name, f"A graphics card ({build})", 10 + i
 
 
 def _apply_torch(preferences: Any, _: Any = None) -> None:
     """Look for torch where the preferences say; what is wrong is shown below."""
+    get_torch.remember(preferences.torch)
     try:
         torch_folder.use(machine.folder(preferences.torch))
     except UsageError:
         torch_folder.use(None)
+
+
+_NAMES = ("device", "threads", "memory_limit", "stop_keeps", "weights", "torch")
 
 
 class XRDS_Preferences(bpy.types.AddonPreferences):
@@ -58,21 +67,30 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
     bl_idname = machine.package
 
     device: bpy.props.EnumProperty(
-        name="Device", items=_devices, description="Where the network runs"
+        name="Network Device",
+        items=_devices,
+        description="Where the network of super-resolution runs; Cycles' own device "
+        "is in the render properties",
     )
     threads: bpy.props.IntProperty(
-        name="Threads",
+        name="Threads (0: Automatic)",
         description="CPU threads of network and denoiser; 0 uses all cores",
         default=0,
         min=0,
         max=1024,
     )
     memory_limit: bpy.props.IntProperty(
-        name="Memory Limit",
-        description="Megabytes that the network may use on top of the picture; "
-        "0 sets no limit. Less memory means smaller tiles",
+        name="Memory Limit (MB)",
+        description="Memory that the network may use beside the picture; 0 sets no "
+        "limit. With less of it the network works in smaller tiles and takes longer",
         default=0,
         min=0,
+    )
+    stop_keeps: bpy.props.BoolProperty(
+        name="Stop Keeps the Picture",
+        description="A still that you stop with Esc keeps the samples taken so far, "
+        "quickly denoised",
+        default=True,
     )
     weights: bpy.props.StringProperty(
         name="Weights Folder",
@@ -88,17 +106,32 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
         default="",
         update=_apply_torch,
     )
+    torch_command: bpy.props.StringProperty(
+        name="Command",
+        description="Downloads PyTorch into a folder of XRDS: run it in a terminal",
+        get=lambda _: get_torch.command(),
+    )
 
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        for name in ("device", "threads", "memory_limit", "weights", "torch"):
+        for name in _NAMES:
             layout.prop(self, name)
         for icon, line in torch_status(machine.folder(self.torch)):
             layout.label(text=line, icon=icon)
+        if not torch_folder.is_there():
+            self._draw_the_way_to_torch(layout.box())
         layout.operator(XRDS_OT_self_test.bl_idname, icon="CHECKMARK")
         for line in XRDS_OT_self_test.lines:
             layout.label(text=line)
+
+    def _draw_the_way_to_torch(self, layout: Any) -> None:
+        layout.use_property_split = False
+        layout.label(text=get_torch.NEEDED)
+        layout.prop(self, "torch_command", text="")
+        layout.operator(get_torch.XRDS_OT_get_torch.bl_idname, icon="COPYDOWN")
+        if get_torch.is_looking():
+            layout.label(text=get_torch.WAITING, icon="SORTTIME")
 
 
 def torch_status(folder: Path | None = None) -> list[tuple[str, str]]:
@@ -112,7 +145,7 @@ def torch_status(folder: Path | None = None) -> list[tuple[str, str]]:
     try:
         torch = torch_folder.available()
     except UsageError as error:
-        return [*lines, ("ERROR", str(error)), ("BLANK1", _install())]
+        return [*lines, ("INFO", str(error))]
     lines.append(
         ("INFO", f"PyTorch {torch.version} ({torch.build}) from {torch.folder}")
     )
@@ -122,22 +155,25 @@ def torch_status(folder: Path | None = None) -> list[tuple[str, str]]:
     return lines
 
 
-def _install() -> str:
-    return torch_folder.install(Path("FOLDER"))
+_CLASSES = (XRDS_OT_self_test, get_torch.XRDS_OT_get_torch, XRDS_Preferences)
 
 
 def register(package: str) -> None:
     """Register the preferences under the add-on's module name."""
     XRDS_Preferences.bl_idname = machine.package = package
-    bpy.utils.register_class(XRDS_OT_self_test)
-    bpy.utils.register_class(XRDS_Preferences)
+    for item in _CLASSES:
+        bpy.utils.register_class(item)
     entry = bpy.context.preferences.addons.get(package)
-    if entry and entry.preferences and entry.preferences.torch:
-        _apply_torch(entry.preferences)
+    if entry and entry.preferences:
+        kept = entry.preferences
+        if not (kept.torch or torch_folder.is_there()):
+            kept.torch = get_torch.remembered()
+        if kept.torch:
+            _apply_torch(kept)
 
 
 def unregister() -> None:
     """Take them back."""
     torch_folder.use(None)
-    bpy.utils.unregister_class(XRDS_Preferences)
-    bpy.utils.unregister_class(XRDS_OT_self_test)
+    for item in reversed(_CLASSES):
+        bpy.utils.unregister_class(item)
