@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from ..frame.job import ENGINE
+from xrds_core.errors import SceneError
 
-LOOK_AGAIN = 0.25  # seconds between two looks at a running render job
+from ..frame import engine_loan
 
 
 class XRDS_OT_render(bpy.types.Operator):
@@ -30,35 +30,21 @@ class XRDS_OT_render(bpy.types.Operator):
         return self._render(context, "INVOKE_DEFAULT")
 
     def _render(self, context: bpy.types.Context, how: str) -> set[str]:
-        scene = context.scene
-        engine, scene.render.engine = scene.render.engine, ENGINE
         running = False
         try:
+            engine_loan.lend(context.scene)
             done = bpy.ops.render.render(how, animation=self.animation)
             running = "RUNNING_MODAL" in done
+        except SceneError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
         except RuntimeError as error:  # Blender's own message, shown as it shows them
             self.report({"ERROR"}, str(error).removeprefix("Error: ").strip())
             return {"CANCELLED"}
         finally:
-            if running:
-                _give_back_later(scene.name, engine)
-            else:
-                scene.render.engine = engine
+            if not running:
+                engine_loan.withdraw()
         return {"FINISHED"}
-
-
-def _give_back_later(scene_name: str, engine: str) -> None:
-    """Set the engine back once the render job is over, from the main thread."""
-
-    def look() -> float | None:
-        if bpy.app.is_job_running("RENDER"):
-            return LOOK_AGAIN
-        scene = bpy.data.scenes.get(scene_name)
-        if scene is not None and scene.render.engine == ENGINE:
-            scene.render.engine = engine
-        return None
-
-    bpy.app.timers.register(look, first_interval=LOOK_AGAIN)
 
 
 def menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:

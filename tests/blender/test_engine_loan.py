@@ -1,0 +1,106 @@
+"""*Render with XRDS* on scenes of other engines: nobody sees ours in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from xrds_blender.frame import engine_loan
+from xrds_blender.shot import animation
+from xrds_core.errors import SceneError
+
+
+@pytest.fixture
+def renders(life: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The engine that the scene has during each render by XRDS."""
+    seen: list[str] = []
+    real = animation.render_frame
+
+    def render_frame(*arguments: Any) -> Any:
+        seen.append(life.render.engine)
+        return real(*arguments)
+
+    monkeypatch.setattr(animation, "render_frame", render_frame)
+    life.xrds.way = "full_size"
+    return seen
+
+
+@pytest.mark.parametrize("persistent", [False, True])
+@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_WORKBENCH"])
+def test_the_scene_keeps_its_engine_meanwhile(
+    life: Any, renders: list[str], engine: str, persistent: bool
+) -> None:
+    life.render.engine, life.render.use_persistent_data = engine, persistent
+    assert bpy.ops.xrds.render() == {"FINISHED"}
+    assert renders == [engine]
+    assert life.render.engine == engine
+
+
+def test_a_file_saved_meanwhile_has_the_scenes_engine(
+    life: Any, renders: list[str], tmp_path: Path
+) -> None:
+    path = tmp_path / "saved.blend"
+
+    def save(*_: Any) -> None:
+        bpy.data.libraries.write(str(path), {life})
+
+    life.render.engine = "CYCLES"
+    bpy.app.handlers.render_pre.append(save)
+    assert bpy.ops.xrds.render() == {"FINISHED"}
+    with bpy.data.libraries.load(str(path)) as (_, loaded):
+        loaded.scenes = [life.name]
+    assert loaded.scenes[0].render.engine == "CYCLES"
+
+
+@pytest.mark.parametrize("persistent", [False, True])
+def test_the_next_render_is_by_the_scenes_engine(
+    life: Any, renders: list[str], persistent: bool
+) -> None:
+    life.render.engine, life.render.use_persistent_data = "CYCLES", persistent
+    bpy.ops.render.render()
+    assert bpy.ops.xrds.render() == {"FINISHED"}
+    bpy.ops.render.render()
+    assert len(renders) == 1
+    assert life.render.use_persistent_data is persistent
+
+
+def test_an_animation_is_lent_for_all_its_frames(
+    life: Any, renders: list[str], tmp_path: Path
+) -> None:
+    life.render.engine = "CYCLES"
+    life.render.filepath = str(tmp_path / "frame")
+    life.frame_start, life.frame_end = 1, 3
+    assert bpy.ops.xrds.render(animation=True) == {"FINISHED"}
+    assert renders == ["CYCLES"] * 3
+
+
+def test_a_render_that_does_not_begin_lends_nothing(
+    life: Any, renders: list[str]
+) -> None:
+    life.render.engine, life.camera = "CYCLES", None
+    engine_loan.lend(life)
+    engine_loan.withdraw()
+    life.camera = bpy.data.objects["Camera"]
+    bpy.ops.render.render()
+    assert not renders
+
+
+@pytest.fixture
+def unknown_place() -> Iterator[None]:
+    usual, engine_loan._offset = engine_loan._offset, 0
+    yield
+    engine_loan._offset = usual
+
+
+def test_an_unknown_blender_is_told(life: Any, unknown_place: None) -> None:
+    life.render.engine = "CYCLES"
+    with pytest.raises(SceneError, match="keeps the name of a scene's render engine"):
+        engine_loan.lend(life)
+    with pytest.raises(RuntimeError, match="choose the engine XRDS instead"):
+        bpy.ops.xrds.render()
+    assert life.render.engine == "CYCLES"

@@ -1,0 +1,144 @@
+"""One render by XRDS of a scene that keeps its own render engine.
+
+At the start of a render Blender calls `render_init`, copies the scene's render settings
+and calls `render_pre`; from then on it looks at the copy alone. So XRDS' name stands in
+the scene between these two calls only, and nobody sees it: a file saved, an undo step
+or a panel drawn while the render runs has the scene's own engine. The name is written
+in place: Blender's property would restart viewports, and only the main thread may set
+it.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import bpy
+
+from xrds_core.errors import SceneError
+
+from .job import ENGINE
+
+_NAME_SIZE = 32  # bytes that Blender keeps for the name
+_MOST = 1 << 16  # bytes of the render settings, far more than they are
+
+_offset: int | None = None
+"""Where the name lies in the render settings; the same in every scene."""
+_waiting: Any = None
+"""The scene whose next render is to be ours."""
+_lent: tuple[Any, bytes] | None = None
+"""The scene that bears our name now, and the bytes of its own."""
+_last: Any = None
+"""The scene of the render that goes on."""
+
+
+def lend(scene: Any) -> None:
+    """Let the render of `scene` that is started next be by XRDS.
+
+    To be called on the main thread. Raises SceneError where this Blender keeps the
+    name in an unknown way; nothing is changed then.
+    """
+    global _waiting
+    if scene.render.engine != ENGINE:
+        _find(scene.render)
+        _free_kept_engine(scene)
+        _waiting = scene
+
+
+def withdraw() -> None:
+    """The render has ended, or none has begun: the next one is not to be ours."""
+    global _waiting
+    _waiting = None
+
+
+@bpy.app.handlers.persistent
+def _before_copy(scene: Any, *_: Any) -> None:
+    global _lent, _last, _waiting
+    if _waiting is not None and scene == _waiting:
+        address = _find(scene.render)
+        _lent = scene, ctypes.string_at(address, _NAME_SIZE)
+        _last, _waiting = scene, None
+        ctypes.memmove(address, _padded(ENGINE), _NAME_SIZE)
+
+
+@bpy.app.handlers.persistent
+def _after_copy(*_: Any) -> None:
+    global _lent
+    if _lent is not None:
+        (scene, own), _lent = _lent, None
+        ctypes.memmove(_find(scene.render), own, _NAME_SIZE)
+
+
+@bpy.app.handlers.persistent
+def _at_end(*_: Any) -> None:
+    global _last
+    _after_copy()  # where nothing could be rendered it has not been called
+    if _last is not None:
+        scene, _last = _last, None
+        _free_kept_engine(scene)
+
+
+def _free_kept_engine(scene: Any) -> None:
+    """Free what Blender keeps of the last render, which may be another engine's.
+
+    It keeps the engine for persistent data, and would render with it.
+    """
+    if scene.render.use_persistent_data:
+        scene.render.use_persistent_data = False
+        scene.render.use_persistent_data = True
+
+
+def _find(render: Any) -> int:
+    """The address of the engine's name in render settings; raises SceneError."""
+    global _offset
+    base = render.as_pointer()
+    if _offset is None:
+        _offset = _look_for(render)
+    if _offset is None or ctypes.string_at(base + _offset) != render.engine.encode():
+        raise SceneError(
+            f"Blender {bpy.app.version_string} keeps the name of a scene's render "
+            "engine in a way that XRDS does not know; choose the engine XRDS instead"
+        )
+    return base + _offset
+
+
+def _look_for(render: Any) -> int | None:
+    """Try every place that holds the name until the property follows."""
+    # Both lie in the scene; what is between them may be read.
+    base, end = render.as_pointer(), render.id_data.view_settings.as_pointer()
+    if not _NAME_SIZE < end - base < _MOST:
+        return None
+    memory, name = ctypes.string_at(base, end - base), _padded(render.engine)
+    name = name.rstrip(b"\0") + b"\0"
+    at = memory.find(name)
+    while 0 <= at <= len(memory) - _NAME_SIZE:
+        kept = memory[at : at + _NAME_SIZE]
+        ctypes.memmove(base + at, _padded(ENGINE), _NAME_SIZE)
+        follows = render.engine == ENGINE
+        ctypes.memmove(base + at, kept, _NAME_SIZE)
+        if follows:
+            return at
+        at = memory.find(name, at + 1)
+    return None
+
+
+def _padded(name: str) -> bytes:
+    return name.encode().ljust(_NAME_SIZE, b"\0")
+
+
+def register() -> None:
+    """Listen to Blender's renders."""
+    handlers = bpy.app.handlers
+    handlers.render_init.append(_before_copy)
+    handlers.render_pre.insert(0, _after_copy)
+    handlers.render_complete.append(_at_end)
+    handlers.render_cancel.append(_at_end)
+
+
+def unregister() -> None:
+    """Listen no more."""
+    handlers = bpy.app.handlers
+    handlers.render_init.remove(_before_copy)
+    handlers.render_pre.remove(_after_copy)
+    handlers.render_complete.remove(_at_end)
+    handlers.render_cancel.remove(_at_end)
