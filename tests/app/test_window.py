@@ -182,6 +182,52 @@ def test_escape_cancels_at_once(window: Window) -> None:
     window.shot("10_cancelled")
 
 
+@pytest.mark.parametrize("way", ["full_size", "x2"])
+def test_the_picture_grows_and_stays_after_escape(window: Window, way: str) -> None:
+    """Seen at full size while it renders, kept when it is stopped."""
+    small_scene(window, 100_000)
+    window.ask(
+        f"""
+bpy.context.preferences.view.render_display_type = 'AREA'
+render = bpy.data.scenes[0].render
+render.resolution_x, render.resolution_y = 320, 180
+bpy.data.scenes[0].xrds.way = {way!r}
+"""
+    )
+    before = settings(window)
+    press(window, RENDER_IMAGE)
+    window.wait("bpy.app.is_job_running('RENDER')", 60)
+    time.sleep(6.0)
+    window.move(400, 620)
+    time.sleep(2.0)
+    seen = brightness(window.shot(f"10_growing_{way}"))
+    window.key("Escape")
+    assert finished(window)[-1] == "render_cancel"
+    assert settings(window) == before
+    window.settle()
+    window.move(400, 600)
+    window.settle()
+    kept = brightness(window.shot(f"10_kept_{way}"))
+    window.ask(
+        """
+for area in window.screen.areas:
+    if area.type == 'IMAGE_EDITOR':
+        area.type = 'VIEW_3D'
+bpy.data.scenes[0].xrds.way = 'full_size'
+"""
+    )
+    for picture in (seen, kept):  # the cube's sides differ, and fill the middle
+        assert picture.std() > 10.0
+        assert picture.max() > 100.0
+    assert np.abs(seen - kept).mean() < 10.0
+
+
+def brightness(path: Path) -> np.ndarray:
+    """Of the middle of the window, where the image editor shows the picture."""
+    image = pytest.importorskip("PIL.Image")
+    return np.asarray(image.open(path).convert("L"), np.float32)[320:470, 430:620]
+
+
 def test_an_animation_of_three_frames(window: Window) -> None:
     small_scene(window, 4)
     folder = window.program.share / "frames"

@@ -171,6 +171,8 @@ def test_two_view_layers_with_their_passes(
     other.layer_collection.children["hidden"].exclude = True
     for layer in life.view_layers:
         layer.use_pass_z = layer.use_pass_diffuse_direct = True
+        layer.cycles.denoising_store_passes = True
+    life.cycles.use_denoising = True
     channels = multilayer(life, tmp_path / "layers.exr")
     assert {name.split(".")[0] for name in channels} >= {"A", "B"}
     assert np.abs(channels["A.Combined.R"] - channels["B.Combined.R"]).max() > 0.1
@@ -223,6 +225,7 @@ def test_the_compositor_gets_the_picture(life: Any, network: Any, written: Any) 
 
 def test_the_compositor_gets_the_guides(life: Any, network: Any, written: Any) -> None:
     life.render.engine = "XRDS"
+    life.view_layers[0].cycles.denoising_store_passes = True
     tree, end = compositor(life)
     layers = tree.nodes.new("CompositorNodeRLayers")
     assert layers.outputs["Denoising Normal"].enabled
@@ -230,7 +233,8 @@ def test_the_compositor_gets_the_guides(life: Any, network: Any, written: Any) -
     picture = written(life)
     call = network[0].calls[0]
     np.testing.assert_allclose(picture[..., :3], call["albedo"], atol=1e-6)
-    life.xrds.way = "plain"
+    life.view_layers[0].cycles.denoising_store_passes = False
+    life.view_layers[0].update_render_passes()
     sockets = [socket.name for socket in layers.outputs if socket.enabled]
     assert "Denoising Normal" not in sockets
 
@@ -240,6 +244,7 @@ def test_full_guides_bring_radiance_and_keep_data_passes(
 ) -> None:
     life.xrds.guides = "full"
     life.view_layers[0].use_pass_z = True
+    life.view_layers[0].cycles.denoising_store_passes = True
     channels = multilayer(life, tmp_path / "full.exr")
     call = network[0].calls[0]
     assert call["guide_radiance"].shape == (33, 45, 3)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+import re
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -42,6 +45,42 @@ def test_cycles_panels_show_under_xrds() -> None:
     assert all("XRDS" in panel.COMPAT_ENGINES for panel in found)
 
 
+def test_what_asks_for_cycles_by_name_shows_under_xrds() -> None:
+    """Device, feature set and OSL; panoramas' lenses; volumes; subdivision."""
+    scene = bpy.context.scene
+    camera = scene.camera.data
+    camera.type = "PANO"
+    own = draw_as("CYCLES", camera)
+    ours = draw_as("XRDS", camera)
+    assert {"device", "panorama_type"} <= set(own)
+    assert set(ours) >= set(own)
+    assert "device" not in draw_as("BLENDER_WORKBENCH", camera)
+    subdivision = bpy.types.CYCLES_RENDER_PT_subdivision
+    for engine in ("CYCLES", "XRDS"):
+        scene.render.engine = engine
+        scene.cycles.feature_set = "EXPERIMENTAL"
+        context = SimpleNamespace(scene=scene, engine=engine)
+        assert subdivision.poll(context), engine
+
+
+def draw_as(engine: str, camera: object) -> list[str]:
+    """The names of what the render tab's head, the lens and a volume show."""
+    layout, scene = Layout(), bpy.context.scene
+    scene.render.engine = engine
+    context = SimpleNamespace(
+        engine=engine,
+        scene=scene,
+        camera=camera,
+        volume=bpy.data.volumes.new("Volume"),
+        workspace=SimpleNamespace(use_filter_by_owner=False),
+        preferences=bpy.context.preferences,
+    )
+    for name in ("RENDER_PT_context", "DATA_PT_lens", "DATA_PT_volume_render"):
+        panel = getattr(bpy.types, name)
+        panel.draw(SimpleNamespace(layout=layout), context)
+    return layout.names
+
+
 def test_unregister_takes_everything_back() -> None:
     xrds_blender.unregister()
     try:
@@ -62,10 +101,17 @@ class Layout:
 
     def __init__(self) -> None:
         self.drawn: list[str] = []
+        self.names: list[str] = []
 
     def prop(self, owner: object, name: str, text: str = "", **_: object) -> None:
         assert name in owner.bl_rna.properties
         self.drawn.append(text or name)
+        self.names.append(name)
+
+    def separator(self, **_: object) -> None:
+        pass
+
+    operator_context = ""
 
     def prop_enum(
         self, owner: object, name: str, value: str, text: str = "", **_: object
@@ -286,10 +332,7 @@ def test_operator_keeps_the_engine() -> None:
     scene.cycles.samples = 1
     scene.cycles.use_denoising = False  # plain fails as Cycles does without OIDN
     scene.xrds.way = "plain"
-    used: list[str] = []
-    bpy.app.handlers.render_init.append(lambda s, *_: used.append(s.render.engine))
     assert bpy.ops.xrds.render() == {"FINISHED"}
-    assert used == ["XRDS"]
     assert scene.render.engine == "CYCLES"
 
 
@@ -338,8 +381,10 @@ def test_self_test_tells_what_is_wrong(
     assert preferences.XRDS_OT_self_test.lines[0].startswith("Failed: no weights")
 
 
-def test_status_bar_tells_the_stage() -> None:
+def test_status_bar_tells_the_stage(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "_seconds", {})  # measured by no render before
     told: list[str] = []
+    shown: list[float] = []
 
     class Bar:
         class layout:  # noqa: N801  # Blender's name
@@ -347,16 +392,30 @@ def test_status_bar_tells_the_stage() -> None:
             def label(text: str) -> None:
                 told.append(text)
 
-    class Engine:
-        update_stats = staticmethod(lambda *_: None)
-        update_progress = staticmethod(lambda _: None)
-
+    text = ctypes.create_string_buffer(1024)  # as Blender keeps an engine's status
+    engine = running_engine(text, shown)
     status_bar.draw(Bar, None)
-    progress.begin(Engine, progress.GUIDES, 2)
+    progress.begin(engine, progress.LOW, 1)
     status_bar.draw(Bar, None)
+    text[64:82] = b"Mem | Sample 12/64"
+    time.sleep(0.05)
+    status_bar.draw(Bar, None)
+    progress.begin(engine, progress.NETWORK, 3)
+    for done in (0.25, 0.75):
+        time.sleep(0.05)
+        progress.reporter(engine)(done)
+        status_bar.draw(Bar, None)
     progress.end()
     status_bar.draw(Bar, None)
-    assert told == ["XRDS 2/3: Guides"]
+    assert told[0] == "XRDS 1/3: Low resolution"
+    assert re.fullmatch(r"XRDS 1/3: Low resolution, \d:\d\d left", told[1])
+    assert re.fullmatch(r"XRDS 3/3: Network, 0:00 left", told[3])
+    assert len(told) == 4
+    drawn = [shown[i] for i in (0, 1, 3, 5)]  # the network itself reports in between
+    assert drawn == sorted(drawn)
+    assert drawn[0] == 0.0
+    assert 0.0 < drawn[1] < 0.5
+    assert drawn[-1] < 1.0
 
 
 def test_panels_use_their_own_words_for_guides() -> None:
@@ -387,18 +446,26 @@ def test_presets_hold_all_settings() -> None:
     assert held == {f"scene.xrds.{name}" for name in names}
 
 
-def test_the_status_bar_tells_the_frames_left() -> None:
-    class Engine:
-        def update_stats(self, *_: str) -> None: ...
+def running_engine(text: object, shown: list[float]) -> SimpleNamespace:
+    """What the progress of a render asks of an engine; `text` holds its status."""
+    return SimpleNamespace(
+        update_stats=lambda *_: None,
+        update_progress=shown.append,
+        get_result=lambda: SimpleNamespace(resolution_x=1000, resolution_y=1000),
+        as_pointer=lambda: ctypes.addressof(text),
+        test_break=lambda: False,
+    )
 
-        def update_progress(self, _: float) -> None: ...
 
+def test_the_status_bar_tells_the_frames_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress, "_seconds", {})
+    engine = running_engine(ctypes.create_string_buffer(1024), [])
     progress.begin_frame(12, 36, 754.0)
-    progress.begin(Engine(), "Samples", 1, 2)
+    progress.begin(engine, "Samples", 1, 2)
     assert progress.current() == "Frame 12 (36 left, about 13 min). XRDS 1/2: Samples"
     progress.end()
     assert progress.current() is None
     progress.begin_frame(48, 0)
-    progress.begin(Engine(), "Samples", 1, 2)
+    progress.begin(engine, "Samples", 1, 2)
     assert progress.current() == "Frame 48 (the last one). XRDS 1/2: Samples"
     progress.end()

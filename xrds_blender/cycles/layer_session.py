@@ -13,7 +13,7 @@ from typing import Any, Self
 
 from xrds_core.arrays import Array
 
-from . import session
+from . import live, session, spare_passes
 from .borrowed import Borrowed, PipelineSettings
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
 from .pass_names import COMBINED, DEPTH, GUIDE_PASSES, NOISY, is_light
@@ -74,7 +74,7 @@ class LayerSession:
         session.prepare(self._engine, self._depsgraph)
         self._scene = self._depsgraph.scene_eval
         for name, letters in self._wanted_passes():
-            session.add_pass(self._engine, self._layer_name, name, letters)
+            spare_passes.add(self._engine, self._layer_name, name, letters)
         return self
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
@@ -144,6 +144,7 @@ class LayerSession:
             for camera in self._cameras():
                 widen(borrowed, camera, self.frame, grid.scale)
         size = self.frame.low_size(grid.scale)
+        live.samples(grid.scale)
         return self._run(size, grid.rendered(self._size), exact=exact)
 
     def _run(

@@ -7,7 +7,7 @@ from typing import Any
 from xrds_core.temporal.samples import Portion
 
 from ..planning.denoiser import Denoiser
-from . import session
+from . import session, spare_passes
 from .borrowed import Borrowed
 from .clock import StageClock
 from .pass_names import GUIDE_PASSES
@@ -35,7 +35,7 @@ def render_once(
     scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
     if noisy:
         for name, letters, _ in GUIDE_PASSES:
-            session.add_pass(engine, layer.name, name, letters)
+            spare_passes.add(engine, layer.name, name, letters)
     with Borrowed() as borrowed:
         if portion is None:
             set_sampling(borrowed, scene, samples, seed)

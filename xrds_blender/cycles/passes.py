@@ -16,7 +16,7 @@ from xrds_core.temporal.samples import Portion
 
 from ..planning.denoiser import Denoiser
 from ..planning.plan import GuideRender
-from . import session
+from . import live, session
 from .borrowed import Borrowed
 from .guide_settings import guide_settings
 from .layer_session import LayerSession
@@ -111,6 +111,11 @@ class CyclesPasses(LayerSession):
         seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
         return {view: self._read_low(view, grid, seconds) for view in self.views}
 
+    def stopped_samples(self, scale: int) -> dict[str, LowSamples]:
+        """What `low_samples` has left in the result when the user stopped it."""
+        grid, seconds = self._grid(scale), dict.fromkeys(("sync", "denoise"), 0.0)
+        return {view: self._read_low(view, grid, seconds) for view in self.views}
+
     def border_exposure(self) -> float | None:
         """The exposure of the whole frame, where a border cuts a part out of it.
 
@@ -167,6 +172,7 @@ class CyclesPasses(LayerSession):
         with Borrowed() as borrowed, settings:
             self._set_samples(borrowed, samples, seed, portion)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
+            live.samples()
             clock = self._run((self.width, self.height), self.region, exact=full)
         seconds = {"sync": clock.sync, "guides": clock.render}
         return {

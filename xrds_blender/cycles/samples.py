@@ -11,7 +11,7 @@ import numpy as np
 from xrds_core.arrays import Array
 from xrds_core.temporal.samples import Portion
 
-from . import session
+from . import session, spare_passes
 from .once import render_once
 from .pass_names import ALBEDO, COMBINED, DEPTH, FIRST_HIT, MOTION, NOISY, NORMAL
 
@@ -57,19 +57,25 @@ def sample_layer(
     """
     layer_name = depsgraph.view_layer_eval.name
     for name, letters in geometry:
-        session.add_pass(engine, layer_name, name, letters)
+        spare_passes.add(engine, layer_name, name, letters)
     clock = render_once(
         engine, depsgraph, samples=samples, seed=seed, noisy=True, portion=portion
     )
+    return samples_in(engine, layer_name, {name for name, _ in geometry}), clock
+
+
+def samples_in(
+    engine: Any, layer_name: str, wanted: Collection[str] = ()
+) -> dict[str, Samples]:
+    """The samples that the result holds, by view; `wanted` as `read_samples` has it."""
     result = engine.get_result()
     views = [view.name for view in result.views] or [""]
     layer, size = result.layers[layer_name], (result.resolution_x, result.resolution_y)
-    wanted = {name for name, _ in geometry}
 
     def reader(view: str) -> Reader:
         return lambda name: session.read_pass(layer, name, view, size)
 
-    return {view: read_samples(reader(view), wanted) for view in views}, clock
+    return {view: read_samples(reader(view), wanted) for view in views}
 
 
 def read_samples(read: Reader, wanted: Collection[str]) -> Samples:

@@ -9,12 +9,15 @@ sync and its BVH then cost next to nothing.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import Cancelled
 
+from . import spare_passes
 from .clock import StageClock
-from .pass_names import COMBINED
+from .pass_names import COMBINED, NOISY
 
 if TYPE_CHECKING:
     # numpy is imported where pixels are: Blender starts faster without it.
@@ -85,10 +88,40 @@ def run(engine: Any, depsgraph: Any, *, exact: bool = True) -> StageClock:
             engine.most_samples = 0
         engine.most_samples = max(samples, engine.most_samples)
         cycles.reset(engine, bpy.data, depsgraph)
-        cycles.render(engine, depsgraph)
-        # With tiles the pixels lie in a file until this call.
-        cycles.render_frame_finish(engine)
+        with _noise_in_sight(engine, depsgraph):
+            cycles.render(engine, depsgraph)
+            # With tiles the pixels lie in a file until this call.
+            cycles.render_frame_finish(engine)
     return clock
+
+
+def _is_watched() -> bool:
+    """Whether there is a window to show pictures in."""
+    import bpy
+
+    return not bpy.app.background
+
+
+@contextmanager
+def _noise_in_sight(engine: Any, depsgraph: Any) -> Iterator[None]:
+    """Let the samples be seen in a window while they are taken.
+
+    Where nothing is denoised, but the result has a pass for the noisy picture, Cycles
+    puts the samples there and shows the other one, which stays black.
+    """
+    if not _is_watched() or depsgraph.scene_eval.cycles.use_denoising:
+        yield
+        return
+    name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
+    with spare_passes.aside(engine, name, NOISY) as is_aside:
+        yield
+    if is_aside:
+        result = engine.get_result()
+        layer, size = result.layers[name], (result.resolution_x, result.resolution_y)
+        for view in [view.name for view in result.views] or [""]:
+            picture = read_pass(layer, COMBINED, view, size)
+            if picture is not None:
+                write_pass(layer, NOISY, view, picture)
 
 
 def _samples(depsgraph: Any) -> int:
@@ -134,12 +167,6 @@ def free(engine: Any) -> None:
     if getattr(engine, "session", None):
         functions().free(engine)  # takes the attribute away
     engine.session = None
-
-
-def add_pass(engine: Any, layer_name: str, name: str, letters: str) -> None:
-    """Add a pass to the result, where the file does not ask for it."""
-    if name not in engine.get_result().layers[layer_name].passes:
-        engine.add_pass(name, len(letters), letters, layer=layer_name)
 
 
 def allocate(engine: Any) -> None:

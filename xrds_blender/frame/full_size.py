@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..cycles import session
+from xrds_core.errors import Cancelled
+
+from ..cycles import live, session
 from ..cycles.samples import sample_layer
 from ..planning.plan import Decision
 from . import progress
 from .denoisers import load_denoiser
 from .job import Picture, RenderJob
 from .memory import peak_memory
+from .stopping import keep_samples
 
 if TYPE_CHECKING:
     from xrds_core.denoising import Denoised
@@ -28,14 +31,21 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
     denoiser = load_denoiser(job)
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     progress.begin(engine, progress.SAMPLES, 1, 2)
-    noisy, clock = sample_layer(engine, depsgraph, samples=job.samples, seed=job.seed)
-    progress.begin(engine, progress.DENOISE, 2, 2)
-    started = time.perf_counter()
-    report = progress.reporter(engine)
-    denoised = {
-        view: denoiser(each.picture, each.albedo, each.normal, progress=report)
-        for view, each in noisy.items()
-    }
+    try:
+        noisy, clock = sample_layer(
+            engine, depsgraph, samples=job.samples, seed=job.seed
+        )
+        live.show(next(iter(noisy.values())).picture)
+        progress.begin(engine, progress.DENOISE, 2, 2)
+        started = time.perf_counter()
+        report = progress.reporter(engine)
+        denoised = {
+            view: denoiser(each.picture, each.albedo, each.normal, progress=report)
+            for view, each in noisy.items()
+        }
+    except Cancelled:
+        keep_samples(engine, layer_name, job)
+        raise
     finished = time.perf_counter()
     pictures = {view: each.radiance for view, each in denoised.items()}
     session.write_combined(engine, layer_name, pictures)

@@ -45,6 +45,7 @@ class RenderJob:
     them until they are `guide_limit`.
     `denoiser` is a mode of Cycles' denoiser or its name, None the scene's own;
     `denoise` is the quality of ours, one of QUALITIES.
+    `stop_keeps` leaves what there is in the result when the user stops the render.
     `temporal_radius` is how many frames before and after lend their samples, in a shot.
     With `time_budget` (seconds a frame) or `quality` (PSNR in dB) scale, samples,
     guides, network and denoiser are chosen anew for the scene.
@@ -71,6 +72,7 @@ class RenderJob:
     time_budget: float | None = None
     quality: float | None = None
     threads: int | None = None
+    stop_keeps: bool = False
 
     def __post_init__(self) -> None:
         if self.scale not in SCALES:

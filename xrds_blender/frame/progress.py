@@ -1,15 +1,18 @@
-"""What a running render is doing now.
+"""What a running render is doing now, how far it has come, and how long it will take.
 
-Blender asks an engine for nothing like this, so it is kept here for the status bar to
-show.
+Cycles tells Blender how far each of its renders is, so Blender's own bar would run
+several times. The status bar therefore shows what is worked out here, from the seconds
+of the stages so far and those that each kind of stage took before.
 """
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
-from ..cycles import session
+from ..cycles import session, status
 
 LOW, GUIDES, NETWORK = "Low resolution", "Guides", "Network"
 SAMPLES, DENOISE = "Samples", "Denoising"
@@ -23,17 +26,52 @@ STAGES = (
     "network",
     "write",
 )
+_KINDS = (LOW, GUIDES, NETWORK)
+_LEAST = 0.02  # of a stage, before its seconds can be told from what is done
+_LARGE = 0.1  # megapixels; of less, seconds do not tell what more would take
+# Seconds per megapixel until a stage has been measured: two cores of a desktop.
+_seconds = {DENOISE: 2.5, NETWORK: 1.5}
 
-_current: str | None = None
+
+@dataclass
+class _Run:
+    """One frame's render; times are readings of perf_counter."""
+
+    engine: Any
+    megapixels: float
+    start: float
+    stage: str = ""
+    number: int = 0
+    of: int = 0
+    since: float = 0.0
+    reported: float = 0.0
+    done: set[str] = field(default_factory=set)
+
+    @property
+    def kind(self) -> str:
+        return self.stage.partition(" of frame")[0]
+
+
+_run: _Run | None = None
 _frames_left: str = ""
 
 
 def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
-    """Note that the stage of this number has begun."""
-    global _current
-    _current = f"XRDS {number}/{of}: {stage}"
+    """Note that the stage of this number has begun.
+
+    At scale 1 the last one is the denoiser, and all before are samples.
+    """
+    global _run
+    now = time.perf_counter()
+    if _run is None:
+        result = engine.get_result()
+        pixels = result.resolution_x * result.resolution_y
+        _run = _Run(engine, max(pixels, 1) / 1e6, now)
+    else:
+        _learn(_run, now)
+    _run.engine, _run.stage, _run.number, _run.of = engine, stage, number, of
+    _run.since, _run.reported = now, 0.0
     engine.update_stats("XRDS", stage)
-    engine.update_progress(0.0)
 
 
 def begin_frame(number: int, left: int, seconds: float | None = None) -> None:
@@ -56,9 +94,11 @@ def _time(seconds: float) -> str:
 
 
 def reporter(engine: Any) -> Callable[[float], bool]:
-    """Shows how far a stage is, from 0 to 1; False once the user has stopped it."""
+    """Notes how far a stage is, from 0 to 1; False once the user has stopped it."""
 
     def report(done: float) -> bool:
+        if _run is not None:
+            _run.reported = done
         engine.update_progress(done)
         return not session.is_stopped(engine)
 
@@ -67,10 +107,70 @@ def reporter(engine: Any) -> Callable[[float], bool]:
 
 def end() -> None:
     """Note that the render is over, however it ended."""
-    global _current, _frames_left
-    _current, _frames_left = None, ""
+    global _run, _frames_left
+    if _run is not None and _run.reported >= 1.0:
+        _learn(_run, time.perf_counter())
+    _run, _frames_left = None, ""
 
 
 def current() -> str | None:
-    """What is being done, None between renders."""
-    return None if _current is None else _frames_left + _current
+    """What is being done and how long it will take, None between renders."""
+    run = _run
+    if run is None:
+        return None
+    left = _left(run)
+    told = "" if left is None else f", {_clock(left)} left"
+    return f"{_frames_left}XRDS {run.number}/{run.of}: {run.stage}{told}"
+
+
+def show() -> None:
+    """Set Blender's progress bar to the part of the whole render that is done.
+
+    For the main thread, while the engine renders.
+    """
+    run = _run
+    if run is None:
+        return
+    spent, left = time.perf_counter() - run.start, _left(run)
+    part = 0.0 if left is None else spent / max(spent + left, 1e-6)
+    run.engine.update_progress(part)
+
+
+def _learn(run: _Run, now: float) -> None:
+    """Keep what a stage has taken, for the next ones of its kind."""
+    run.done.add(run.kind)
+    if run.megapixels > _LARGE:
+        _seconds[run.kind] = (now - run.since) / run.megapixels
+
+
+def _left(run: _Run) -> float | None:
+    """Seconds until the end; None where not even the first samples are there."""
+    spent = time.perf_counter() - run.since
+    part = run.reported or status.fraction(run.engine) or 0.0
+    if part > _LEAST:
+        whole = spent / part
+    elif run.kind in _seconds:
+        whole = max(_seconds[run.kind] * run.megapixels, spent)
+    else:
+        return None
+    later = [_expected(run, kind, whole) for kind in _later(run)]
+    return whole - spent + sum(later)
+
+
+def _later(run: _Run) -> list[str]:
+    """The kinds of the stages that are still to come."""
+    if run.kind in (SAMPLES, DENOISE):
+        return ([SAMPLES] * (run.of - 1) + [DENOISE])[run.number :]
+    return [k for k in _KINDS if k not in run.done and k != run.kind]
+
+
+def _expected(run: _Run, kind: str, this: float) -> float:
+    """Seconds of a stage to come; where none was measured as many as this one takes."""
+    known = _seconds.get(kind)
+    return this if known is None else known * run.megapixels
+
+
+def _clock(seconds: float) -> str:
+    """Minutes and seconds, as 1:05."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02}"

@@ -10,9 +10,10 @@ from typing import Any, TypeVar
 
 from xrds_core.errors import Cancelled, SceneError, XRDSError
 
+from ..cycles import live, spare_passes
 from ..cycles.borrowed import Borrowed
 from ..cycles.passes import CyclesPasses
-from .job import ENGINE, Picture, RenderJob
+from .job import Picture, RenderJob
 from .layer import render_layer
 
 T = TypeVar("T")
@@ -55,7 +56,18 @@ def run_job(
 
 
 def render_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
-    """Do the work that waits for the engine, or what Blender asks of it: `asked`."""
+    """Do the work that waits for the engine, or what Blender asks of it: `asked`.
+
+    The result then has no passes but those that the file asks for.
+    """
+    live.clear()
+    try:
+        _work_in(engine, depsgraph, asked)
+    finally:
+        spare_passes.drop(engine)
+
+
+def _work_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
     if _task is not None:
         try:
             _task.results.append(_task.work(engine, depsgraph))
@@ -88,6 +100,8 @@ def call_engine(
     """
     import bpy
 
+    from . import engine_loan
+
     global _task
     if _task is not None:
         raise SceneError("a render is already running; wait until it has finished")
@@ -97,15 +111,15 @@ def call_engine(
     task = _task = _Task(work)
     try:
         with Borrowed() as borrowed:
-            borrowed.set(
-                scene.render, engine=ENGINE, use_compositing=False, use_sequencer=False
-            )
+            borrowed.set(scene.render, use_compositing=False, use_sequencer=False)
+            engine_loan.lend(scene)
             bpy.ops.render.render(scene=scene.name, layer=name)
     except RuntimeError as error:
         message = str(error).removeprefix("Error: ").strip()
         task.error = task.error or SceneError(message)
     finally:
         _task = None
+        engine_loan.withdraw()
     if task.error is not None:
         raise task.error
     if not task.results:

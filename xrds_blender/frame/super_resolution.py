@@ -9,19 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.errors import Cancelled
 
-from ..cycles import session
+from ..cycles import live, session
 from ..cycles.pass_names import COMBINED
 from ..cycles.passes import CyclesPasses
 from ..cycles.rendered import Beauty, Guides
 from ..planning import plan
 from . import progress
 from .denoisers import in_process
-from .enlarging import bilinear, enlarge, enlarged_lights
+from .enlarging import enlarge, enlarged_lights
 from .facts import find_facts
 from .guides import GuideSource
 from .job import NetworkFailed, Picture, RenderJob
 from .memory import peak_memory
+from .stopping import enlarged, keep_beauties, stopped_beauties
 
 if TYPE_CHECKING:
     from xrds_core import Upscaler
@@ -60,9 +62,13 @@ def render_enlarged(
     layer = depsgraph.view_layer_eval.name
     enlargement = _Enlargement(engine, layer, job, upscaler, inputs)
     seconds = _seconds(inputs)
-    with _Timed(seconds, "network"):
-        pictures = enlargement.pictures()
-    session.stop_if_cancelled(engine)
+    try:
+        with _Timed(seconds, "network"):
+            pictures = enlargement.pictures()
+        session.stop_if_cancelled(engine)
+    except Cancelled:
+        keep_beauties(engine, layer, job, inputs.beauties)
+        raise
     with _Timed(seconds, "write"):
         enlargement.write(pictures)
     beauty, guides = inputs.first
@@ -85,13 +91,14 @@ def render_inputs(engine: Any, depsgraph: Any, job: RenderJob) -> Inputs:
 
     Raises Cancelled when the user stops it.
     """
+    layer = depsgraph.view_layer_eval.name
     with CyclesPasses(engine, depsgraph, noisy=True) as passes:
         facts = find_facts(depsgraph, job)
         chosen = job.plan(facts)
         if not chosen.motion_blur:
             passes.hold_still()
         source = GuideSource(passes, depsgraph, job, chosen, facts, engine.report)
-        renders = _Renders(engine, job, chosen, passes, source)
+        renders = _Renders(engine, layer, job, chosen, passes, source)
         render = renders.guides_first if job.guides == "full" else renders.light_first
         beauties, guides, exposure = render()
     first = passes.views[0]
@@ -110,6 +117,7 @@ class _Renders:
     """Both Cycles renders of one layer, in either order."""
 
     engine: Any
+    layer: str
     job: RenderJob
     chosen: plan.Plan
     passes: CyclesPasses
@@ -119,7 +127,11 @@ class _Renders:
         progress.begin(self.engine, progress.LOW, 1)
         beauties, exposure = self.light()
         progress.begin(self.engine, progress.GUIDES, 2)
-        return beauties, self.source.guides(beauties), exposure
+        try:
+            return beauties, self.source.guides(beauties), exposure
+        except Cancelled:
+            keep_beauties(self.engine, self.layer, self.job, beauties)
+            raise
 
     def guides_first(self) -> _Rendered:
         """Fewer samples first: noise that matters, and one sync all the same."""
@@ -133,14 +145,22 @@ class _Renders:
     def light(self) -> tuple[dict[str, Beauty], float | None]:
         """The low-resolution pictures by view, and the exposure if it is known."""
         job = self.job
-        beauties = self.passes.beauties(
-            job.scale,
-            job.samples,
-            denoise=self.chosen.denoise,
-            seed=job.seed,
-            denoiser=job.denoiser,
-            in_process=in_process(job),
-        )
+        try:
+            beauties = self.passes.beauties(
+                job.scale,
+                job.samples,
+                denoise=self.chosen.denoise,
+                seed=job.seed,
+                denoiser=job.denoiser,
+                in_process=in_process(job),
+            )
+        except Cancelled:
+            if job.stop_keeps:
+                beauties = stopped_beauties(self.passes, job)
+                keep_beauties(self.engine, self.layer, job, beauties)
+            raise
+        first = next(iter(beauties.values()))
+        live.show(np.dstack((first.radiance, first.alpha)), job.scale, first.offset)
         return beauties, job.exposure or self.passes.border_exposure()
 
 
@@ -182,7 +202,8 @@ class _Enlargement:
         try:
             return {view: self.upscaled(view) for view in self.inputs.beauties}
         except NetworkFailed:
-            self.write(self.bilinear_pictures())
+            size = next(iter(self.inputs.guides.values())).alpha.shape
+            self.write(enlarged(self.inputs.beauties, self.job.scale, size))
             raise
 
     def upscaled(self, view: str) -> Array:
@@ -194,26 +215,8 @@ class _Enlargement:
             self.upscaler,
             exposure=self.inputs.exposure,
             skip_idle=self.inputs.skip_idle,
-            progress=self.report,
+            progress=progress.reporter(self.engine),
         )
-
-    def report(self, done: float) -> bool:
-        """Show the fraction done; False once the user has stopped the render."""
-        self.engine.update_stats("XRDS", f"Network {done:.0%}")
-        self.engine.update_progress(done)
-        return not session.is_stopped(self.engine)
-
-    def bilinear_pictures(self) -> dict[str, Array]:
-        """By view, the region's radiance and alpha without a network, (H, W, 4)."""
-        return {
-            view: bilinear(
-                np.dstack((low.radiance, low.alpha)),
-                self.job.scale,
-                low.offset,
-                self.inputs.guides[view].alpha.shape,
-            )
-            for view, low in self.inputs.beauties.items()
-        }
 
     def write(self, pictures: dict[str, Array]) -> None:
         """Put the pictures and the enlarged light passes into the engine's result."""

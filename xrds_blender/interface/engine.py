@@ -9,7 +9,7 @@ import bpy
 
 from ..cycles import session
 from ..frame.job import ENGINE
-from . import write_lock
+from . import support, write_lock
 
 
 class XRDSRender(bpy.types.RenderEngine):
@@ -29,6 +29,7 @@ class XRDSRender(bpy.types.RenderEngine):
         super().__init__(*args, **kwargs)
         self.session = None
         self.most_samples = 0
+        self.spare_passes: set[tuple[str, str]] = set()
 
     def __del__(self) -> None:
         # Blender may have taken its half of the object away already.
@@ -38,16 +39,7 @@ class XRDSRender(bpy.types.RenderEngine):
     # What renders is imported when Blender first asks for it: Blender starts faster.
 
     def update_render_passes(self, scene: Any, layer: Any) -> None:
-        from ..cycles.pass_names import GUIDE_PASSES
-        from .properties import job_of
-
-        cycles = session.functions()
-        cycles.register_passes(self, scene, layer)
-        known = {name for name, *_ in cycles.list_render_passes(scene, layer)}
-        plain = job_of(scene.xrds).plain
-        for name, letters, kind in GUIDE_PASSES:
-            if not plain and name not in known:
-                self.register_pass(scene, layer, name, len(letters), letters, kind)
+        session.functions().register_passes(self, scene, layer)
 
     def update(self, data: Any, depsgraph: Any) -> None:
         # A final render makes its sessions itself, with their own sizes.
@@ -67,18 +59,30 @@ class XRDSRender(bpy.types.RenderEngine):
                 render_in(self, depsgraph, lambda: self._render_asked(depsgraph))
 
     def _render_asked(self, depsgraph: Any) -> None:
-        """Render what the scene's settings describe."""
+        """Render what the scene's settings describe, and tell what was done."""
+        from ..frame import record
         from ..shot.animation import render_frame
         from .properties import job_of
 
-        render_frame(self, depsgraph, job_of(depsgraph.scene_eval.xrds))
+        scene, job = depsgraph.scene_eval, job_of(depsgraph.scene_eval.xrds)
+        # Cycles may free the scene as it renders.
+        frame, samples = scene.frame_current, scene.cycles.samples
+        layer, notes = depsgraph.view_layer_eval.name, list(support.notes(scene))
+        picture = render_frame(self, depsgraph, job)
+        told = record.fields(picture, job, samples)
+        record.stamp(self, told, layer)
+        self.report({"INFO"}, record.line(told, frame, layer))
+        for note in notes if (picture.job or job).is_enlarged else ():
+            self.report({"INFO"}, f"XRDS: {note}")
 
     def render_frame_finish(self) -> None:
         if self.session:
             session.functions().render_frame_finish(self)
 
     def draw(self, context: Any, depsgraph: Any) -> None:
-        session.functions().draw(self, depsgraph, context.space_data)
+        from . import live_picture
+
+        live_picture.draw(self, depsgraph, context.space_data)
 
     def bake(
         self,

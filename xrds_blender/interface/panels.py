@@ -241,7 +241,7 @@ def register() -> None:
     for panel in CLASSES:
         bpy.utils.register_class(panel)
     cycles_panels.register()
-    bpy.types.STATUSBAR_HT_header.append(status_bar.draw)
+    bpy.types.STATUSBAR_HT_header.prepend(status_bar.draw)
     for event, handler in _handlers():
         event.append(handler)
 

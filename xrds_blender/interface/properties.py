@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
@@ -109,12 +107,6 @@ _GUIDES = [
 ]
 
 
-def _ask_for_passes(settings: bpy.types.PropertyGroup, _: Any) -> None:
-    """Plain renders have no guides: the Render Layers nodes lose their sockets."""
-    for layer in settings.id_data.view_layers:
-        layer.update_render_passes()
-
-
 class XRDSSettings(bpy.types.PropertyGroup):
     """How the engine XRDS renders a scene."""
 
@@ -125,7 +117,6 @@ class XRDSSettings(bpy.types.PropertyGroup):
         default=Way.AUTOMATIC,
         description="How XRDS makes the picture: this decides how long a frame takes "
         "and how good it gets",
-        update=_ask_for_passes,
     )
     preset: EnumProperty(
         name="Network",
@@ -223,6 +214,7 @@ def job_of(settings: XRDSSettings) -> RenderJob:
         memory_limit=here.memory_limit,
         weights=here.weights,
         threads=here.threads,
+        stop_keeps=here.stop_keeps,
     )
     return ways.on_the_way(
         job, Way(settings.way), settings.id_data, settings.temporal_radius

@@ -8,7 +8,16 @@ from typing import Any
 import bpy
 
 from ..cycles import session
-from . import engine, operators, panels, preferences, properties, write_lock
+from ..frame import engine_loan
+from . import (
+    engine,
+    live_picture,
+    operators,
+    panels,
+    preferences,
+    properties,
+    write_lock,
+)
 
 _ADD_ON = __name__.partition(".")[0]
 _registered = False
@@ -24,7 +33,9 @@ def register(package: str = "xrds_blender") -> None:
     bpy.utils.register_class(properties.XRDSSettings)
     bpy.types.Scene.xrds = bpy.props.PointerProperty(type=properties.XRDSSettings)
     bpy.utils.register_class(engine.XRDSRender)
+    engine_loan.register()  # before those who ask for a scene's engine
     write_lock.register()
+    live_picture.register()
     preferences.register(package)
     operators.register()
     panels.register()
@@ -41,7 +52,9 @@ def unregister() -> None:
     panels.unregister()
     operators.unregister()
     preferences.unregister()
+    live_picture.unregister()
     write_lock.unregister()
+    engine_loan.unregister()
     bpy.utils.unregister_class(engine.XRDSRender)
     del bpy.types.Scene.xrds
     bpy.utils.unregister_class(properties.XRDSSettings)

@@ -1,4 +1,4 @@
-"""The running stage in Blender's status bar.
+"""The running stage and the progress of all stages in Blender's status bar.
 
 Cycles overwrites the texts that an engine gives Blender; the status bar is our own.
 """
@@ -11,7 +11,8 @@ from ..frame import progress
 
 
 def draw(self: Any, context: Any) -> None:
-    """Draw the stage into the status bar."""
+    """Draw the stage into the status bar, before Blender draws its progress bar."""
     stage = progress.current()
     if stage is not None:
+        progress.show()
         self.layout.label(text=stage)

@@ -1,0 +1,98 @@
+"""What made a frame: in the log, and in the files."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+bpy = pytest.importorskip("bpy")
+
+from xrds_blender.frame import record
+from xrds_blender.frame.job import Picture, RenderJob
+from xrds_blender.planning.plan import Decision
+
+NAMES = ("version", "way", "scale", "preset", "samples", "device", "seconds")
+
+
+@pytest.fixture
+def metadata(life: Any, tmp_path: Path) -> Any:
+    """Text and float fields that Blender writes into a PNG."""
+
+    def render(way: str) -> dict[str, str]:
+        life.render.engine, life.xrds.way = "XRDS", way
+        life.render.image_settings.file_format = "PNG"
+        life.render.filepath = str(tmp_path / "frame.png")
+        bpy.ops.render.render(write_still=True)
+        return texts(Path(life.render.filepath).read_bytes())
+
+    return render
+
+
+def texts(png: bytes) -> dict[str, str]:
+    found, at = {}, 8
+    while at < len(png):
+        size, kind = struct.unpack_from(">I4s", png, at)
+        if kind == b"tEXt":
+            name, _, text = png[at + 8 : at + 8 + size].partition(b"\0")
+            found[name.decode()] = text.decode()
+        at += size + 12
+    return found
+
+
+@pytest.mark.parametrize(
+    ("way", "told"),
+    [
+        ("x2", {"way": "super-resolution", "scale": "2", "preset": "fast"}),
+        ("full_size", {"way": "full size", "scale": "1", "preset": "high"}),
+    ],
+)
+def test_blenders_files_tell_what_made_them(
+    metadata: Any, network: Any, way: str, told: dict[str, str]
+) -> None:
+    found = metadata(way)
+    fields = {
+        name.rpartition(".")[2]: text
+        for name, text in found.items()
+        if name.startswith("xrds.ViewLayer.")
+    }
+    assert set(NAMES) | {"left out"} <= set(fields)
+    assert fields["samples"] == "2"
+    assert float(fields["seconds"]) >= 0.0
+    assert {name: fields[name] for name in told} == told
+
+
+def test_the_log_has_one_line_a_frame_and_few_others(
+    life: Any, network: Any, capfd: pytest.CaptureFixture[str], written: Any
+) -> None:
+    life.view_layers[0].use_pass_diffuse_direct = True
+    written(life)
+    lines = [
+        line
+        for line in "".join(capfd.readouterr()).splitlines()
+        if "XRDS" in line and "Saved" not in line
+    ]
+    (line,) = [line for line in lines if "XRDS " in line and ", frame 1," in line]
+    for word in ("super-resolution", "samples 2", "scale 2"):
+        assert word in line
+    assert len(lines) <= 6
+    assert any("Light passes are those of the small" in each for each in lines)
+
+
+def test_what_was_left_out_is_named() -> None:
+    plan = (
+        Decision("guide samples", "2", ""),
+        Decision("motion blur", "skipped", ""),
+        Decision("guide lights", "all", ""),
+        Decision("guide cache", "used 4 samples", ""),
+    )
+    picture = Picture(None, None, plan=plan, device="cpu", seconds={"total": 1.26})
+    told = record.fields(picture, RenderJob(scale=4), 16)
+    assert told["left out"] == "motion blur, guides, kept from before"
+    assert told["guide samples"] == "2"
+    assert told["seconds"] == "1.3"
+    line = record.line(told, 7, "Main")
+    assert line.startswith(f"XRDS {told['version']}, frame 7, Main: super-resolution, ")
+    assert record.metadata(told, "Main")["xrds.Main.scale"] == "4"

@@ -1,0 +1,87 @@
+"""What made a frame: a line for the log, and the same as metadata of its files."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from xrds_core.version import package_version
+
+from ..planning.plan import Decision
+from .job import Picture, RenderJob
+
+PREFIX = "xrds"
+# What the plan calls a decision and its value, and what was left out then.
+_LEFT_OUT = {
+    ("denoise", "skipped"): "denoising",
+    ("guides", "none"): "guides",
+    ("guide bounces", "0"): "guide bounces",
+    ("guide lights", "none sampled"): "light in guides",
+    ("guide lights", "lamps alone"): "light in guides but lamps",
+    ("motion blur", "skipped"): "motion blur",
+    ("network", "without empty parts"): "network on empty parts",
+}
+
+
+def fields(picture: Picture, job: RenderJob, samples: int) -> dict[str, str]:
+    """Name and value of what made a picture; `samples` are the scene's own."""
+    job = picture.job or job
+    told = {"version": package_version(), "way": _way(job), "scale": str(_scale(job))}
+    if job.is_enlarged:
+        told["preset"] = job.preset
+    elif not job.plain:
+        told["preset"] = job.denoise
+    told["samples"] = str(job.samples or samples)
+    if job.is_enlarged:
+        told["guide samples"] = _decided(picture.plan, "guide samples") or "0"
+    if picture.temporal is not None:
+        frames = picture.temporal.frames
+        told["frames"] = f"{frames[0]} to {frames[-1]}"
+    if picture.device:
+        told["device"] = picture.device
+    told["seconds"] = f"{picture.seconds.get('total', 0.0):.1f}"
+    told["left out"] = ", ".join(_left_out(picture.plan)) or "nothing"
+    return told
+
+
+def line(told: dict[str, str], frame: int, layer: str) -> str:
+    """The fields as one line of a log."""
+    rest = [f"{name} {value}" for name, value in told.items() if name not in _NAMELESS]
+    head = f"XRDS {told['version']}, frame {frame}, {layer}: {told['way']}"
+    return ", ".join([head, *rest])
+
+
+_NAMELESS = ("version", "way")
+
+
+def metadata(told: dict[str, str], layer: str) -> dict[str, str]:
+    """The fields by the names that they have in files, as Cycles names its own."""
+    return {f"{PREFIX}.{layer}.{name}": value for name, value in told.items()}
+
+
+def stamp(engine: Any, told: dict[str, str], layer: str) -> None:
+    """Let Blender write the fields into every file that it makes of the result."""
+    result = engine.get_result()
+    for name, value in metadata(told, layer).items():
+        result.stamp_data_add_field(name, value)
+
+
+def _way(job: RenderJob) -> str:
+    if job.plain:
+        return "plain Cycles"
+    return "super-resolution" if job.is_enlarged else "full size"
+
+
+def _scale(job: RenderJob) -> int:
+    return job.scale if job.is_enlarged else 1
+
+
+def _decided(plan: tuple[Decision, ...], name: str) -> str | None:
+    return next((each.value for each in plan if each.decision == name), None)
+
+
+def _left_out(plan: tuple[Decision, ...]) -> list[str]:
+    found = [_LEFT_OUT.get((each.decision, each.value)) for each in plan]
+    kept = _decided(plan, "guide cache") or ""
+    if kept.startswith("used"):
+        found.append("guides, kept from before")
+    return [words for words in found if words]

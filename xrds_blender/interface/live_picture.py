@@ -1,0 +1,90 @@
+"""Draws the live picture into the image editor, in pixels of the frame from its corner.
+
+The image editor draws scene-linear colours and gives them the scene's look by itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import bpy
+
+from ..cycles import live, session
+
+_kept: tuple[Any, Any] = None, None
+"""A picture and its texture; made and freed while drawing, where Blender may."""
+
+
+def draw(engine: Any, depsgraph: Any, space: Any) -> None:
+    """Draw what `cycles.live` tells."""
+    now = live.now()
+    if now.picture is None:
+        _draw_samples(engine, depsgraph, space, now.scale)
+    else:
+        _draw_picture(now, _height(engine))
+
+
+def _draw_samples(engine: Any, depsgraph: Any, space: Any, scale: int) -> None:
+    """Cycles' own drawing, its pixels as large as the frame has them."""
+    import gpu
+
+    height = _height(engine)
+    with gpu.matrix.push_pop():
+        gpu.matrix.translate((0.0, float(height - -(-height // scale) * scale)))
+        gpu.matrix.scale((float(scale), float(scale)))
+        session.functions().draw(engine, depsgraph, space)
+
+
+def _draw_picture(now: live.Live, height: int) -> None:
+    import gpu
+    from gpu_extras.presets import draw_texture_2d
+
+    rows, columns = (side * now.scale for side in now.picture.shape[:2])
+    dy, dx = now.offset
+    gpu.state.blend_set("ALPHA_PREMULT")
+    place = -dx, height + dy - rows
+    draw_texture_2d(_texture(now.picture), place, columns, rows)
+    gpu.state.blend_set("NONE")
+
+
+def _texture(picture: Any) -> Any:
+    import gpu
+    import numpy as np
+
+    global _kept
+    if _kept[0] is not picture:
+        rows = np.ascontiguousarray(picture[::-1], np.float32)  # the lowest one first
+        height, width = rows.shape[:2]
+        data = gpu.types.Buffer("FLOAT", rows.size, rows.ravel())
+        texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=data)
+        _kept = picture, texture
+    return _kept[1]
+
+
+def _height(engine: Any) -> int:
+    return engine.get_result().resolution_y
+
+
+def forget() -> None:
+    """Free the texture; on the main thread."""
+    global _kept
+    _kept = None, None
+
+
+@bpy.app.handlers.persistent
+def _forget_soon(*_: Any) -> None:
+    live.clear()
+    if not bpy.app.background:
+        bpy.app.timers.register(forget)
+
+
+def register() -> None:
+    """Listen to the ends of renders."""
+    for handlers in (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel):
+        handlers.append(_forget_soon)
+
+
+def unregister() -> None:
+    """Listen no more."""
+    for handlers in (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel):
+        handlers.remove(_forget_soon)
