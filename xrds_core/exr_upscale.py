@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -59,13 +60,7 @@ def upscale_file(
         WeightsError, UsageError, Cancelled: as `Upscaler`.
     """
     start = time.perf_counter()
-    check_place(Path(output))
-    if Path(output).suffix.lower() != ".exr":
-        raise UsageError(
-            f"output {str(output)!r} must end in .exr: without Blender there is no "
-            "view transform to make another format with"
-        )
-    check_output(Path(output), (beauty, guide_file))
+    _check_output(Path(output), (beauty, guide_file))
     if threads is not None:
         torch.set_num_threads(threads)
     upscaler = Upscaler(preset, scale, guides, device, weights=weights)
@@ -91,3 +86,13 @@ def upscale_file(
         "bad_pixels": result.bad_pixels,
         "tiles": result.tiles,
     }
+
+
+def _check_output(path: Path, inputs: Sequence[str | Path]) -> None:
+    check_place(path)
+    if path.suffix.lower() != ".exr":
+        raise UsageError(
+            f"output {str(path)!r} must end in .exr: without Blender there is no view "
+            "transform to make another format with"
+        )
+    check_output(path, inputs)
