@@ -49,7 +49,7 @@ function compileJob(job) {
         // An animation lends samples from frame to frame; single frames do not.
         const [first, last] = chunk.split("-");
         const which = last && !chunk.includes(",")
-            ? ["--frame-start", first, "--frame-end", last, "--render-anim"]
+            ? ["--frame-start", first, "--frame-end", last, "--frame-jump", "1", "--render-anim"]
             : ["--render-frame", chunk.replace(/-/g, "..")];
         const task = author.Task(`render-${chunk}`, "blender");
         task.addCommand(author.Command("blender-render", {

@@ -59,8 +59,8 @@ def test_flamenco_renders_every_chunk(tasks: list[dict[str, Any]]) -> None:
     (command,) = tasks[1]["commands"]
     args = command["parameters"]["args"]
     assert command["name"] == "blender-render"
-    told = ["--frame-start", "7", "--frame-end", "9", "--render-anim"]
-    assert args[-5:] == told  # of single frames none would lend to another
+    told = "--frame-start 7 --frame-end 9 --frame-jump 1 --render-anim"
+    assert args[-7:] == told.split()  # of single frames none would lend to another
     single = tasks[2]["commands"][0]["parameters"]["args"]
     assert single[-2:] == ["--render-frame", "10"]
     assert args[args.index("--render-output") + 1] == "/out/######"
@@ -168,3 +168,41 @@ def test_an_open_job_shot_runs_in_chunks(tmp_path: Path) -> None:
         assert [n for x in each for n in x.frames] == list(range(1, 21))
     assert asked[0].keep_samples == tmp_path / "samples"
     assert asked[2].source == f"{tmp_path}/samples/####.exr"
+
+
+def test_an_open_job_renders_chunks_as_animations(tmp_path: Path) -> None:
+    """Its check, run with a stand-in for bpy, sets the frames that `-a` renders."""
+    pytest.importorskip("openjd.cli")
+    worker = tmp_path / "blender.sh"
+    worker.write_text(
+        "#!/bin/bash\n"
+        f'while [ "$1" != --python ]; do shift; done\n'
+        f"{sys.executable} {tmp_path}/stand_in.py $2 >> {tmp_path}/frames\n"
+        '[[ "$*" == *--render-anim ]]\n'
+    )
+    worker.chmod(0o755)
+    (tmp_path / "stand_in.py").write_text(
+        "import runpy, sys\n"
+        "from unittest.mock import MagicMock\n"
+        "bpy = sys.modules['bpy'] = MagicMock()\n"
+        "scene = bpy.context.scene\n"
+        "scene.render.engine = 'XRDS'\n"
+        "runpy.run_path(sys.argv[1])\n"
+        "print(scene.frame_start, scene.frame_end, scene.frame_step)\n"
+    )
+    told = {
+        "BlendFile": tmp_path / "a.blend",
+        "Frames": "8-12",
+        "ChunkSize": 3,
+        "OutputFolder": tmp_path / "out",
+        "Blender": worker,
+    }
+    words = [word for k, v in told.items() for word in ("-p", f"{k}={v}")]
+    done = subprocess.run(
+        [OPENJD, "run", str(TEMPLATE), "--step", "Render", *words],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "frames").read_text().splitlines() == ["8 10 1", "11 12 1"]

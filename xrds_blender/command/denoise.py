@@ -128,8 +128,13 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _lines(result: dict[str, Any]) -> list[str]:
-    kept = f"; {len(result['kept'])} skipped, complete" if result["kept"] else ""
-    return [f"{result['output']}: {len(result['frames'])} frames denoised{kept}"]
+    done = [entry["frame"] for entry in result["frames"]]
+    told = {"denoised": done, "skipped, complete": result["kept"]}
+    return [
+        f"{result['output']}: frames {in_words(numbers)} {what}"
+        for what, numbers in told.items()
+        if numbers
+    ]
 
 
 def _check(result: dict[str, Any]) -> None:
