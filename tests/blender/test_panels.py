@@ -108,9 +108,6 @@ class Layout:
         self.drawn.append(text or name)
         self.names.append(name)
 
-    def separator(self, **_: object) -> None:
-        pass
-
     operator_context = ""
 
     def prop_enum(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -126,20 +126,12 @@ def denoise_sequence(
     lending = _beside(files.source, numbers, radius)
     shot = Shot(tuple(todo), radius, lending=(*numbers, *lending))
     entries = []
-    clock, lenders, movement = Clock(), Lenders(say), Movement()
-    for number, own, beside in slide(shot, loader.load):
-        if not (resume and files.is_done(number)):  # another machine was quicker
-            others = lenders.of(number, own, beside)
-            finished = finish_frame(
-                own.stored, others, denoiser, movement, region=own.inner
-            )
-            started = time.perf_counter()
-            path = files.write(number, own, finished)
-            seconds = {"read": loader.seconds(), **finished.seconds}
-            seconds["write"] = time.perf_counter() - started
-            entries.append(_entry(number, path, radius, finished, seconds))
-            left = sum(n > number and n not in loader.failed for n in todo)
-            say(f"frame {number}: {path}, {clock.lap(left)}")
+    clock = Clock()
+    for entry in _entries(files, denoiser, shot, loader, resume, say):
+        entries.append(entry)
+        number = entry["frame"]
+        left = sum(n > number and n not in loader.failed for n in todo)
+        say(f"frame {number}: {entry['output']}, {clock.lap(left)}")
     return {
         "output": files.output,
         "temporal_radius": radius,
@@ -152,6 +144,30 @@ def denoise_sequence(
             if n in todo
         ],
     }
+
+
+def _entries(
+    files: Files,
+    denoiser: Denoiser,
+    shot: Shot,
+    loader: Loader,
+    resume: bool,
+    say: Say,
+) -> Iterator[dict[str, Any]]:
+    """Finish and write the frames of a shot; yields what is told of each."""
+    lenders, movement = Lenders(say), Movement()
+    for number, own, beside in slide(shot, loader.load):
+        if resume and files.is_done(number):  # another machine was quicker
+            continue
+        others = lenders.of(number, own, beside)
+        finished = finish_frame(
+            own.stored, others, denoiser, movement, region=own.inner
+        )
+        started = time.perf_counter()
+        path = files.write(number, own, finished)
+        seconds = {"read": loader.seconds(), **finished.seconds}
+        seconds["write"] = time.perf_counter() - started
+        yield _entry(number, path, shot.radius, finished, seconds)
 
 
 def _all_frames(pattern: str) -> list[int]:
