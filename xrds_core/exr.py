@@ -95,15 +95,20 @@ def read_guides(
 
 
 def write_picture(
-    path: str | Path, channels: Mapping[str, Array], encoding: Encoding = FLOAT_ZIP
+    path: str | Path,
+    channels: Mapping[str, Array],
+    encoding: Encoding = FLOAT_ZIP,
+    metadata: Mapping[str, str] | None = None,
 ) -> None:
     """Write (H, W) planes by channel name, all at once or not at all.
 
-    Raises PictureError, and leaves `path` as it was, if it cannot be written.
+    `metadata` goes into the header. Raises PictureError, and leaves `path` as it was,
+    if it cannot be written.
     """
     planes = {name: encoding.plane(pixels) for name, pixels in channels.items()}
     with _whole(path) as unfinished:
-        exr_library.write(unfinished, planes, encoding.codec)
+        attributes = dict(metadata or {})
+        exr_library.write(unfinished, planes, encoding.codec, attributes)
 
 
 def copy_picture(

@@ -71,7 +71,10 @@ def read_headers(path: str | Path) -> list[Part]:
 
 
 def write(
-    path: str | Path, planes: Mapping[str, Pixels], codec: str = FLOAT_ZIP.codec
+    path: str | Path,
+    planes: Mapping[str, Pixels],
+    codec: str = FLOAT_ZIP.codec,
+    attributes: Attributes | None = None,
 ) -> None:
     """Write planes of one size by channel name, in their own number formats.
 
@@ -79,7 +82,8 @@ def write(
     """
     height, width = next(iter(planes.values())).shape
     window = ((0, 0), (width - 1, height - 1))
-    write_part(path, Part("", window, window, dict(planes)), codec)
+    part = Part("", window, window, dict(planes), dict(attributes or {}))
+    write_part(path, part, codec)
 
 
 def write_part(path: str | Path, part: Part, codec: str = FLOAT_ZIP.codec) -> None:

@@ -16,6 +16,7 @@ from .exr_encoding import FLOAT_ZIP, Encoding
 from .files import check_output, check_place
 from .progress import Callback
 from .upscaler import Upscaler
+from .version import package_version
 
 
 def upscale_file(
@@ -79,7 +80,17 @@ def upscale_file(
         progress=progress,
     )
     planes = zip("RGBA", np.moveaxis(result.radiance, 2, 0), strict=False)
-    write_picture(output, dict(planes), encoding)
+    seconds = time.perf_counter() - start
+    told = {
+        "version": package_version(),
+        "way": "super-resolution",
+        "scale": scale,
+        "preset": preset,
+        "device": upscaler.device,
+        "seconds": f"{seconds:.1f}",
+    }
+    metadata = {f"xrds.{name}": str(value) for name, value in told.items()}
+    write_picture(output, dict(planes), encoding, metadata)
     return {
         "output": str(output),
         "seconds": time.perf_counter() - start,

@@ -58,7 +58,7 @@ def test_blenders_files_tell_what_made_them(
         for name, text in found.items()
         if name.startswith("xrds.ViewLayer.")
     }
-    assert set(NAMES) | {"left out"} <= set(fields)
+    assert set(NAMES) | {"left_out"} <= set(fields)
     assert fields["samples"] == "2"
     assert float(fields["seconds"]) >= 0.0
     assert {name: fields[name] for name in told} == told
@@ -90,9 +90,41 @@ def test_what_was_left_out_is_named() -> None:
     )
     picture = Picture(None, None, plan=plan, device="cpu", seconds={"total": 1.26})
     told = record.fields(picture, RenderJob(scale=4), 16)
-    assert told["left out"] == "motion blur, guides, kept from before"
-    assert told["guide samples"] == "2"
+    assert told["left_out"] == "motion blur, guides, kept from before"
+    assert told["guide_samples"] == "2"
     assert told["seconds"] == "1.3"
     line = record.line(told, 7, "Main")
     assert line.startswith(f"XRDS {told['version']}, frame 7, Main: super-resolution, ")
     assert record.metadata(told, "Main")["xrds.Main.scale"] == "4"
+
+
+@pytest.mark.parametrize("suffix", [".png", ".exr"])
+def test_the_commands_files_tell_what_made_them(
+    life: Any, tmp_path: Path, suffix: str
+) -> None:
+    from xrds_blender.command.render_file import render_file
+    from xrds_blender.command.whole_file import is_whole
+    from xrds_core import exr_library
+
+    path, output = tmp_path / "life.blend", tmp_path / f"frame{suffix}"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    render_file(path, str(output), RenderJob(scale=1, samples=3))
+    assert is_whole(output, (45, 33))
+    if suffix == ".png":
+        found = texts(output.read_bytes())
+    else:
+        found = exr_library.read(output)[0].attributes
+    told = {name: found[f"xrds.{name}"] for name in (*NAMES, "left_out")}
+    assert (told["way"], told["scale"], told["samples"]) == ("full size", "1", "3")
+
+
+def test_text_beyond_latin_is_kept(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    from xrds_blender.command import png_text
+
+    path = tmp_path / "one.png"
+    image.new("RGB", (3, 2)).save(path)
+    png_text.add(path, {"xrds.way": "フルサイズ", "xrds.scale": "1"})
+    with image.open(path) as opened:
+        opened.load()
+        assert opened.text == {"xrds.way": "フルサイズ", "xrds.scale": "1"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from xrds_core.errors import PictureError, UsageError
 from xrds_core.exr_encoding import FLOAT_ZIP, Encoding
 from xrds_core.frames import frame_path
 
+from . import png_text
 from .whole_file import png_size
 
 SUFFIXES = (".exr", ".png")
@@ -46,6 +47,7 @@ def save(
     alpha: Array,
     scene: Any,
     encoding: Encoding = FLOAT_ZIP,
+    metadata: Mapping[str, str] | None = None,
 ) -> None:
     """Write one frame, all at once or not at all; raises PictureError if it cannot.
 
@@ -56,19 +58,22 @@ def save(
         scene: its view settings shape the PNG; with a transparent film both formats
             hold alpha.
         encoding: of an .exr.
+        metadata: texts by name that the file is to hold.
     """
     if path.suffix.lower() == ".png":
-        _write_png(path, radiance, alpha, scene)
+        _write_png(path, radiance, alpha, scene, metadata or {})
         return
     from xrds_core import exr
 
     channels = {name: radiance[..., i] for i, name in enumerate("RGB")}
     if scene.render.film_transparent:
         channels["A"] = alpha
-    exr.write_picture(path, channels, encoding)
+    exr.write_picture(path, channels, encoding, metadata)
 
 
-def _write_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
+def _write_png(
+    path: Path, radiance: Array, alpha: Array, scene: Any, metadata: Mapping[str, str]
+) -> None:
     if not path.parent.is_dir():  # Blender would make it anew, wherever that is by now
         raise PictureError(f"cannot write {path}: its folder no longer exists")
     try:
@@ -76,6 +81,7 @@ def _write_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
             _save_png(unfinished, radiance, alpha, scene)
             if png_size(unfinished) != alpha.shape[::-1]:
                 raise PictureError(f"cannot write {path}: is the disk full?")
+            png_text.add(unfinished, metadata)
     except OSError as error:
         raise PictureError(f"cannot write {path}: {error.strerror}") from error
 

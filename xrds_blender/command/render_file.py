@@ -16,6 +16,7 @@ from xrds_core.notices import warn
 from xrds_core.time_left import Clock
 
 from ..cycles.size import picture_size
+from ..frame import record
 from ..frame.denoisers import load_denoiser
 from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.networks import known_networks, load_upscaler
@@ -76,7 +77,7 @@ def render_file(
     written, last = [], None
     if output is not None:
         for number, last in _pictures(scene, job, output, numbers, is_done, keeper):
-            written.append(_write(scene, output, number, last, encoding))
+            written.append(_write(scene, output, number, last, job, encoding))
     if keeper:
         _keep_others(scene, job, numbers, keeper)
     job = (last and last.job) or job
@@ -171,15 +172,22 @@ def _kept(error: NetworkFailed, scene: Any, output: str, number: int) -> XRDSErr
 
 
 def _write(
-    scene: Any, output: str, number: int, picture: Picture, encoding: Encoding
+    scene: Any,
+    output: str,
+    number: int,
+    picture: Picture,
+    job: RenderJob,
+    encoding: Encoding,
 ) -> dict[str, Any]:
     """Write one frame; returns its entry for the JSON."""
     target = frame_path(output, number)
+    metadata = record.metadata(record.fields(picture, job, scene.cycles.samples))
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated
     try:
-        picture_file.save(target, picture.radiance, picture.alpha, scene, encoding)
+        pixels = picture.radiance, picture.alpha
+        picture_file.save(target, *pixels, scene, encoding, metadata)
     except PictureError as error:
         place = _keep_elsewhere(target, picture.radiance, picture.alpha, scene)
         raise PictureError(f"{error}; the frame was {place}") from error

@@ -32,20 +32,24 @@ def fields(picture: Picture, job: RenderJob, samples: int) -> dict[str, str]:
         told["preset"] = job.denoise
     told["samples"] = str(job.samples or samples)
     if job.is_enlarged:
-        told["guide samples"] = _decided(picture.plan, "guide samples") or "0"
+        told["guide_samples"] = _decided(picture.plan, "guide samples") or "0"
     if picture.temporal is not None:
         frames = picture.temporal.frames
         told["frames"] = f"{frames[0]} to {frames[-1]}"
     if picture.device:
         told["device"] = picture.device
     told["seconds"] = f"{picture.seconds.get('total', 0.0):.1f}"
-    told["left out"] = ", ".join(_left_out(picture.plan)) or "nothing"
+    told["left_out"] = ", ".join(_left_out(picture.plan)) or "nothing"
     return told
 
 
 def line(told: dict[str, str], frame: int, layer: str) -> str:
     """The fields as one line of a log."""
-    rest = [f"{name} {value}" for name, value in told.items() if name not in _NAMELESS]
+    rest = [
+        f"{name.replace('_', ' ')} {value}"
+        for name, value in told.items()
+        if name not in _NAMELESS
+    ]
     head = f"XRDS {told['version']}, frame {frame}, {layer}: {told['way']}"
     return ", ".join([head, *rest])
 
@@ -53,9 +57,13 @@ def line(told: dict[str, str], frame: int, layer: str) -> str:
 _NAMELESS = ("version", "way")
 
 
-def metadata(told: dict[str, str], layer: str) -> dict[str, str]:
-    """The fields by the names that they have in files, as Cycles names its own."""
-    return {f"{PREFIX}.{layer}.{name}": value for name, value in told.items()}
+def metadata(told: dict[str, str], layer: str = "") -> dict[str, str]:
+    """The fields by their names in files: with the layer's, as Cycles names its own.
+
+    Files of one picture, as commands write them, have no layers.
+    """
+    prefix = f"{PREFIX}.{layer}." if layer else f"{PREFIX}."
+    return {prefix + name: value for name, value in told.items()}
 
 
 def stamp(engine: Any, told: dict[str, str], layer: str) -> None:
