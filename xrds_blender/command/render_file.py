@@ -133,14 +133,16 @@ def _check_keeping(job: RenderJob) -> None:
             "--keep-samples needs --scale 1, without --plain, --time-budget and "
             "--quality"
         )
+    if not job.temporal_radius:
+        raise UsageError("--keep-samples needs a --temporal-radius of 1 or more")
 
 
 def _keeper(scene: Any, job: RenderJob, folder: Path) -> Keeper:
     """What keeps samples; raises UsageError where they could lend nothing."""
     if not can_lend(scene, job):
         raise UsageError(
-            "frames of such a panoramic camera, or with full guides, lend nothing to "
-            "each other: leave out --keep-samples"
+            "frames of such a panoramic camera lend nothing to each other: leave out "
+            "--keep-samples"
         )
     return keeper_of(scene, job, folder, warn)
 
