@@ -87,7 +87,7 @@ def read_frame(
     camera = _camera(file, part, number, reading)
     depth = None
     if camera is not None:
-        depth = _depth(file, part, found, camera, reading)
+        depth = _depth(file, found, camera, reading)
     if lends and (camera is None or depth is None):
         lacking = "camera" if camera is None else "depth"
         raise NotLending(f"{path} has no {lacking}", _REMEDY[lacking])
@@ -147,12 +147,8 @@ def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | N
     return replace(camera, window=(x - left, y - top), name=name)
 
 
-def _depth(
-    file: File, part: Part, found: Found, camera: Camera, reading: Reading
-) -> Array | None:
+def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array | None:
     """Depth (H, W) along the camera's axis, infinite without a hit."""
-    if KEY in part.attributes:  # our own
-        return file.plane(found.depth[0])
     position, depth = found.position, found.depth
     if depth and position and _is_half(file, position):
         position = []  # half floats tell a place in the world by centimetres
