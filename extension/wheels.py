@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 BLENDERS_OWN = {"numpy"}
+# For Linux PyPI has PyTorch with all of CUDA; PyTorch's own index has its CPU build.
+CPU_INDEX = ("--extra-index-url", "https://download.pytorch.org/whl/cpu")
 # What only a build for graphics cards depends on: a CPU build needs none of it.
 GPU_PARTS = ("nvidia", "cuda", "triton", "pytorch-triton", "rocm")
 
@@ -64,6 +67,11 @@ class Target:
         platforms = [word for tag in self.tags for word in ("--platform", tag)]
         own = ["--python-version", self.python, "--only-binary", ":all:", "--no-deps"]
         return [*own, *platforms]
+
+    def index(self, names: Iterable[str]) -> list[str]:
+        """Pip's options for where packages of these names are."""
+        of_cpu = self.system[0] == "Linux" and "torch" in names
+        return list(CPU_INDEX) if of_cpu else []
 
 
 _LINUX = tuple(f"manylinux_2_{minor}_x86_64" for minor in (28, 27, 24, 17, 12, 5))
@@ -114,7 +122,8 @@ def resolve(target: Target, wanted: list[str]) -> list[str]:
 def download(target: Target, pins: list[str], folder: Path) -> list[Path]:
     """Fetch the wheels of `pins` into `folder` and return their paths."""
     folder.mkdir(parents=True, exist_ok=True)
-    _pip("download", *target.options(), "--dest", str(folder), *pins)
+    where = target.index(pin.partition("==")[0] for pin in pins)
+    _pip("download", *target.options(), *where, "--dest", str(folder), *pins)
     return sorted(folder.glob("*.whl"))
 
 
@@ -122,7 +131,8 @@ def _look_up(target: Target, requirement: Requirement) -> dict[str, Any]:
     """The metadata of the wheel that pip would take; nothing is fetched."""
     options = ["--dry-run", "--ignore-installed", "--target", "none", "--report", "-"]
     text = f"{requirement.name}{requirement.specifier}"
-    report = json.loads(_pip("install", *options, *target.options(), text))
+    words = [*options, *target.options(), *target.index([requirement.name]), text]
+    report = json.loads(_pip("install", *words))
     metadata: dict[str, Any] = report["install"][0]["metadata"]
     return metadata
 

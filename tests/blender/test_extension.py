@@ -117,6 +117,28 @@ def test_a_build_for_graphics_cards_is_no_cpu_build(
         wheels.resolve(target("linux-x64", "3.13"), ["jax"])
 
 
+def test_only_linux_asks_pytorch_for_its_cpu_build() -> None:
+    linux, windows = target("linux-x64", "3.13"), target("windows-x64", "3.13")
+    assert linux.index(["sympy", "torch"]) == list(wheels.CPU_INDEX)
+    assert linux.index(["sympy"]) == windows.index(["torch"]) == []
+
+
+def test_a_zip_of_another_python_tells_which_one_is_right(tmp_path: Path) -> None:
+    """The root module alone, as where Blender has spread no wheel for its Python."""
+    code = "import runpy; runpy.run_path('init.py')['register']()"
+    (tmp_path / "init.py").write_text((ROOT / "extension/__init__.py").read_text())
+    done = subprocess.run(
+        [sys.executable, "-I", "-S", "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
+    )
+    last = done.stderr.strip().splitlines()[-1]
+    assert last.startswith("RuntimeError: XRDS finds no xrds_blender: remove XRDS")
+    assert last.endswith(f"cp{sys.version_info[0]}{sys.version_info[1]}")
+
+
 def test_a_manifest_takes_lines_above_its_tables() -> None:
     text = build._manifest({"platforms": ["linux-x64"], "wheels": ["./wheels/a.whl"]})
     told = tomllib.loads(text)
