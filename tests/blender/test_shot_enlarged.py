@@ -122,6 +122,61 @@ def test_guides_of_what_stands_still_are_rendered_a_few_times(
     assert samples == [2, 3, 3, 3, 3, 3]
 
 
+def rendered_guides(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The numbers of the frames whose guides are rendered from now on."""
+    frames: list[int] = []
+    guides = CyclesPasses.guides_by_view
+
+    def count(passes: CyclesPasses, *given: Any, **named: Any) -> Any:
+        frames.append(bpy.context.scene.frame_current)
+        return guides(passes, *given, **named)
+
+    monkeypatch.setattr(CyclesPasses, "guides_by_view", count)
+    return frames
+
+
+def test_where_only_the_camera_moves_every_second_frame_has_guides(
+    moving: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = rendered_guides(monkeypatch)
+    result = render(moving, "shot", frames=[1, 2, 3, 4])
+    assert frames == [1, 3, 4]
+    decisions = {each["decision"] for each in result["plan"]}
+    assert "guides" in decisions
+    frames.clear()
+    render(moving, "all", frames=[1, 2, 3, 4], job={"savings": ()})
+    assert frames == [1, 2, 3, 4]
+    saved, whole = (picture(moving.parent / n / "2.exr") for n in ("shot", "all"))
+    assert np.abs(saved - whole).mean() < 0.02 * whole.mean()
+
+
+def test_where_things_move_every_frame_has_guides(
+    moving: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cube = bpy.data.objects["Red"]
+    for frame in (1, 5):
+        cube.location.x = -1.0 - 0.2 * frame
+        cube.keyframe_insert("location", frame=frame)
+    bpy.ops.wm.save_mainfile()
+    frames = rendered_guides(monkeypatch)
+    render(moving, "shot", frames=[1, 2, 3])
+    assert frames == [1, 2, 3]
+
+
+def test_views_that_swing_away_have_guides_of_their_own(
+    moving: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a turntable in large steps: what lies beside is another take."""
+    camera = bpy.context.scene.camera
+    for frame in range(1, 6):
+        camera.rotation_euler.z = 1.5 * (frame - 2)
+        camera.keyframe_insert("rotation_euler", frame=frame)
+    bpy.ops.wm.save_mainfile()
+    frames = rendered_guides(monkeypatch)
+    render(moving, "shot", frames=[1, 2, 3])
+    assert sorted(frames) == [1, 2, 3]
+
+
 @pytest.fixture
 def animation(moving: Path) -> Any:
     bpy.ops.wm.open_mainfile(filepath=str(moving))
@@ -145,18 +200,28 @@ def layer(path: Path, name: str, letters: str = "RGB") -> np.ndarray:
     return np.dstack([found[each] for each in names])
 
 
+@pytest.mark.parametrize("passes", [False, True])
 def test_an_enlarged_animation_is_the_shot_of_the_command(
-    animation: Any, moving: Path
+    animation: Any, moving: Path, monkeypatch: pytest.MonkeyPatch, passes: bool
 ) -> None:
+    """Passes that come with the guides need them in every frame."""
+    layer_settings = animation.view_layers[0]
+    layer_settings.use_pass_diffuse_direct = layer_settings.use_pass_normal = passes
+    layer_settings.use_pass_z = False
+    bpy.ops.wm.save_mainfile()
+    frames = rendered_guides(monkeypatch)
     bpy.ops.render.render(animation=True)
+    assert len(frames) == (5 if passes else 3)
     render(moving, "command")
     for number in FRAMES:
         path = moving.parent / "f12" / f"{number}.exr"
         theirs = picture(moving.parent / "command" / f"{number}.exr")
         np.testing.assert_allclose(layer(path, "Combined"), theirs, atol=2e-3)
-        # light passes are those of the low-resolution render, at the picture's size
-        light = layer(path, "DiffDir" if bpy.app.version < (5,) else "Diffuse Direct")
-        assert 0.2 < light[24:, 33:].mean() / light[24:, :33].mean() < 5.0
+        if passes:
+            # light passes are of the low-resolution render, at the picture's size
+            name = "DiffDir" if bpy.app.version < (5,) else "Diffuse Direct"
+            light = layer(path, name)
+            assert 0.2 < light[24:, 33:].mean() / light[24:, :33].mean() < 5.0
 
 
 def test_what_was_rendered_is_kept_where_the_network_fails(

@@ -136,6 +136,9 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
     _sample_missing(engine, depsgraph, window, number, needed)
 
     lenders = [window.sampled[n] for n in needed if n != number]
+    if window.method.lacks(window.sampled[number], lenders):
+        with CyclesPasses(engine, depsgraph) as passes:
+            window.sampled[number] = _sample(engine, depsgraph, window, passes)
     picture = _finish(engine, layer_name, window, window.sampled[number], lenders)
     picture.seconds["total"] = time.perf_counter() - started
     return picture
@@ -185,6 +188,7 @@ def _sample_missing(
     engine: Any, depsgraph: Any, window: _Window, number: int, needed: list[int]
 ) -> None:
     """Sample what is not kept; the result then holds the passes of frame `number`."""
+    scene = depsgraph.scene_eval
     missing = [n for n in needed if n not in window.sampled]
     if not missing:
         session.allocate(engine)
@@ -193,7 +197,10 @@ def _sample_missing(
             for each in missing:
                 if each != depsgraph.scene_eval.frame_current:
                     engine.frame_set(each, 0.0)
-                window.sampled[each] = _sample(engine, depsgraph, window, passes)
+                between = _is_between(scene, each)
+                window.sampled[each] = _sample(
+                    engine, depsgraph, window, passes, between
+                )
                 window.count += 1
                 if each >= number and missing[-1] != number:
                     window.passes[each] = passes.all_passes()
@@ -204,8 +211,21 @@ def _sample_missing(
             passes.put_back(window.passes.pop(number))
 
 
+def _is_between(scene: Any, number: int) -> bool:
+    """As `Shot.is_between`, of the whole animation."""
+    first, step = scene.frame_start, scene.frame_step
+    around = (number - step, number, number + step)
+    inside = first <= around[0] and around[2] <= scene.frame_end
+    is_second = (number - first) // step % 2 == 1
+    return inside and is_second and not cuts(scene, around)
+
+
 def _sample(
-    engine: Any, depsgraph: Any, window: _Window, passes: CyclesPasses
+    engine: Any,
+    depsgraph: Any,
+    window: _Window,
+    passes: CyclesPasses,
+    between: bool = False,
 ) -> Sampled:
     """Sample the frame that the dependency graph is at.
 
@@ -217,7 +237,7 @@ def _sample(
     scene = depsgraph.scene_eval
     asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
     if not stands_still(scene.camera) or (asked and shapes_move(depsgraph)):
-        return window.method.sample(engine, depsgraph)
+        return window.method.sample(engine, depsgraph, between=between)
     number, camera = scene.frame_current, scene.camera.name_full
     first, kept = window.first.get(camera, (number, {}))
     place = (number - first if asked else number) // scene.frame_step

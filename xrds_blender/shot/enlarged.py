@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.frame import Frame, Stored, store
+from xrds_core.temporal.frame import Camera, Frame, Stored, store
 from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.stand_in import stand_in
+from xrds_core.temporal.takes import same_take
 
 from ..cycles.low_samples import LowPlace, LowSamples
+from ..cycles.pass_names import COMBINED, is_light
 from ..cycles.passes import CyclesPasses
 from ..cycles.rendered import Beauty, Guides
 from ..cycles.view import low_view
@@ -28,7 +31,8 @@ from ..frame.guide_cache import GuideName
 from ..frame.guides import GuideSource
 from ..frame.job import NetworkFailed, Picture, RenderJob, Temporal
 from ..frame.memory import peak_memory
-from ..planning.plan import Plan
+from ..planning.plan import Decision, Plan
+from ..scene.facts import shapes_move
 from .finishing import accumulation
 from .sampling import Sampled, Sampling, light_of, sampling_of
 
@@ -37,33 +41,41 @@ if TYPE_CHECKING:
     from xrds_core.denoising import Denoiser
 
 
+_OF_OTHERS = Decision(
+    "guides", "of the frames beside", "only the camera moves: they show the same"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class View:
     """One view of a frame as the window keeps it.
 
-    `place` is that of the light's pixels. Guides of the same `guide_name` hold each
-    other's samples: they are not added up.
+    `place` is that of the light's pixels, `camera` sees those of the picture. Guides of
+    the same `guide_name` hold each other's samples: they are not added up. None where
+    those of the frames beside it show what this one would show.
     """
 
     light: Stored
-    guides: Stored
+    guides: Stored | None
+    camera: Camera
+    shape: tuple[int, int]
     guide_name: GuideName | None
     place: LowPlace
     exposure: float | None
     plan: Plan
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(H, W) of the picture."""
-        return self.guides.shape
-
 
 def sample_enlarged(
-    engine: Any, depsgraph: Any, job: RenderJob, place: int | None = None
+    engine: Any,
+    depsgraph: Any,
+    job: RenderJob,
+    place: int | None = None,
+    between: bool = False,
 ) -> Sampled:
     """Render light and guides of the frame that the dependency graph is at.
 
-    As `sampling.sample_frame`; the result then holds the guides' data passes.
+    As `sampling.sample_frame`; the result then holds the guides' data passes. A frame
+    `between` two others takes its guides from them where that costs no detail.
     """
     how = sampling_of(engine, depsgraph, job, place)
     name = f"of frame {how.number}"
@@ -77,6 +89,15 @@ def sample_enlarged(
             job.scale, job.samples, seed=how.own_seed, portion=how.portion(how.count)
         )
         exposure = job.exposure or passes.border_exposure()
+        shape = passes.region.height, passes.region.width
+        asked = _asks_for_guides(engine, passes)
+        if between and not asked and _is_told_by_others(depsgraph, job, how, chosen):
+            seen = replace(chosen, decisions=(*chosen.decisions, _OF_OTHERS))
+            lit = {
+                view: _view(how, job, low, view, shape, exposure, seen)
+                for view, low in light.items()
+            }
+            return Sampled(lit, _seconds(light))
         progress.begin(engine, f"{progress.GUIDES} {name}", 2)
         portion = how.portion(chosen.guide_samples, other=1)
         wanted = _guide_job(job, how, chosen.guide_samples)
@@ -89,17 +110,53 @@ def sample_enlarged(
         guides = source.guides(noisy)
         seen = replace(chosen, decisions=(*chosen.decisions, source.decision))
         views = {
-            view: View(
-                _stored_light(how, job, low, view),
-                _stored_guides(how, guides[view], passes, view, chosen),
-                source.name,
-                low.place,
-                exposure,
-                seen,
+            view: replace(
+                _view(how, job, low, view, shape, exposure, seen),
+                guides=_stored_guides(how, guides[view], passes, view, chosen),
+                guide_name=source.name,
             )
             for view, low in light.items()
         }
     return Sampled(views, _seconds(light, guides))
+
+
+def _asks_for_guides(engine: Any, passes: CyclesPasses) -> bool:
+    """Whether the file asks for passes that come with the guides."""
+    spare = {name for _, name in engine.spare_passes}
+    asked = set(passes.pass_names()) - spare - {COMBINED}
+    return not all(is_light(name) for name in asked)
+
+
+def _is_told_by_others(
+    depsgraph: Any, job: RenderJob, how: Sampling, chosen: Plan
+) -> bool:
+    """Whether guides of the frames beside this one show what its own would show."""
+    if _OF_OTHERS.decision not in job.savings or not chosen.render_guides:
+        return False
+    # under a camera that stands still they are not rendered again anyway
+    return how.place is None and not shapes_move(depsgraph)
+
+
+def _view(
+    how: Sampling,
+    job: RenderJob,
+    low: LowSamples,
+    view: str,
+    shape: tuple[int, int],
+    exposure: float | None,
+    seen: Plan,
+) -> View:
+    """A view without guides."""
+    return View(
+        light=_stored_light(how, job, low, view),
+        guides=None,
+        camera=how.cameras[view],
+        shape=shape,
+        guide_name=None,
+        place=low.place,
+        exposure=exposure,
+        plan=seen,
+    )
 
 
 def _guide_job(job: RenderJob, how: Sampling, samples: int) -> RenderJob:
@@ -139,12 +196,15 @@ def _stored_guides(
 
 
 def _seconds(
-    light: dict[str, LowSamples], guides: dict[str, Guides]
+    light: dict[str, LowSamples], guides: dict[str, Guides] | None = None
 ) -> dict[str, float]:
     seconds = dict.fromkeys(progress.STAGES, 0.0)
     first = next(iter(light))
-    for rendered in (light[first].place, guides[first]):
-        for stage, value in rendered.seconds.items():
+    rendered = [light[first].place.seconds]
+    if guides is not None:
+        rendered.append(guides[first].seconds)
+    for each in rendered:
+        for stage, value in each.items():
             seconds[stage] += value
     return seconds
 
@@ -218,12 +278,32 @@ def _denoised(own: View, gathered: Accumulated, denoiser: Denoiser) -> Beauty:
 
 def _gathered_guides(own: View, lenders: Sequence[View], movement: Movement) -> Guides:
     """Guides with the samples of other frames; the richest of those of one name."""
-    target, others = own.guides, list(lenders)
+    others = [each for each in lenders if each.guides is not None]
     if own.guide_name is not None:
-        same = [own, *(x for x in lenders if own.guide_name.is_same(x.guide_name))]
-        target = max((each.guides for each in same), key=lambda each: each.samples)
-        others = [each for each in lenders if each not in same]
-    found = accumulate(target, [each.guides for each in others], movement)
+        name = own.guide_name
+        same = [own, *(each for each in others if name.is_same(each.guide_name))]
+        own = max(same, key=_samples)
+        others = [each for each in others if each not in same]
+    lent = [each.guides for each in others if each.guides is not None]
+    target = own.guides
+    if target is None:
+        number = own.light.number
+        beside = sorted(lent, key=lambda each: abs(each.number - number))[:2]
+        target = stand_in(number, own.camera, beside)
+    found = accumulate(target, lent, movement)
     assert found.alpha is not None
-    samples = max(1, int(found.samples.mean()))
+    # their own number: where nothing is lent there are no more
+    samples = max(1, int(target.samples))
     return Guides(found.albedo, found.normal, found.alpha, None, None, samples)
+
+
+def lacks_guides(own: View, lenders: Sequence[View]) -> bool:
+    """Whether a frame counted on guides of frames that a cut parts from it."""
+    if own.guides is not None:
+        return False
+    rich = [each.light for each in lenders if each.guides is not None]
+    return not same_take(own.light, rich)
+
+
+def _samples(view: View) -> float:
+    return 0.0 if view.guides is None else view.guides.samples

@@ -13,7 +13,7 @@ from ..frame.denoisers import load_denoiser
 from ..frame.enlarging import enlarged_lights
 from ..frame.job import Picture, RenderJob
 from ..frame.networks import load_upscaler
-from .enlarged import finish_enlarged, sample_enlarged
+from .enlarged import finish_enlarged, lacks_guides, sample_enlarged
 from .finishing import finish
 from .sampling import Keep, Sampled, sample_frame
 
@@ -33,9 +33,22 @@ class FullSize:
         self._denoiser = load_denoiser(job)
         self._movement = Movement()
 
-    def sample(self, engine: Any, depsgraph: Any, place: int | None = None) -> Sampled:
-        """Render the frame that the dependency graph is at, as `sample_frame`."""
+    def sample(
+        self,
+        engine: Any,
+        depsgraph: Any,
+        place: int | None = None,
+        between: bool = False,
+    ) -> Sampled:
+        """Render the frame that the dependency graph is at, as `sample_frame`.
+
+        What other frames tell as well may be missing of one that lies `between` two.
+        """
         return sample_frame(engine, depsgraph, self._job, place, self._keep)
+
+    def lacks(self, own: Sampled, lenders: Sequence[Sampled]) -> bool:
+        """Whether what is missing of a frame is not told by others after all."""
+        return False
 
     def finish(
         self,
@@ -73,8 +86,20 @@ class Enlarged(FullSize):
         self._upscaler = load_upscaler(job)
         super().__init__(job)
 
-    def sample(self, engine: Any, depsgraph: Any, place: int | None = None) -> Sampled:
-        return sample_enlarged(engine, depsgraph, self._job, place)
+    def sample(
+        self,
+        engine: Any,
+        depsgraph: Any,
+        place: int | None = None,
+        between: bool = False,
+    ) -> Sampled:
+        return sample_enlarged(engine, depsgraph, self._job, place, between)
+
+    def lacks(self, own: Sampled, lenders: Sequence[Sampled]) -> bool:
+        return any(
+            lacks_guides(each, own.lenders(view, lenders))
+            for view, each in own.views.items()
+        )
 
     def finish(
         self,

@@ -45,13 +45,17 @@ def render_shot(
     def load(number: int) -> Sampled | None:
         if keeper and (kept := keeper.read(number)):
             return kept
-        return _sample(scene, method, frames, number) if number in frames else None
+        if number not in frames:
+            return None
+        return _sample(scene, method, frames, number, shot.is_between(number))
 
     for number, own, lenders in slide(shot, load):
         if is_done(number):  # another machine was quicker
             continue
-        view = next(iter(own.views))
-        picture = method.finish(own, list(lenders.values()), view)
+        view, others = next(iter(own.views)), list(lenders.values())
+        if method.lacks(own, others):
+            own = _sample(scene, method, frames, number)  # noqa: PLW2901
+        picture = method.finish(own, others, view)
         seconds = own.seconds | picture.seconds
         seconds["total"] = sum(seconds.values())
         yield number, replace(picture, seconds=seconds)
@@ -72,7 +76,11 @@ def keep_shot(
 
 
 def _sample(
-    scene: Any, method: FullSize, frames: Sequence[int], number: int
+    scene: Any,
+    method: FullSize,
+    frames: Sequence[int],
+    number: int,
+    between: bool = False,
 ) -> Sampled:
     """Sample a frame of a shot, the same way whatever part of the shot `frames` are."""
     scene.frame_set(number)
@@ -80,7 +88,7 @@ def _sample(
 
     def work(engine: Any, depsgraph: Any) -> Sampled:
         try:
-            return method.sample(engine, depsgraph, place)
+            return method.sample(engine, depsgraph, place, between)
         finally:
             progress.end()
 

@@ -178,6 +178,11 @@ class Stored:
         """Whether there is radiance before albedo and normal."""
         return self.picture.shape[1] >= 9
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether no pixel has a sample, as of a stand-in."""
+        return self.spoilt is not None and bool(self.spoilt.all())
+
     def shows_same(self, other: Stored) -> bool:
         """Whether two frames differ in their noise alone."""
         return self.still and other.still and self.camera.same(other.camera)

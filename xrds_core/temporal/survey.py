@@ -40,6 +40,8 @@ def survey(pair: Pair) -> Array:
     """Return the weights (rows, columns) of tiles of `pair.here`, 0 after a cut."""
     height, width = pair.here.shape
     tiles = -(-height // TILE), -(-width // TILE)
+    if pair.here.is_empty:  # there is nothing to compare
+        return np.ones(tiles, np.float32)
     step = _STRIDES[height * width >= _LARGE]
     y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]
     spots = (y * width + x).ravel()

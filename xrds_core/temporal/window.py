@@ -59,6 +59,12 @@ class Shot:
             )
         )
 
+    def is_between(self, frame: int) -> bool:
+        """Return whether it lies between two lenders that themselves do not."""
+        place = self.order.index(frame)
+        beside = {*self.order[place - 1 : place], *self.order[place + 1 : place + 2]}
+        return place % 2 == 1 and len(beside) == 2 and beside <= {*self.lenders(frame)}
+
     def _take(self, frame: int) -> int:
         """Return between which cuts a frame lies."""
         return sum(cut <= frame for cut in self.cuts)
