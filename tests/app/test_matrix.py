@@ -26,6 +26,7 @@ COPIED = (
     "tests/blender",
     "tests/conftest.py",
     "tests/channels.py",
+    "tests/hostile.py",
     "pyproject.toml",
 )
 # Left out: what starts a Python of its own.
