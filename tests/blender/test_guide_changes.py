@@ -68,6 +68,7 @@ CASES = [
     *cases("still", STILL | settings.SHADING | settings.SHAPES, deeds.STILL),
     *cases("still", settings.LENS, deeds.LENS, camera="Lens"),
     *cases("timed", settings.TIMED, deeds.TIMED),
+    *cases("clocked", {}, (deeds.next_frame,)),
     *cases("seen", settings.SEEN),
 ]
 HARMLESS = cases("still", settings.HARMLESS, deeds.HARMLESS)
@@ -75,10 +76,10 @@ SHARE = 6
 # Each took the guides of before once.
 ONCE_WRONG = (
     "use_sky use_solid use_strand pass_alpha_threshold cut_by_marker camera "
-    "sequence_file_rewritten lifetime Socket_2 driven_modifier vertex_weight "
-    'frame_start objects["Copies"].color ["hue"] ["layer_mood"] focus_on_bone '
+    "sequence_file_rewritten lifetime driven_modifier vertex_weight frame_start "
+    'objects["Copies"].color ["hue"] ["layer_mood"] Socket_2.value ["Socket_2"] '
     "focused_bone_moves file_of_equal_size_and_time layer_path_shown next_frame "
-    "remesh_voxel_size audio_volume"
+    "remesh_voxel_size audio_volume lamp_added"
 )
 
 

@@ -13,7 +13,8 @@ import numpy as np
 from xrds_lab.studio.geometry import box
 from xrds_lab.studio.nodes import solid
 
-from .settings import put
+from .settings import SHADE, put, split
+from .stage import FILE_SIZE
 
 Deed = Callable[[Path], None]
 """Is given the folder of the stage's images."""
@@ -61,28 +62,23 @@ def stereo(_: Path) -> None:
     _scene().render.use_multiview = True
 
 
-def focus_on_bone(_: Path) -> None:
-    """A bone that the focus follows."""
-    lens = bpy.data.cameras["Lens"].dof
-    lens.focus_object, lens.focus_subtarget = bpy.data.objects["Rig"], "Bone"
+def focus_on_distance(_: Path) -> None:
+    """Focus that follows nothing."""
+    bpy.data.cameras["Lens"].dof.focus_object = None
 
 
-def focused_bone_moves(folder: Path) -> None:
-    """The bone in focus goes towards the camera."""
-    focus_on_bone(folder)
-    bpy.data.objects["Rig"].pose.bones["Bone"].location = (0.0, 0.0, 6.0)
+def focused_bone_moves(_: Path) -> None:
+    """The bone in focus, which moves nothing else, goes towards the camera."""
+    bpy.data.objects["Puller"].pose.bones["Focus"].location = (0.0, 0.0, 6.0)
 
 
-def _rewrite(path: Path, value: float, keep_times: bool = False) -> None:
-    before = path.stat()
+def _rewrite(path: Path, value: float) -> None:
+    """Write a file anew, of another colour and as long as before."""
     image = bpy.data.images.load(str(path))
-    pixels = np.full(len(image.pixels), value, np.float32)
-    image.pixels.foreach_set(pixels)
+    image.pixels.foreach_set(np.full(len(image.pixels), value, np.float32))
     image.save()
     bpy.data.images.remove(image)
-    if keep_times:
-        path.write_bytes(path.read_bytes().ljust(before.st_size, b"\0"))
-        os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    path.write_bytes(path.read_bytes().ljust(FILE_SIZE, b"\0"))
 
 
 def file_rewritten(folder: Path) -> None:
@@ -93,22 +89,10 @@ def file_rewritten(folder: Path) -> None:
 def file_of_equal_size_and_time(folder: Path) -> None:
     """Other pixels in a file of the same length and time."""
     path = folder / "filed.png"
-    content, status = bytearray(path.read_bytes()), path.stat()
-    swapped = _png(folder / "swap.png", len(content))
-    path.write_bytes(swapped)
-    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
-
-
-def _png(path: Path, size: int) -> bytes:
-    """The bytes of another picture, as many as asked for."""
-    image = bpy.data.images.new("swap", 8, 8)
-    image.pixels.foreach_set(np.linspace(1, 0, 256, dtype=np.float32))
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
-    bpy.data.images.remove(image)
-    content = path.read_bytes()
-    assert len(content) <= size + 64
-    return content.ljust(size, b"\0")
+    before = path.stat()
+    _rewrite(path, 0.8)
+    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
+    assert path.stat().st_size == before.st_size
 
 
 def file_gone(folder: Path) -> None:
@@ -158,9 +142,8 @@ def animated_node(_: Path) -> None:
 
 def driven_modifier(_: Path) -> None:
     """An input of geometry nodes that a driver sets."""
-    modifier = bpy.data.objects["Scattered"].modifiers["Scatter"]
-    driver = modifier.driver_add('["Socket_2"]').driver
-    driver.expression = "0.9"
+    owner, name = split(SHADE)
+    owner.driver_add(name).driver.expression = "0.9"
 
 
 def driven_property(_: Path) -> None:
@@ -414,7 +397,7 @@ STILL: tuple[Deed, ...] = (
     nodes_input_default,
     point_radius,
 )
-LENS: tuple[Deed, ...] = (focus_on_bone, focused_bone_moves)
+LENS: tuple[Deed, ...] = (focus_on_distance, focused_bone_moves)
 TIMED: tuple[Deed, ...] = (next_frame, sequence_file_rewritten)
 HARMLESS: tuple[Deed, ...] = (
     marker_alone,

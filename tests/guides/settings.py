@@ -36,6 +36,12 @@ def _modifier(name: str, modifier: str, /, **values: Any) -> dict[str, Any]:
     return _of(f'objects["{name}"].modifiers["{modifier}"]', **values)
 
 
+SHADE = 'objects["Scattered"].modifiers["Scatter"]'
+"""The input of geometry nodes that the colour of their instances comes from."""
+if hasattr(bpy.types, "GeometryNodesModifierInterface"):  # from Blender 5.2 on
+    SHADE += ".properties.inputs.Socket_2.value"
+else:
+    SHADE += '["Socket_2"]'
 _SHADER, _GROUP = "Principled BSDF", 'node_groups["Scatter"].nodes'
 CAMERA = {
     **_of(_MAIN, type="PERSP", ortho_scale=10.2, shift_x=0.02, shift_y=0.02),
@@ -95,7 +101,7 @@ OBJECT = {
     'objects["Copies"]["hue"]': 0.9,
     'meshes["Data"]["data_tint"]': 0.9,
     'meshes["DataPath"].remesh_voxel_size': 0.9,
-    'objects["Scattered"].modifiers["Scatter"]["Socket_2"]': 0.9,
+    SHADE: 0.9,
     'objects["Follower"].constraints["Copy Location"].influence': 0.5,
     'objects["Follower"].constraints["Copy Location"].mute': True,
     'objects["Rig"].pose.bones["Bone"].location': (0.3, 0.0, 0.0),
@@ -233,7 +239,7 @@ HARMLESS = {
 
 def put(path: str, value: Any) -> None:
     """Set what lies at a path; of a pointer the name of what it is to point at."""
-    owner, name = _split(path)
+    owner, name = split(path)
     if name.startswith('["'):
         owner[name[2:-2]] = value
         return
@@ -252,7 +258,8 @@ _LISTS = {
 }
 
 
-def _split(path: str) -> tuple[Any, str]:
+def split(path: str) -> tuple[Any, str]:
+    """The struct that a path ends in, and the property or `["key"]` of it."""
     if path.endswith('"]'):
         owner, _, name = path.rpartition('["')
         return bpy.data.path_resolve(owner), f'["{name}'

@@ -19,6 +19,7 @@ from xrds_lab.studio.nodes import Surface, solid
 
 WIDTH, HEIGHT = 96, 72
 COLUMNS = 8
+FILE_SIZE = 1000  # bytes of each image file, whatever it shows
 WEIGHTS = (0.1, 0.3, 0.5, 0.9)
 
 
@@ -69,7 +70,11 @@ def save(folder: Path, kind: str) -> None:
 
 
 def build(folder: Path, kind: str = "still") -> Any:
-    """Build a stage: `still`, `timed` (it knows the frame), `seen` (a lamp is)."""
+    """Build a stage.
+
+    `still`; `timed`, which knows the frame in several ways, `clocked` in one alone; in
+    `seen` there are mirrors and a lamp in the picture.
+    """
     scene = empty_scene(WIDTH, HEIGHT)
     scene.render.threads_mode, scene.render.threads = "FIXED", 1
     stage = Stage(scene, folder)
@@ -84,6 +89,8 @@ def build(folder: Path, kind: str = "still") -> Any:
         _timed(stage)
     if kind == "seen":
         _seen(stage)
+    if kind == "clocked":
+        _clocked(stage)
     layer = scene.view_layers[0]
     layer.use_pass_z = layer.use_pass_object_index = layer.use_pass_material_index = (
         True
@@ -99,6 +106,9 @@ def _cameras(stage: Stage) -> None:
     other.rotation_euler, other.data.name = (math.radians(90), 0, 0), "Other"
     lens = stage.link("Lens", bpy.data.cameras.new("Lens"), (0.0, -12.0, 0.4))
     lens.rotation_euler = (math.radians(90), 0, 0)
+    puller = stage.link("Puller", bpy.data.armatures.new("Puller"))
+    _add_bone(puller, "Focus")
+    lens.data.dof.focus_object, lens.data.dof.focus_subtarget = puller, "Focus"
     lens.data.dof.use_dof, lens.data.dof.aperture_fstop = True, 0.1
 
 
@@ -183,6 +193,7 @@ def _saved(path: Path) -> Any:
     image.filepath_raw, image.file_format = str(path), "PNG"
     image.save()
     bpy.data.images.remove(image)
+    path.write_bytes(path.read_bytes().ljust(FILE_SIZE, b"\0"))
     return bpy.data.images.load(str(path))
 
 
@@ -339,12 +350,17 @@ def _timed(stage: Stage) -> None:
     settings.lifetime, settings.normal_factor = 60, 0.6
     settings.render_type, settings.instance_object = "OBJECT", spark
     settings.particle_size = 1.0
+    _clocked(stage)
+    stage.tinted("Frame", "VIEW_LAYER", "frame_current")
+    stage.scene.frame_set(2)
+
+
+def _clocked(stage: Stage) -> None:
+    """Geometry nodes that read the time."""
     small = bpy.data.objects["Small"]
     clock = stage.thing("Clock", solid("Clock"), sheet(0.8, 0.8, 2, 2))
     clock.rotation_euler[0] = 1.0
     clock.modifiers.new("Scatter", "NODES").node_group = scatter(small, time=True)
-    stage.tinted("Frame", "VIEW_LAYER", "frame_current")
-    stage.scene.frame_set(2)
 
 
 def _seen(stage: Stage) -> None:

@@ -27,7 +27,8 @@ _LEFT_OUT = {
     "vertex_groups users_collection children children_recursive particle_systems "
     "active_selection_set selection_sets",
     "Mesh": "total_vert_sel total_edge_sel total_face_sel is_editmode shape_keys",
-    "Collection": "all_objects children_recursive",
+    "Collection": "all_objects children_recursive collection_objects "
+    "collection_children",
     "Camera": "background_images",
     "Node": "location location_absolute width height width_hidden dimensions label "
     "parent select color use_custom_color internal_links inputs outputs "
