@@ -85,8 +85,9 @@ def _camera(depsgraph: Any, render: Any, place: Any) -> Camera:
         left, bottom = border_start(render)
         window = left, height - bottom - picture_size(render)[1]
     return Camera(
-        view=np.array(place.normalized().inverted()),
-        project=np.array(project),
+        # of Blender 5.2's matrices NumPy would make float32, too coarse to compute with
+        view=np.array(place.normalized().inverted(), np.float64),
+        project=np.array(project, np.float64),
         size=(width, height),
         window=window,
         name=camera.name_full,
