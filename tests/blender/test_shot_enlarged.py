@@ -17,7 +17,7 @@ from xrds_blender import run_job
 from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.shot import enlarged
+from xrds_blender.shot import enlarged_finishing
 from xrds_core.errors import XRDSError
 from xrds_core.upscaler import Upscaler
 
@@ -104,7 +104,7 @@ def test_guides_of_what_stands_still_are_rendered_a_few_times(
     rendered = []
     samples = []
     guides = CyclesPasses.guides_by_view
-    gather = enlarged._gathered_guides
+    gather = enlarged_finishing._gathered_guides
 
     def count(passes: CyclesPasses, *given: Any, **named: Any) -> Any:
         rendered.append(named["portion"].offset)
@@ -116,7 +116,7 @@ def test_guides_of_what_stands_still_are_rendered_a_few_times(
         return found
 
     monkeypatch.setattr(CyclesPasses, "guides_by_view", count)
-    monkeypatch.setattr(enlarged, "_gathered_guides", look)
+    monkeypatch.setattr(enlarged_finishing, "_gathered_guides", look)
     render(lit, "shot", job={"temporal_radius": 1}, frames=[1, 2, 3, 4, 5, 6])
     assert sorted(rendered) == [0, 1, 2]  # and frames 4 to 6 take what is there
     assert samples == [2, 3, 3, 3, 3, 3]
@@ -141,8 +141,9 @@ def test_where_only_the_camera_moves_every_second_frame_has_guides(
     frames = rendered_guides(monkeypatch)
     result = render(moving, "shot", frames=[1, 2, 3, 4])
     assert frames == [1, 3, 4]
-    decisions = {each["decision"] for each in result["plan"]}
-    assert "guides" in decisions
+    assert [d["value"] for d in result["plan"] if d["decision"] == "guides"] == [
+        "rendered"
+    ]
     frames.clear()
     render(moving, "all", frames=[1, 2, 3, 4], job={"savings": ()})
     assert frames == [1, 2, 3, 4]

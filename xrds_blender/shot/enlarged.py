@@ -1,48 +1,36 @@
-"""A frame of a shot above scale 1: light and guides, each with its neighbours' samples.
+"""The samples of a frame of a shot above scale 1: light at low resolution, and guides.
 
-The light is accumulated and denoised at low resolution, the guides at full size; then
-the network makes the picture of both, as of a single frame.
+`enlarged_finishing` makes the picture of them and of their neighbours'.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.frame import Camera, Frame, Stored, store
-from xrds_core.temporal.moving import Movement
-from xrds_core.temporal.stand_in import stand_in
-from xrds_core.temporal.takes import same_take
 
 from ..cycles.low_samples import LowPlace, LowSamples
 from ..cycles.pass_names import COMBINED, is_light
 from ..cycles.passes import CyclesPasses
-from ..cycles.rendered import Beauty, Guides
+from ..cycles.rendered import Guides
 from ..cycles.view import low_view
 from ..frame import progress
-from ..frame.enlarging import enlarge
 from ..frame.facts import find_facts
 from ..frame.guide_cache import GuideName
 from ..frame.guides import GuideSource
-from ..frame.job import NetworkFailed, Picture, RenderJob, Temporal
-from ..frame.memory import peak_memory
-from ..planning.plan import Decision, Plan
+from ..frame.job import RenderJob
+from ..planning.plan import Decision, Facts, Plan
 from ..scene.facts import shapes_move
-from .finishing import accumulation
 from .sampling import Sampled, Sampling, light_of, sampling_of
-
-if TYPE_CHECKING:
-    from xrds_core import Upscaler
-    from xrds_core.denoising import Denoiser
-
 
 _OF_OTHERS = Decision(
     "guides", "of the frames beside", "only the camera moves: they show the same"
+)
+_NOT_KEPT = Decision(
+    "guide cache", "off", "the camera moves: no frame has the guides of another"
 )
 
 
@@ -78,121 +66,147 @@ def sample_enlarged(
     `between` two others takes its guides from them where that costs no detail.
     """
     how = sampling_of(engine, depsgraph, job, place)
-    name = f"of frame {how.number}"
     with CyclesPasses(engine, depsgraph, noisy=True, geometry=how.geometry) as passes:
         facts = find_facts(depsgraph, job)
         chosen = job.plan(facts)
         if not chosen.motion_blur:
             passes.hold_still()
-        progress.begin(engine, f"{progress.LOW} {name}", 1)
-        light = passes.low_samples(
-            job.scale, job.samples, seed=how.own_seed, portion=how.portion(how.count)
+        renders = _Renders(engine, depsgraph, job, how, passes, facts, chosen)
+        light = renders.light()
+        views = renders.views(light)
+        if between and renders.is_told_by_others():
+            return Sampled(_with_decision(views, _OF_OTHERS), _seconds(light))
+        return renders.with_guides(views, light)
+
+
+@dataclass(frozen=True)
+class _Renders:
+    """Both Cycles renders of one frame."""
+
+    engine: Any
+    depsgraph: Any
+    job: RenderJob
+    how: Sampling
+    passes: CyclesPasses
+    facts: Facts
+    chosen: Plan
+
+    def light(self) -> dict[str, LowSamples]:
+        """The noisy low-resolution light by view."""
+        self._begin(progress.LOW, 1)
+        how, job = self.how, self.job
+        portion = how.portion(how.count)
+        return self.passes.low_samples(
+            job.scale, job.samples, seed=how.own_seed, portion=portion
         )
-        exposure = job.exposure or passes.border_exposure()
-        shape = passes.region.height, passes.region.width
-        asked = _asks_for_guides(engine, passes)
-        if between and not asked and _is_told_by_others(depsgraph, job, how, chosen):
-            seen = replace(chosen, decisions=(*chosen.decisions, _OF_OTHERS))
-            lit = {
-                view: _view(how, job, low, view, shape, exposure, seen)
-                for view, low in light.items()
-            }
-            return Sampled(lit, _seconds(light))
-        progress.begin(engine, f"{progress.GUIDES} {name}", 2)
-        portion = how.portion(chosen.guide_samples, other=1)
-        wanted = _guide_job(job, how, chosen.guide_samples)
-        source = GuideSource(
-            passes, depsgraph, wanted, chosen, facts, engine.report, portion
-        )
-        noisy = {
-            view: low.place.beauty(low.samples.picture) for view, low in light.items()
-        }
-        guides = source.guides(noisy)
-        seen = replace(chosen, decisions=(*chosen.decisions, source.decision))
-        views = {
-            view: replace(
-                _view(how, job, low, view, shape, exposure, seen),
-                guides=_stored_guides(how, guides[view], passes, view, chosen),
-                guide_name=source.name,
+
+    def views(self, light: dict[str, LowSamples]) -> dict[str, View]:
+        """The views without guides."""
+        exposure = self.job.exposure or self.passes.border_exposure()
+        region = self.passes.region
+        return {
+            view: View(
+                light=_stored_light(self.how, self.job, low, view),
+                guides=None,
+                camera=self.how.cameras[view],
+                shape=(region.height, region.width),
+                guide_name=None,
+                place=low.place,
+                exposure=exposure,
+                plan=self.chosen,
             )
             for view, low in light.items()
         }
-    return Sampled(views, _seconds(light, guides))
+
+    def is_told_by_others(self) -> bool:
+        """Whether guides of the frames beside this one show what its own would show."""
+        if _OF_OTHERS.decision not in self.job.savings or not self.chosen.render_guides:
+            return False
+        spare = {name for _, name in self.engine.spare_passes}
+        asked = set(self.passes.pass_names()) - spare - {COMBINED}
+        if not all(is_light(name) for name in asked):
+            return False  # they come with the guides
+        # under a camera that stands still guides are not rendered again anyway
+        return self.how.place is None and not shapes_move(self.depsgraph)
+
+    def with_guides(
+        self, views: dict[str, View], light: dict[str, LowSamples]
+    ) -> Sampled:
+        """The views with guides, rendered or kept from a frame before."""
+        self._begin(progress.GUIDES, 2)
+        samples = self.chosen.guide_samples
+        source = GuideSource(
+            self.passes,
+            self.depsgraph,
+            _guide_job(self.job, self.how, samples),
+            self.chosen,
+            self.facts,
+            self.engine.report,
+            self.how.portion(samples, other=1),
+        )
+        noisy = {v: low.place.beauty(low.samples.picture) for v, low in light.items()}
+        guides = source.guides(noisy)
+        found = {
+            view: replace(
+                each, guides=self._stored(guides[view], view), guide_name=source.name
+            )
+            for view, each in views.items()
+        }
+        is_kept = self.how.place is not None or self.job.guide_cache is not None
+        decision = source.decision if is_kept else _NOT_KEPT
+        return Sampled(_with_decision(found, decision), _seconds(light, guides))
+
+    def _stored(self, guides: Guides, view: str) -> Stored:
+        if self.chosen.render_guides:
+            depth, vector = self.passes.geometry(view)
+        else:  # an even background
+            depth, vector = np.full(guides.alpha.shape, np.inf, np.float32), None
+        frame = Frame(
+            number=self.how.number,
+            camera=self.how.cameras[view],
+            radiance=None,
+            alpha=guides.alpha,
+            albedo=guides.albedo,
+            normal=guides.normal,
+            depth=depth,
+            vector=vector,
+            samples=guides.samples or self.chosen.guide_samples or 1,
+            still=self.how.still,
+        )
+        return store(frame, np.float16)
+
+    def _begin(self, stage: str, number: int) -> None:
+        progress.begin(self.engine, f"{stage} of frame {self.how.number}", number)
 
 
-def _asks_for_guides(engine: Any, passes: CyclesPasses) -> bool:
-    """Whether the file asks for passes that come with the guides."""
-    spare = {name for _, name in engine.spare_passes}
-    asked = set(passes.pass_names()) - spare - {COMBINED}
-    return not all(is_light(name) for name in asked)
+def _with_decision(views: dict[str, View], decision: Decision) -> dict[str, View]:
+    """The views with a decision in the place of that of its name."""
 
+    def decided(plan: Plan) -> Plan:
+        others = [d for d in plan.decisions if d.decision != decision.decision]
+        return replace(plan, decisions=(*others, decision))
 
-def _is_told_by_others(
-    depsgraph: Any, job: RenderJob, how: Sampling, chosen: Plan
-) -> bool:
-    """Whether guides of the frames beside this one show what its own would show."""
-    if _OF_OTHERS.decision not in job.savings or not chosen.render_guides:
-        return False
-    # under a camera that stands still they are not rendered again anyway
-    return how.place is None and not shapes_move(depsgraph)
-
-
-def _view(
-    how: Sampling,
-    job: RenderJob,
-    low: LowSamples,
-    view: str,
-    shape: tuple[int, int],
-    exposure: float | None,
-    seen: Plan,
-) -> View:
-    """A view without guides."""
-    return View(
-        light=_stored_light(how, job, low, view),
-        guides=None,
-        camera=how.cameras[view],
-        shape=shape,
-        guide_name=None,
-        place=low.place,
-        exposure=exposure,
-        plan=seen,
-    )
+    return {name: replace(v, plan=decided(v.plan)) for name, v in views.items()}
 
 
 def _guide_job(job: RenderJob, how: Sampling, samples: int) -> RenderJob:
-    """Under a camera that stands still guides are kept until they are as many."""
-    if how.place is None:
-        return replace(job, seed=how.own_seed)
-    enough = samples * (2 * how.radius + 1)
-    return replace(job, guide_limit=max(job.guide_limit, enough))
+    """Under a camera that stands still guides are kept until they are as many.
+
+    Under another no frame finds what one before it has left, so memory is spared.
+    """
+    if how.place is not None:
+        enough = samples * (2 * how.radius + 1)
+        return replace(job, guide_limit=max(job.guide_limit, enough))
+    kept = job.savings
+    if job.guide_cache is None:
+        kept = tuple(name for name in kept if name != _NOT_KEPT.decision)
+    return replace(job, seed=how.own_seed, savings=kept)
 
 
 def _stored_light(how: Sampling, job: RenderJob, low: LowSamples, view: str) -> Stored:
     window = low.place.window.x, low.place.window.y
     camera = low_view(how.cameras[view], job.scale, window)
     return store(light_of(how, camera, low.samples), np.float16)
-
-
-def _stored_guides(
-    how: Sampling, guides: Guides, passes: CyclesPasses, view: str, chosen: Plan
-) -> Stored:
-    if chosen.render_guides:
-        depth, vector = passes.geometry(view)
-    else:  # an even background
-        depth, vector = np.full(guides.alpha.shape, np.inf, np.float32), None
-    frame = Frame(
-        number=how.number,
-        camera=how.cameras[view],
-        radiance=None,
-        alpha=guides.alpha,
-        albedo=guides.albedo,
-        normal=guides.normal,
-        depth=depth,
-        vector=vector,
-        samples=guides.samples or chosen.guide_samples or 1,
-        still=how.still,
-    )
-    return store(frame, np.float16)
 
 
 def _seconds(
@@ -207,103 +221,3 @@ def _seconds(
         for stage, value in each.items():
             seconds[stage] += value
     return seconds
-
-
-def finish_enlarged(
-    own: View,
-    lenders: Sequence[View],
-    job: RenderJob,
-    denoiser: Denoiser,
-    upscaler: Upscaler,
-    movement: Movement,
-    report: Callable[[float], bool] | None = None,
-) -> Picture:
-    """The picture of a view.
-
-    Its seconds are of accumulation, denoising and network alone. Raises Cancelled where
-    `report` says so, and what the network raises.
-    """
-    started = time.perf_counter()
-    gathered = accumulate(own.light, [each.light for each in lenders], movement)
-    guides = _gathered_guides(own, lenders, movement)
-    accumulated = time.perf_counter()
-    beauty = _denoised(own, gathered, denoiser)
-    denoised = time.perf_counter()
-    try:
-        picture = enlarge(
-            beauty,
-            guides,
-            job,
-            upscaler,
-            exposure=own.exposure,
-            skip_idle=own.plan.skip_idle,
-            progress=report,
-        )
-    except NetworkFailed as error:
-        error.number = own.light.number
-        raise
-    seconds = {
-        "accumulate": accumulated - started,
-        "denoise": denoised - accumulated,
-        "network": time.perf_counter() - denoised,
-    }
-    temporal = Temporal(
-        job.temporal_radius,
-        gathered.frames,
-        float(gathered.samples.mean()),
-        gathered.rejected,
-    )
-    return Picture(
-        radiance=np.ascontiguousarray(picture[..., :3]),
-        alpha=np.ascontiguousarray(picture[..., 3]),
-        albedo=guides.albedo,
-        normal=guides.normal,
-        low_resolution=beauty.radiance,
-        seconds=seconds,
-        plan=(*own.plan.decisions, accumulation(gathered.frames)),
-        peak_memory=peak_memory(),
-        device=str(upscaler.device),
-        temporal=temporal,
-    )
-
-
-def _denoised(own: View, gathered: Accumulated, denoiser: Denoiser) -> Beauty:
-    assert gathered.radiance is not None
-    picture = np.dstack((gathered.radiance, gathered.alpha))
-    if not own.plan.denoise:
-        return own.place.beauty(picture)
-    denoised = denoiser(picture, gathered.albedo, gathered.normal)
-    return own.place.beauty(denoised.radiance, gathered.radiance)
-
-
-def _gathered_guides(own: View, lenders: Sequence[View], movement: Movement) -> Guides:
-    """Guides with the samples of other frames; the richest of those of one name."""
-    others = [each for each in lenders if each.guides is not None]
-    if own.guide_name is not None:
-        name = own.guide_name
-        same = [own, *(each for each in others if name.is_same(each.guide_name))]
-        own = max(same, key=_samples)
-        others = [each for each in others if each not in same]
-    lent = [each.guides for each in others if each.guides is not None]
-    target = own.guides
-    if target is None:
-        number = own.light.number
-        beside = sorted(lent, key=lambda each: abs(each.number - number))[:2]
-        target = stand_in(number, own.camera, beside)
-    found = accumulate(target, lent, movement)
-    assert found.alpha is not None
-    # their own number: where nothing is lent there are no more
-    samples = max(1, int(target.samples))
-    return Guides(found.albedo, found.normal, found.alpha, None, None, samples)
-
-
-def lacks_guides(own: View, lenders: Sequence[View]) -> bool:
-    """Whether a frame counted on guides of frames that a cut parts from it."""
-    if own.guides is not None:
-        return False
-    rich = [each.light for each in lenders if each.guides is not None]
-    return not same_take(own.light, rich)
-
-
-def _samples(view: View) -> float:
-    return 0.0 if view.guides is None else view.guides.samples

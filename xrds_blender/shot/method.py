@@ -13,7 +13,8 @@ from ..frame.denoisers import load_denoiser
 from ..frame.enlarging import enlarged_lights
 from ..frame.job import Picture, RenderJob
 from ..frame.networks import load_upscaler
-from .enlarged import finish_enlarged, lacks_guides, sample_enlarged
+from .enlarged import sample_enlarged
+from .enlarged_finishing import finish_enlarged, lacks_guides
 from .finishing import finish
 from .sampling import Keep, Sampled, sample_frame
 
