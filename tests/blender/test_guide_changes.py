@@ -79,7 +79,7 @@ ONCE_WRONG = (
     "sequence_file_rewritten lifetime driven_modifier vertex_weight frame_start "
     'objects["Copies"].color ["hue"] ["layer_mood"] Socket_2.value ["Socket_2"] '
     "focused_bone_moves file_of_equal_size_and_time layer_path_shown next_frame "
-    "remesh_voxel_size audio_volume lamp_added"
+    "remesh_voxel_size audio_volume lamp_added viewer viewer_as_texture"
 )
 
 
@@ -168,19 +168,27 @@ def changed(case: Case, base: Path, folder: Path) -> tuple[str, Passes, Passes]:
 
 
 def test_no_change_takes_guides_that_are_not_its_own(
-    case: Case, stages: Callable[[str], Path], tmp_path: Path
+    case: Case,
+    stages: Callable[[str], Path],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     said, kept, anew = changed(case, stages(case.stage), tmp_path)
     assert not differ(kept, anew), f"{said}: {case}"
     assert not guide_cache.CACHE.holes, "the probe alone knew it"
+    assert "bpy.rna" not in "".join(capfd.readouterr())  # of properties that were read
 
 
 def test_what_guides_do_not_depend_on_takes_them(
-    harmless: Case, stages: Callable[[str], Path], tmp_path: Path
+    harmless: Case,
+    stages: Callable[[str], Path],
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     said, kept, anew = changed(harmless, stages(harmless.stage), tmp_path)
     assert said == "used 1 samples"
     assert not differ(kept, anew)
+    assert "bpy.rna" not in "".join(capfd.readouterr())
 
 
 def test_a_key_with_a_hole_costs_a_render_and_no_picture(

@@ -348,6 +348,32 @@ def saved_and_opened(folder: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=path)
 
 
+def viewer(_: Path) -> None:
+    """A compositor with a viewer, whose image every render changes."""
+    tree = _compositor()
+    layers, shown = (
+        tree.nodes.new(f"CompositorNode{kind}") for kind in ("RLayers", "Viewer")
+    )
+    tree.links.new(layers.outputs[0], shown.inputs[0])
+
+
+def viewer_as_texture(folder: Path) -> None:
+    """The viewer's image on a thing."""
+    viewer(folder)
+    image = next(each for each in bpy.data.images if each.source == "VIEWER")
+    _tree("Painted").nodes["Image Texture"].image = image
+
+
+def _compositor() -> Any:
+    scene = _scene()
+    if hasattr(scene, "compositing_node_group"):  # from Blender 5.0 on
+        tree = bpy.data.node_groups.new("Compositor", "CompositorNodeTree")
+        scene.compositing_node_group = tree
+        return tree
+    scene.use_nodes = True
+    return scene.node_tree
+
+
 def unused_material(_: Path) -> None:
     """A material that nothing wears."""
     bpy.data.materials.new("Unused").use_fake_user = True
@@ -396,6 +422,7 @@ STILL: tuple[Deed, ...] = (
     instance_on_faces,
     nodes_input_default,
     point_radius,
+    viewer_as_texture,
 )
 LENS: tuple[Deed, ...] = (focus_on_distance, focused_bone_moves)
 TIMED: tuple[Deed, ...] = (next_frame, sequence_file_rewritten)
@@ -405,4 +432,5 @@ HARMLESS: tuple[Deed, ...] = (
     lamp_added,
     saved_and_opened,
     unused_material,
+    viewer,
 )

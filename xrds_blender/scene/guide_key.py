@@ -156,6 +156,8 @@ class _SceneHash:
 
     def _reference(self, item: Any) -> None:
         """What a setting points at: its name here, what it holds by itself."""
+        if self._is_shown(item):
+            raise NotFollowed(f"the image {item.name}, which every render changes")
         if not self._counts(item):
             return
         self._add(type(item).__name__, item.name_full)
@@ -187,13 +189,19 @@ class _SceneHash:
         elif isinstance(item, (types.CacheFile, types.Volume)):
             self._is_timed |= item.is_sequence
 
+    def _is_shown(self, item: Any) -> bool:
+        """Whether an image is what Blender shows of a render."""
+        return isinstance(item, self._types.Image) and item.source == "VIEWER"
+
     def _counts(self, item: Any) -> bool:
-        """Whether guides can depend on a data-block of light."""
+        """Whether guides can depend on a data-block of light, or of the compositor."""
         types, facts = self._types, self._facts
         if isinstance(item, types.Object) and item.type == "LIGHT":
             return facts.seen_lamps > 0
         if isinstance(item, types.Light):
             return facts.seen_lamps > 0
+        if self._is_shown(item):
+            return False  # in the compositor; where shaders see it, see `_reference`
         if isinstance(item, types.World):
             unseen = facts.film_transparent and not (facts.smooth or facts.volumes)
             return not unseen or any(n.type == "OUTPUT_AOV" for n in _nodes(item))
