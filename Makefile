@@ -1,15 +1,21 @@
-# make install | test | test-app | demo | extension | clean.  BPY=5.0.1 picks another Blender.
+# make install | test | test-other | test-app | demo | extension | clean.  BPY=5.0.1 picks another Blender.
 PYTHON ?= python3.11
 VENV   ?= .venv
 BPY    ?= 4.5.15
 TORCH  ?= 2.13.0
 RUN    := $(VENV)/bin/python
+PACKAGES := import sysconfig; print(sysconfig.get_path("purelib"))
 STAMP  := $(VENV)/.installed-bpy-$(BPY)-torch-$(TORCH)
 
 PLATFORMS ?= linux-x64 windows-x64 macos-arm64
 SUITES ?= trixie sid
 
-.PHONY: install test test-app demo extension clean
+# A second Blender for the tests: its bpy alone, all else comes from $(VENV).
+OTHER_BPY  ?= 5.0.1
+OTHER_VENV := $(VENV)-bpy-$(OTHER_BPY)
+OTHER_RUN  := $(OTHER_VENV)/bin/python
+
+.PHONY: install test test-other test-app demo extension clean
 
 install: $(STAMP)
 
@@ -25,6 +31,16 @@ test: install
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 	$(RUN) tests/run.py
+
+test-other: install $(OTHER_VENV)/.installed
+	$(OTHER_RUN) tests/run.py blender/
+
+$(OTHER_VENV)/.installed:
+	$(PYTHON) -m venv --without-pip $(OTHER_VENV)
+	$(RUN) -m pip --python $(OTHER_RUN) install --quiet --no-deps "bpy==$(OTHER_BPY)"
+	echo "import site; site.addsitedir('$$($(RUN) -c '$(PACKAGES)')')" \
+	    > "$$($(OTHER_RUN) -c '$(PACKAGES)')/others.pth"
+	touch $@
 
 # Real Blender programs out of Debian, fetched once into build/blender; needs root.
 test-app: install

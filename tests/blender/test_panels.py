@@ -58,7 +58,8 @@ def test_what_asks_for_cycles_by_name_shows_under_xrds() -> None:
     subdivision = bpy.types.CYCLES_RENDER_PT_subdivision
     for engine in ("CYCLES", "XRDS"):
         scene.render.engine = engine
-        scene.cycles.feature_set = "EXPERIMENTAL"
+        if hasattr(scene.cycles, "feature_set"):  # before Blender 5.0
+            scene.cycles.feature_set = "EXPERIMENTAL"
         context = SimpleNamespace(scene=scene, engine=engine)
         assert subdivision.poll(context), engine
 
