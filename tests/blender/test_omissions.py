@@ -11,6 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import run_job
+from xrds_blender.frame.explain import explain
 from xrds_blender.frame.facts import find_facts
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
@@ -175,3 +176,33 @@ def test_holding_still_is_no_motion_blur() -> None:
     np.testing.assert_array_equal(picture(True, True), sharp)
     assert np.abs(picture(True, False) - sharp).mean() > 0.01
     assert scene.render.use_motion_blur
+
+
+def test_a_plan_is_of_the_frames_asked_for() -> None:
+    """Of the first of them, and of what these frames lend to each other."""
+    scene = small("plain")
+    shader = bpy.data.objects["Red"].data.materials[0].node_tree.nodes
+    alpha = shader["Principled BSDF"].inputs["Alpha"]
+    alpha.default_value = 1.0
+    alpha.keyframe_insert("default_value", frame=4)
+    alpha.default_value = 0.5
+    alpha.keyframe_insert("default_value", frame=6)
+    other = scene.camera.copy()
+    scene.collection.objects.link(other)
+    for frame, camera in ((1, scene.camera), (8, other)):
+        scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+    job = RenderJob(scale=2, temporal_radius=2)
+
+    def told(*frames: int) -> tuple[bool, dict[str, str]]:
+        found = explain(scene, job, frames)
+        values = {each["decision"]: each["value"] for each in found["decisions"]}
+        return found["facts"]["scene"]["transparent"], values
+
+    opaque, alone = told(2)
+    assert not opaque
+    assert "accumulation" not in alone
+    clear, together = told(6, 7, 8)
+    assert clear
+    assert together["accumulation"] == "2 frames to each side"
+    assert together["cuts"] == "frame 8"
+    assert "cuts" not in told(6, 7)[1]

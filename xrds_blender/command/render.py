@@ -79,8 +79,8 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
     from ..frame.explain import explain
     from .scene_file import open_scene
 
-    job = job_of(options)
-    return explain(open_scene(options.scene, choice_of(options)), job)
+    job, frames = job_of(options), getattr(options, "frames", None)
+    return explain(open_scene(options.scene, choice_of(options)), job, frames)
 
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -16,32 +17,41 @@ from .picking import pick, picked_decisions
 from .rendering import call_engine
 
 
-def explain(scene: Any, job: RenderJob) -> dict[str, Any]:
-    """Facts and decisions of a scene, evaluated as for a render.
+def explain(
+    scene: Any, job: RenderJob, frames: Sequence[int] | None = None
+) -> dict[str, Any]:
+    """Facts and decisions of the first of some frames, evaluated as for its render.
 
-    Nothing is rendered but, for a time budget or a quality, the probes that a render
-    would choose by. Raises SceneError without a camera.
+    `frames` None is the scene's current one, and its whole range as a shot. Nothing is
+    rendered but, for a time budget or a quality, the probes that a render would choose
+    by. Raises SceneError without a camera.
     """
     start = time.perf_counter()
+    if frames:
+        scene.frame_set(frames[0])
+    shot = frames or range(scene.frame_start, scene.frame_end + 1)
 
     def look(engine: Any, depsgraph: Any) -> dict[str, Any]:
         if not job.is_picked:
-            return _told(scene, depsgraph, job)
+            return _told(depsgraph, job, scene, shot)
         with CyclesPasses(engine, depsgraph) as passes:
             picked, decision = pick(passes, job, start)
-            return _told(scene, depsgraph, picked, decision)
+            return _told(depsgraph, picked, scene, shot, decision)
 
     return call_engine(scene, look)
 
 
 def _told(
-    scene: Any, depsgraph: Any, job: RenderJob, choice: Decision | None = None
+    depsgraph: Any,
+    job: RenderJob,
+    scene: Any,
+    shot: Sequence[int],
+    choice: Decision | None = None,
 ) -> dict[str, Any]:
     facts = find_facts(depsgraph, job)
     decisions = job.plan(facts).decisions
-    if job.temporal_radius:
-        frames = range(scene.frame_start, scene.frame_end + 1)
-        decisions += lending(facts, job.temporal_radius, cuts(scene, frames))
+    if job.temporal_radius and len(shot) > 1:
+        decisions += lending(facts, job.temporal_radius, cuts(scene, shot))
     if choice is not None:
         decisions = picked_decisions(job, choice, decisions)
     return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}
