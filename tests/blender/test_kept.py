@@ -254,8 +254,10 @@ def test_a_failed_frame_is_rendered_again_by_itself(blend: Path) -> None:
     assert any("frames 3" in line for line in said)
     keep(blend, [3])
     told = denoise(blend, "out", range(1, 6), resume=True)
-    assert [each["frame"] for each in told["frames"]] == [3]
-    assert told["frames"][0]["temporal"]["frames"] == (1, 2, 3, 4, 5)
+    # those beside it, too: they lacked its samples
+    assert [each["frame"] for each in told["frames"]] == [1, 2, 3, 4, 5]
+    assert told["frames"][2]["temporal"]["frames"] == (1, 2, 3, 4, 5)
+    assert not denoise(blend, "out", range(1, 6), resume=True)["frames"]
 
 
 def test_samples_come_from_beyond_a_chunk(blend: Path) -> None:

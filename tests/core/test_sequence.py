@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -353,6 +354,15 @@ def test_resume_makes_what_is_missing_the_same(shot: Path, denoiser: Denoiser) -
     assert {path.name: path.read_bytes() for path in out.iterdir()} == whole
     assert (out / "0003.exr").stat().st_mtime_ns == kept
     assert not denoise(shot, denoiser, resume=True)["frames"]
+
+
+def test_resume_takes_samples_that_came_late(shot: Path, denoiser: Denoiser) -> None:
+    denoise(shot, denoiser, radius=1)
+    late = (shot / "out" / "0005.exr").stat().st_mtime + 10
+    os.utime(shot / "in" / "0004.exr", (late, late))
+    told = denoise(shot, denoiser, radius=1, resume=True)
+    assert [entry["frame"] for entry in told["frames"]] == [3, 4, 5]
+    assert told["kept"] == [1, 2]
 
 
 def test_a_frame_says_how_long_the_others_will_take(

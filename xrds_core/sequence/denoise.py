@@ -57,9 +57,16 @@ class Files:
         )
         return path
 
-    def is_done(self, number: int) -> bool:
-        """Whether a whole output of the input's size is there."""
+    def is_done(self, number: int, lenders: Iterable[int] = ()) -> bool:
+        """Whether a whole output of the input's size is there, younger than its inputs.
+
+        So a frame counts as missing when the samples of one of its `lenders` came late.
+        """
         source, output = (frame_path(x, number) for x in (self.source, self.output))
+        inputs = [source, *(frame_path(self.source, n) for n in lenders)]
+        times = [path.stat().st_mtime_ns for path in inputs if path.is_file()]
+        if not output.is_file() or output.stat().st_mtime_ns < max(times, default=0):
+            return False
         try:
             size = exr.display_size(output, whole=True)
             return not source.is_file() or size == exr.display_size(source)
@@ -99,7 +106,8 @@ def denoise_sequence(
             lend, too.
         radius: how many frames before and after lend; by default what the files
             recommend, or 4.
-        resume: leave outputs as they are that lie there whole and of their size.
+        resume: leave outputs as they are that lie there whole, of their size, and
+            younger than all inputs that lend to them.
         say: takes a line about a frame that is finished, left out, or does not lend.
 
     Returns:
@@ -115,16 +123,18 @@ def denoise_sequence(
     files.check(numbers)
     if "#" not in Path(files.source).name:
         radius = radius or 0  # a frame alone
-    todo = [n for n in numbers if not (resume and files.is_done(n))]
     loader = Loader(files.source, reading or Reading(), lends=radius != 0, say=say)
     loader.look(numbers)
-    first = loader.first(todo)
-    if first is None and len(todo) == len(numbers):
-        raise PictureError(f"no frame can be read: {loader.failed[todo[0]]}")
+    first = loader.first(numbers)
     if radius is None:
         radius = RADIUS if first is None or first.radius is None else first.radius
-    lending = _beside(files.source, numbers, radius)
-    shot = Shot(tuple(todo), radius, lending=(*numbers, *lending))
+    lending = (*numbers, *_beside(files.source, numbers, radius))
+    shot = Shot((), radius, lending=lending)
+    done = {n for n in numbers if resume and files.is_done(n, shot.lenders(n))}
+    if first is None and not done:
+        raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
+    todo = [n for n in numbers if n not in done]
+    shot = Shot(tuple(todo), radius, lending=lending)
     entries = []
     clock = Clock()
     for entry in _entries(files, denoiser, shot, loader, resume, say):
@@ -137,7 +147,7 @@ def denoise_sequence(
         "temporal_radius": radius,
         "device": denoiser.device,
         "frames": entries,
-        "kept": [n for n in numbers if n not in todo],
+        "kept": sorted(done),
         "left_out": [
             {"frame": n, "reason": why}
             for n, why in sorted(loader.failed.items())
@@ -157,7 +167,8 @@ def _entries(
     """Finish and write the frames of a shot; yields what is told of each."""
     lenders, movement = Lenders(say), Movement()
     for number, own, beside in slide(shot, loader.load):
-        if resume and files.is_done(number):  # another machine was quicker
+        # another machine may have been quicker
+        if resume and files.is_done(number, shot.lenders(number)):
             continue
         others = lenders.of(number, own, beside)
         finished = finish_frame(
