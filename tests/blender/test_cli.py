@@ -378,9 +378,10 @@ def test_a_signal_does_not_wait_for_c(tmp_path: Path, name: str, told: str) -> N
 # --- streams that the shell closed, or that take no more ------------------------------
 
 STREAMS = """
-import os, sys
+import os, signal, sys
 from pathlib import Path
 from xrds_blender.command import console, streams
+signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as in a Blender program
 console.prepare()
 with open(sys.argv[1], "w") as picture:  # as any file that is opened afterwards
     assert picture.fileno() > 2

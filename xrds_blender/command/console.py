@@ -107,6 +107,8 @@ def _reason(error: OSError) -> str:
 def prepare() -> None:
     """Make streams and signals safe; once, at the start of a process."""
     streams.prepare()
+    if hasattr(signal, "SIGPIPE"):  # as in Python, but not in a Blender program
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     end_at_once_by_signals()
     atomic.sweep()
 

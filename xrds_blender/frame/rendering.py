@@ -115,7 +115,9 @@ def call_engine(
             engine_loan.lend(scene)
             bpy.ops.render.render(scene=scene.name, layer=name)
     except RuntimeError as error:
-        message = str(error).removeprefix("Error: ").strip()
+        # Blender says the same once for each report
+        lines = [x.removeprefix("Error:").strip() for x in str(error).splitlines()]
+        message = "; ".join(dict.fromkeys(filter(None, lines)))
         task.error = task.error or SceneError(message)
     finally:
         _task = None
