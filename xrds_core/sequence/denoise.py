@@ -148,11 +148,7 @@ def denoise_sequence(
         "device": denoiser.device,
         "frames": entries,
         "kept": sorted(done),
-        "left_out": [
-            {"frame": n, "reason": why}
-            for n, why in sorted(loader.failed.items())
-            if n in todo
-        ],
+        "left_out": _left_out(loader, todo),
     }
 
 
@@ -179,6 +175,11 @@ def _entries(
         seconds = {"read": loader.seconds(), **finished.seconds}
         seconds["write"] = time.perf_counter() - started
         yield _entry(number, path, shot.radius, finished, seconds)
+
+
+def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
+    failed = {n: loader.failed[n] for n in todo if n in loader.failed}
+    return [{"frame": n, "reason": why} for n, why in failed.items()]
 
 
 def _all_frames(pattern: str) -> list[int]:
