@@ -192,14 +192,14 @@ bpy.context.preferences.view.render_display_type = 'AREA'
 render = bpy.data.scenes[0].render
 render.resolution_x, render.resolution_y = 320, 180
 bpy.data.scenes[0].xrds.way = {way!r}
+bpy.data.scenes[0].cycles.use_adaptive_sampling = False
 """
     )
     before = settings(window)
     press(window, RENDER_IMAGE)
-    window.wait("bpy.app.is_job_running('RENDER')", 60)
-    time.sleep(6.0)
+    window.wait(SAMPLES_ARE_TAKEN)  # the first render of this way loads PyTorch
     window.move(400, 620)
-    time.sleep(2.0)
+    time.sleep(3.0)
     seen = brightness(window.shot(f"10_growing_{way}"))
     window.key("Escape")
     assert finished(window)[-1] == "render_cancel"
@@ -220,6 +220,14 @@ bpy.data.scenes[0].xrds.way = 'full_size'
         assert picture.std() > 10.0
         assert picture.max() > 100.0
     assert np.abs(seen - kept).mean() < 10.0
+
+
+SAMPLES_ARE_TAKEN = """
+import sys
+progress = sys.modules.get('xrds_blender.frame.progress')
+run = progress and progress._run
+run and (sys.modules['xrds_blender.cycles.status'].fraction(run.engine) or 0) > 0
+"""
 
 
 def brightness(path: Path) -> np.ndarray:

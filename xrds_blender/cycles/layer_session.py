@@ -13,7 +13,7 @@ from typing import Any, Self
 
 from xrds_core.arrays import Array
 
-from . import live, session, spare_passes
+from . import session, spare_passes
 from .borrowed import Borrowed, PipelineSettings
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
 from .pass_names import COMBINED, DEPTH, GUIDE_PASSES, NOISY, is_light
@@ -144,7 +144,6 @@ class LayerSession:
             for camera in self._cameras():
                 widen(borrowed, camera, self.frame, grid.scale)
         size = self.frame.low_size(grid.scale)
-        live.samples(grid.scale)
         return self._run(size, grid.rendered(self._size), exact=exact)
 
     def _run(

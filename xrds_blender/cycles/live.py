@@ -37,10 +37,15 @@ def now() -> Live:
 
 
 def samples(scale: int = 1) -> None:
-    """From now on Cycles draws its samples, unless there is a picture."""
+    """From now on Cycles draws its samples, of a picture to come."""
     global _now
+    _now = Live(scale=scale)
+
+
+def guides() -> None:
+    """From now on Cycles renders guides, which are drawn where there is no picture."""
     if _now.picture is None:
-        _now = Live(scale=scale)
+        samples()
 
 
 def show(picture: Array, scale: int = 1, offset: tuple[int, int] = (0, 0)) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 from xrds_core.temporal.samples import Portion
 
 from ..planning.denoiser import Denoiser
-from . import session, spare_passes
+from . import live, session, spare_passes
 from .borrowed import Borrowed
 from .clock import StageClock
 from .pass_names import GUIDE_PASSES
@@ -45,6 +45,7 @@ def render_once(
             set_denoising(borrowed, scene, layer, False)
         elif denoiser is not None and session.has_denoiser():
             set_denoising(borrowed, scene, layer, True, denoiser)
+        live.samples()
         try:
             clock = session.run(engine, depsgraph)
         finally:

@@ -84,6 +84,7 @@ class CyclesPasses(LayerSession):
         with Borrowed() as borrowed:
             set_sampling(borrowed, self._scene, samples, seed)
             set_denoising(borrowed, self._scene, self._layer_eval, denoise, denoiser)
+            live.samples(scale)
             clock = self._run_low(borrowed, grid)
         seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
         return {
@@ -107,9 +108,13 @@ class CyclesPasses(LayerSession):
         with Borrowed() as borrowed:
             self._set_samples(borrowed, samples, seed, portion)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
+            live.samples(scale)
             clock = self._run_low(borrowed, grid)
         seconds = {"sync": clock.sync, "beauty": clock.render, "denoise": 0.0}
-        return {view: self._read_low(view, grid, seconds) for view in self.views}
+        low = {view: self._read_low(view, grid, seconds) for view in self.views}
+        first = low[self.views[0]]
+        live.show(first.samples.picture, scale, first.place.offset)
+        return low
 
     def stopped_samples(self, scale: int) -> dict[str, LowSamples]:
         """What `low_samples` has left in the result when the user stopped it."""
@@ -172,7 +177,7 @@ class CyclesPasses(LayerSession):
         with Borrowed() as borrowed, settings:
             self._set_samples(borrowed, samples, seed, portion)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
-            live.samples()
+            live.guides()
             clock = self._run((self.width, self.height), self.region, exact=full)
         seconds = {"sync": clock.sync, "guides": clock.render}
         return {

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def load_denoiser(job: RenderJob) -> Denoiser:
-    """The denoiser of a job; the last one stays for the next frame.
+    """The denoiser of a job; the last two stay for the next frame.
 
     The network's graphics card may be one that this library does not know: it takes
     the fastest device by itself. Raises XRDSError where it cannot be loaded.
@@ -46,7 +46,7 @@ def in_process(job: RenderJob) -> InProcess | None:
     return lambda picture, albedo, normal: denoiser(picture, albedo, normal).radiance
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)  # alpha and stopped pictures take another quality
 def _load(
     quality: str, device: str, threads: int, memory_limit: int | None
 ) -> Denoiser:

@@ -12,6 +12,7 @@ from xrds_core.errors import OutOfMemory, WeightsError
 
 from ..cycles.colour import converted, to_rec709, working_space
 from ..cycles.rendered import Beauty, Guides
+from .cover import cover
 from .job import NetworkFailed, RenderJob
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def enlarge(
             placed(guides.normal),
             noisy=seen(beauty.noisy),
             guide_radiance=placed(seen(guides.radiance)),
-            guide_alpha=placed(guides.alpha),
+            guide_alpha=placed(cover(guides, job)),
             guide_samples=guides.samples,
             exposure=exposure,
             memory_limit=job.memory_limit,

@@ -1,0 +1,63 @@
+"""Alpha above scale 1: that of four guide samples, without their noise."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("bpy")
+pytest.importorskip("mitsuba_oidn")
+
+from xrds_blender.cycles.rendered import Guides
+from xrds_blender.frame import denoisers
+from xrds_blender.frame.cover import cover
+from xrds_blender.frame.job import RenderJob
+
+SIDE = 96
+
+
+def scene() -> np.ndarray:
+    """A disc's exact alpha, and a veil of 0.4 beside it."""
+    y, x = np.mgrid[:SIDE, :SIDE] + 0.5
+    alpha = np.clip(30.5 - np.hypot(x - 40, y - 45), 0.0, 1.0)
+    alpha[8:80, 76:92] = 0.4
+    return alpha.astype(np.float32)
+
+
+def guides_of(alpha: np.ndarray, samples: int | None = 4) -> Guides:
+    hits = np.random.default_rng(1).binomial(samples or 1, alpha) / (samples or 1)
+    nothing = np.zeros((*alpha.shape, 3), np.float32)
+    noisy = hits.astype(np.float32) if samples else alpha
+    return Guides(nothing, nothing, noisy, None, None, samples)
+
+
+def error(alpha: np.ndarray) -> float:
+    return float(np.sqrt(np.mean((alpha - scene()) ** 2)))
+
+
+def test_noise_goes_and_edges_stay() -> None:
+    guides = guides_of(scene())
+    found = cover(guides, RenderJob())
+    assert found.dtype == np.float32
+    assert error(found) < 0.6 * error(guides.alpha)
+    assert 0.0 <= found.min() <= found.max() <= 1.0
+    inside, outside = found[30:60, 25:55], found[85:, :70]
+    assert (inside == 1.0).all()
+    assert (outside == 0.0).all()
+
+
+@pytest.mark.parametrize("alpha", [np.ones((8, 8), np.float32), scene()])
+def test_what_has_no_noise_stays_as_it_is(alpha: np.ndarray) -> None:
+    samples = 4 if alpha.min() == 1.0 else None
+    guides = guides_of(alpha, samples)
+    assert cover(guides, RenderJob()) is guides.alpha
+
+
+def test_without_the_library_it_stays_as_it_is(monkeypatch: Any) -> None:
+    denoisers._load.cache_clear()
+    monkeypatch.setitem(sys.modules, "mitsuba_oidn", None)
+    guides = guides_of(scene())
+    assert cover(guides, RenderJob()) is guides.alpha
