@@ -20,6 +20,11 @@ BRIGHTEST = 1e12
 _LARGEST = np.finfo(np.float32).max
 
 
+def told(bad_pixels: int) -> str:
+    """What a user is told of bad pixels."""
+    return f"replaced {bad_pixels} bad pixels: NaN, infinities or negative light"
+
+
 def clean_radiance(x: Array) -> tuple[Array, int]:
     """Return (x, bad pixels): NaN, infinities and overflows filled in, negative 0.
 

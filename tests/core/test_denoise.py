@@ -151,6 +151,19 @@ def test_poison_everywhere(high: Denoiser, value: float) -> None:
     assert (result == 0).all()
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_lost_alpha_is_counted_and_keeps_the_colour(
+    high: Denoiser, value: float
+) -> None:
+    _, noisy, albedo, normal = render(24, 20)
+    whole = high(noisy, albedo, normal)
+    alpha = np.full((*noisy.shape[:2], 1), value, np.float32)
+    lost = high(np.dstack((noisy, alpha)), albedo, normal)
+    assert lost.bad_pixels == whole.bad_pixels + alpha.size
+    np.testing.assert_array_equal(lost.radiance[..., :3], whole.radiance)
+    assert (lost.radiance[..., 3] == 1).all()
+
+
 def test_one_bad_pixel_leaves_no_mark(high: Denoiser) -> None:
     _, noisy, albedo, normal = render(64, 64)
     noisy[:] = 0.5

@@ -118,6 +118,16 @@ def test_a_lost_alpha_is_counted_and_told_and_keeps_the_colour(folder: Path) -> 
     np.testing.assert_array_equal(*results)
 
 
+def test_bad_pixels_of_a_shot_are_told_by_frame() -> None:
+    from xrds_blender.command.denoise import _lines
+
+    frames = [{"frame": n, "bad_pixels": bad} for n, bad in ((3, 0), (4, 7))]
+    told = _lines({"output": "out", "frames": frames, "kept": []})
+    assert told[1:] == [
+        "  frame 4: replaced 7 bad pixels: NaN, infinities or negative light"
+    ]
+
+
 @pytest.mark.parametrize("guides", ["fast"])
 def test_a_wrong_guide_file_writes_nothing(folder: Path) -> None:
     low = folder / "low.exr"

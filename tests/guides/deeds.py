@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,8 @@ import numpy as np
 from xrds_lab.studio.geometry import box
 from xrds_lab.studio.nodes import solid
 
+from . import images
 from .settings import SHADE, put, split
-from .stage import FILE_SIZE
 
 Deed = Callable[[Path], None]
 """Is given the folder of the stage's images."""
@@ -70,51 +69,6 @@ def focus_on_distance(_: Path) -> None:
 def focused_bone_moves(_: Path) -> None:
     """The bone in focus, which moves nothing else, goes towards the camera."""
     bpy.data.objects["Puller"].pose.bones["Focus"].location = (0.0, 0.0, 6.0)
-
-
-def _rewrite(path: Path, value: float) -> None:
-    """Write a file anew, of another colour and as long as before."""
-    image = bpy.data.images.load(str(path))
-    image.pixels.foreach_set(np.full(len(image.pixels), value, np.float32))
-    image.save()
-    bpy.data.images.remove(image)
-    path.write_bytes(path.read_bytes().ljust(FILE_SIZE, b"\0"))
-
-
-def file_rewritten(folder: Path) -> None:
-    """Other pixels in the same file."""
-    _rewrite(folder / "filed.png", 0.8)
-
-
-def file_of_equal_size_and_time(folder: Path) -> None:
-    """Other pixels in a file of the same length and time."""
-    path = folder / "filed.png"
-    before = path.stat()
-    _rewrite(path, 0.8)
-    os.utime(path, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert path.stat().st_size == before.st_size
-
-
-def file_gone(folder: Path) -> None:
-    """No file any more."""
-    (folder / "filed.png").unlink()
-
-
-def texel_painted(_: Path) -> None:
-    """One texel of a painted image."""
-    bpy.data.images["painted"].pixels[120] = 1.0
-
-
-def texel_packed(_: Path) -> None:
-    """One texel of a packed image, packed again."""
-    image = bpy.data.images["packed.png"]
-    image.pixels[60:64] = (1.0, 0.0, 0.0, 1.0)
-    image.pack()
-
-
-def sequence_file_rewritten(folder: Path) -> None:
-    """The second file of a sequence, shown in frame 2; the first as before."""
-    _rewrite(folder / "frame_0002.png", 0.95)
 
 
 def next_frame(_: Path) -> None:
@@ -348,32 +302,6 @@ def saved_and_opened(folder: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=path)
 
 
-def viewer(_: Path) -> None:
-    """A compositor with a viewer, whose image every render changes."""
-    tree = _compositor()
-    layers, shown = (
-        tree.nodes.new(f"CompositorNode{kind}") for kind in ("RLayers", "Viewer")
-    )
-    tree.links.new(layers.outputs[0], shown.inputs[0])
-
-
-def viewer_as_texture(folder: Path) -> None:
-    """The viewer's image on a thing."""
-    viewer(folder)
-    image = next(each for each in bpy.data.images if each.source == "VIEWER")
-    _tree("Painted").nodes["Image Texture"].image = image
-
-
-def _compositor() -> Any:
-    scene = _scene()
-    if hasattr(scene, "compositing_node_group"):  # from Blender 5.0 on
-        tree = bpy.data.node_groups.new("Compositor", "CompositorNodeTree")
-        scene.compositing_node_group = tree
-        return tree
-    scene.use_nodes = True
-    return scene.node_tree
-
-
 def unused_material(_: Path) -> None:
     """A material that nothing wears."""
     bpy.data.materials.new("Unused").use_fake_user = True
@@ -384,11 +312,11 @@ STILL: tuple[Deed, ...] = (
     border,
     other_border,
     stereo,
-    file_rewritten,
-    file_of_equal_size_and_time,
-    file_gone,
-    texel_painted,
-    texel_packed,
+    images.file_rewritten,
+    images.file_of_equal_size_and_time,
+    images.file_gone,
+    images.texel_painted,
+    images.texel_packed,
     animated,
     animated_node,
     driven_modifier,
@@ -422,15 +350,15 @@ STILL: tuple[Deed, ...] = (
     instance_on_faces,
     nodes_input_default,
     point_radius,
-    viewer_as_texture,
+    images.viewer_as_texture,
 )
 LENS: tuple[Deed, ...] = (focus_on_distance, focused_bone_moves)
-TIMED: tuple[Deed, ...] = (next_frame, sequence_file_rewritten)
+TIMED: tuple[Deed, ...] = (next_frame, images.sequence_file_rewritten)
 HARMLESS: tuple[Deed, ...] = (
     marker_alone,
     selected,
     lamp_added,
     saved_and_opened,
     unused_material,
-    viewer,
+    images.viewer,
 )

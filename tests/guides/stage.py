@@ -13,51 +13,14 @@ from typing import Any
 import bpy
 import numpy as np
 
-from xrds_lab.studio.builder import Builder, empty_scene
+from xrds_lab.studio.builder import empty_scene
 from xrds_lab.studio.geometry import box, sheet, sphere
 from xrds_lab.studio.nodes import Surface, solid
 
+from .things import Stage, painted, saved
+
 WIDTH, HEIGHT = 96, 72
-COLUMNS = 8
-FILE_SIZE = 1000  # bytes of each image file, whatever it shows
 WEIGHTS = (0.1, 0.3, 0.5, 0.9)
-
-
-class Stage(Builder):
-    """Puts things on the grid, one after the other."""
-
-    def __init__(self, scene: Any, folder: Path) -> None:
-        super().__init__(scene)
-        self.folder, self._count = folder, 0
-
-    def place(self) -> tuple[float, float, float]:
-        """The next free place of the grid."""
-        column, row = self._count % COLUMNS, self._count // COLUMNS
-        self._count += 1
-        return (column - (COLUMNS - 1) / 2) * 1.2, 0.0, 2.8 - row * 1.2
-
-    def thing(self, name: str, material: Any, shape: Any = None) -> Any:
-        """A box, or another shape about as large, of one material."""
-        shape = shape or box(0.9, 0.9, 0.9)
-        return self.put(shape, material, self.place(), turn=0.3, name=name)
-
-    def tinted(self, name: str, kind: str, attribute: str, shape: Any = None) -> Any:
-        """A thing whose colour an Attribute node reads."""
-        surface = Surface(name)
-        node = surface.add("Attribute", attribute_type=kind, attribute_name=attribute)
-        surface.set(Base_Color=node.outputs["Fac"])
-        return self.thing(name, surface.material, shape)
-
-    def empty(self, name: str, at: Any = (0.0, 0.0, 0.0)) -> Any:
-        """An empty."""
-        return self.link(name, None, at)
-
-    def pictured(self, name: str, image: Any) -> Any:
-        """A thing that shows an image."""
-        surface = Surface(name)
-        node = surface.add("TexImage", image=image)
-        surface.set(Base_Color=node.outputs["Color"])
-        return self.thing(name, surface.material)
 
 
 def save(folder: Path, kind: str) -> None:
@@ -117,10 +80,10 @@ def _shaded(stage: Stage) -> None:
     two = stage.thing("Slots", solid("First", Base_Color=(0.8, 0.1, 0.1)))
     two.data.materials.append(solid("Second", Base_Color=(0.1, 0.8, 0.1)))
     two.data.polygons[0].material_index = 1
-    stage.pictured("Painted", _painted("painted"))
+    stage.pictured("Painted", painted("painted"))
     bpy.data.images["painted"].pack()  # a file keeps no others
-    stage.pictured("Filed", _saved(stage.folder / "filed.png"))
-    packed = _saved(stage.folder / "packed.png")
+    stage.pictured("Filed", saved(stage.folder / "filed.png"))
+    packed = saved(stage.folder / "packed.png")
     packed.pack()
     stage.pictured("Packed", packed)
     stage.pictured("Made", bpy.data.images.new("made", 8, 8))
@@ -179,22 +142,6 @@ def _procedural(stage: Stage) -> None:
     surface.set(Base_Color=mixed, Roughness=0.6)
     surface.bump(noise.outputs[0], 0.1)
     stage.thing("Noise", surface.material)
-
-
-def _painted(name: str) -> Any:
-    image = bpy.data.images.new(name, 8, 8)
-    image.pixels.foreach_set(np.linspace(0, 1, 256, dtype=np.float32))
-    image.update()
-    return image
-
-
-def _saved(path: Path) -> Any:
-    image = _painted(path.stem)
-    image.filepath_raw, image.file_format = str(path), "PNG"
-    image.save()
-    bpy.data.images.remove(image)
-    path.write_bytes(path.read_bytes().ljust(FILE_SIZE, b"\0"))
-    return bpy.data.images.load(str(path))
 
 
 def _attributes(stage: Stage) -> None:
@@ -331,7 +278,7 @@ def _timed(stage: Stage) -> None:
     """A sequence of images, particles, and nodes that know the time."""
     for number in (1, 2, 3):
         path = stage.folder / f"frame_{number:04d}.png"
-        _saved(path).pixels.foreach_set(np.full(256, number / 4, np.float32))
+        saved(path).pixels.foreach_set(np.full(256, number / 4, np.float32))
         bpy.data.images[path.name].save()
         bpy.data.images.remove(bpy.data.images[path.name])
     image = bpy.data.images.load(str(stage.folder / "frame_0001.png"))

@@ -128,12 +128,19 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _lines(result: dict[str, Any]) -> list[str]:
+    from xrds_core.holes import told
+
     done = [entry["frame"] for entry in result["frames"]]
-    told = {"denoised": done, "skipped, complete": result["kept"]}
-    return [
+    ways = {"denoised": done, "skipped, complete": result["kept"]}
+    lines = [
         f"{result['output']}: frames {in_words(numbers)} {what}"
-        for what, numbers in told.items()
+        for what, numbers in ways.items()
         if numbers
+    ]
+    return lines + [
+        f"  frame {entry['frame']}: {told(entry['bad_pixels'])}"
+        for entry in result["frames"]
+        if entry["bad_pixels"]
     ]
 
 

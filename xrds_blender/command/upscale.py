@@ -79,10 +79,9 @@ def _upscale(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _lines(result: dict[str, Any]) -> list[str]:
+    from xrds_core.holes import told
+
     lines = [f"{result['output']}: {result['seconds']:.1f} s"]
     if result["bad_pixels"]:
-        lines.append(
-            f"  replaced {result['bad_pixels']} bad pixels of the input: NaN, "
-            "infinities or negative light"
-        )
+        lines.append(f"  {told(result['bad_pixels'])}")
     return lines
