@@ -14,7 +14,7 @@ from xrds_core.errors import XRDSError
 from ..progress import report_line
 
 MOTIONS = ("pan", "fast", "still", "objects", "both")
-STABILITY = ("arrays", "large", "scenes", "shots", "load")
+STABILITY = ("arrays", "large", "scenes", "shots", "load", "accumulation")
 
 
 def add_evaluate(commands: Any) -> argparse.ArgumentParser:
@@ -104,7 +104,7 @@ def add_stability(commands: Any) -> argparse.ArgumentParser:
 
 
 def _stability(options: argparse.Namespace) -> dict[str, Any]:
-    if {"scenes", "shots", "load"} & set(options.parts):
+    if set(options.parts) - {"arrays", "large"}:
         need_blender("stability")
     from ..stability.suite import stability
 

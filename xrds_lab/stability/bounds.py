@@ -123,6 +123,38 @@ BOUNDS |= {
     ),
 }
 
+# Frames at full size that take their neighbours' samples.
+BOUNDS |= {
+    "accumulation.cut.ghost": Bound(
+        0, "radiance that frames on either side of a cut add to the other's pixels"
+    ),
+    "accumulation.*.below_single": Bound(
+        0, "dB that a frame with its neighbours' samples lies below the frame alone"
+    ),
+    "accumulation.*.excess": Bound(
+        0.2, "error of a pixel (sRGB, mean of 3x3) beyond its error in the frame alone"
+    ),
+    "accumulation.panorama.lent": Bound(
+        0, "frames of a panoramic camera that took samples of others"
+    ),
+    "accumulation.nan.faults": Bound(
+        0, "faults in the picture after NaN and infinities in one frame"
+    ),
+    "accumulation.nan.reach": Bound(
+        0.01, "relative change of the light beyond 3 pixels from them, before denoising"
+    ),
+    "accumulation.missing.faults": Bound(0, "faults beside a frame that is missing"),
+    "accumulation.missing.unfinished": Bound(
+        0, "other frames that it leaves unfinished"
+    ),
+    "accumulation.passes.crashes": Bound(
+        0, "frames with other passes that neither lend nor are refused in one line"
+    ),
+    "accumulation.long.memory": Bound(
+        16, "KiB that memory grows by with each of 1000 frames"
+    ),
+}
+
 EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
     "invalid.distance": (
         Exemption(

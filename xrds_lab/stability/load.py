@@ -57,7 +57,7 @@ def drive(scene: Any, count: int, **choices: Any) -> list[Frame]:
             target = Path(folder) / f"frame.{('exr', 'png')[number % 2]}"
             picture_file.save(target, picture.radiance, picture.alpha, scene)
             seconds = time.process_time() - start
-            frames.append(Frame(_resident(), _data_blocks(), seconds))
+            frames.append(Frame(resident(), _data_blocks(), seconds))
     return frames
 
 
@@ -123,7 +123,8 @@ def _small_guide_cache() -> Iterator[None]:
         guide_cache.CACHE = usual
 
 
-def _resident() -> int:
+def resident() -> int:
+    """Return the bytes of memory this process holds; 0 where they are not told."""
     if sys.platform != "linux":
         return 0
     import resource

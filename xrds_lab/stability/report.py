@@ -20,6 +20,7 @@ PLOTS = (
     ("samples.falling_psnr", "PSNR against samples", "samples", "x"),
     ("shot.turntable.exposure", "Exposure over the turntable, stops", "frame", ""),
     ("load.memory", "Memory over 200 frames, KiB", "frame", ""),
+    ("accumulation.long.memory", "Memory over a shot of 1000, KiB", "frame", ""),
 )
 
 

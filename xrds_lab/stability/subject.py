@@ -44,6 +44,11 @@ class Subject:
         """Name in the report, as `fast x2 fp32`."""
         return f"{self.preset} x{self.scale} {self.precision}"
 
+    @property
+    def device(self) -> str:
+        """What it runs on."""
+        return str(self.upscaler.device)
+
     def __call__(self, inputs: Inputs, **options: Any) -> Array:
         """Return the picture (H, W, 3 or 4) of `inputs`."""
         if self.upscaler.network.config.guides == "full":

@@ -18,11 +18,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..progress import Progress
+    from .accumulation import FullSize
     from .bounds import Check
     from .measured import Measured
     from .subject import Subject
 
-    Work = Callable[[Subject], Iterator[Measured]]
+    Judged = Subject | FullSize
+    Work = Callable[[Any], Iterator[Measured]]
     Key = tuple[str, str]  # of a value and a subject
 
 GROUPS: dict[str, tuple[Work, ...]] = {
@@ -33,13 +35,14 @@ GROUPS: dict[str, tuple[Work, ...]] = {
     "shapes": shapes.CHECKS,
     "sameness": sameness.CHECKS,
 }
-# Arrays alone; 8192 x 8192; scenes, shots and a long shot that Blender renders.
-PARTS = ("arrays", "large", "scenes", "shots", "load")
+# Arrays alone; 8192 x 8192; scenes, shots and a long shot that Blender renders; frames
+# at full size that lend each other their samples.
+PARTS = ("arrays", "large", "scenes", "shots", "load", "accumulation")
 SIDE = 256  # pixels of rendered scenes along one side; shots are half as wide
 ARRAY_SIDE = 128
 
 
-def checks(subject: Subject, work: Work) -> Iterator[tuple[Check, Measured]]:
+def checks(subject: Judged, work: Work) -> Iterator[tuple[Check, Measured]]:
     """Yield every value of one check with its verdict."""
     for measured in work(subject):
         verdict = judge(
@@ -78,19 +81,16 @@ def stability(
     from xrds_core.weights import available
 
     from . import report
-    from .subject import shipped
 
     unknown = set(parts) - set(PARTS)
     if unknown:
         raise UsageError(f"{sorted(unknown)} is none of {', '.join(PARTS)}")
     out.mkdir(parents=True, exist_ok=True)
-    works = list(_works(parts, cache or out / "rendered", weights, progress))
     records = available(weights)
     verdicts, curves = _earlier(out / "results.json", records)
     result: dict[str, Any] = {}
-    for subject in shipped(
-        directory=weights, device=device, side=ARRAY_SIDE, thorough=True
-    ):
+    rendered = cache or out / "rendered"
+    for subject, works in _subjects(parts, rendered, device, weights, progress):
         for name, work in works:
             for check, measured in checks(subject, work):
                 verdicts[check.name, subject.name] = check
@@ -106,7 +106,7 @@ def stability(
                 {"name": name, "subject": of, "points": [*map(list, curve.items())]}
                 for (name, of), curve in curves.items()
             ],
-            "machine": _machine(subject.upscaler.device),
+            "machine": _machine(subject.device),
             "weights": records,
             "passed": all(check.holds for check in verdicts.values()),
         }
@@ -134,6 +134,38 @@ def _earlier(
     return {
         (c.name, f"{c.preset} x{c.scale} {c.precision}"): c for c in verdicts
     }, curves
+
+
+def _subjects(
+    parts: Sequence[str],
+    folder: Path,
+    device: str,
+    weights: Path | None,
+    progress: Progress,
+) -> Iterator[tuple[Judged, list[tuple[str, Work]]]]:
+    """Yield what is judged, each with its checks."""
+    from .subject import shipped
+
+    if "accumulation" in parts:
+        from .accumulation import FullSize
+
+        yield FullSize(), list(_accumulation())
+    works = list(_works(parts, folder, weights, progress))
+    if works:
+        for subject in shipped(
+            directory=weights, device=device, side=ARRAY_SIDE, thorough=True
+        ):
+            yield subject, works
+
+
+def _accumulation() -> Iterator[tuple[str, Work]]:
+    from . import accumulation, broken_shots
+    from .moving_scenes import SHOTS
+
+    for name in SHOTS:
+        yield name, lambda _, name=name: accumulation.shot(name)
+    yield "panorama", lambda _: accumulation.panorama()
+    yield "broken shots", lambda _: broken_shots.shots()
 
 
 def _works(

@@ -1,0 +1,155 @@
+"""Shots with bad frames, and one of a thousand frames."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from xrds_core.errors import PictureError
+from xrds_core.temporal.accumulate import accumulate
+from xrds_core.temporal.agreement import REACH
+from xrds_core.temporal.frame import Stored
+from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.window import Shot, slide
+
+from .accumulation import RADIUS, SAMPLES, film, finished
+from .load import growth, resident
+from .measured import Measured, faults, relative_difference
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from xrds_core.temporal.accumulate import Accumulated
+
+    Frames = dict[int, Stored]
+
+LONG = 1000
+_MIDDLE = 5
+_BAD = (np.nan, np.inf, -np.inf)
+
+
+def shots() -> Iterator[Measured]:
+    """All of them, on the frames of one shot in which things and camera move."""
+    frames = film("alpha_cards").frames
+    yield from spoilt(frames)
+    yield from missing(frames)
+    yield Measured("accumulation.passes.crashes", float(crashes(frames)))
+    yield long(frames)
+
+
+def spoilt(frames: Frames) -> Iterator[Measured]:
+    """NaN and infinities in one frame: a neighbour's, and the frame's own."""
+    clean = gathered(frames)
+    height, width = frames[_MIDDLE].shape
+    bad = np.zeros((height, width), bool)
+    bad[height // 3, :] = bad[:, width // 4] = True
+    near = np.zeros_like(bad)
+    near[height // 3 - REACH : height // 3 + REACH + 1] = True
+    near[:, width // 4 - REACH : width // 4 + REACH + 1] = True
+    wrong, changed = 0, 0.0
+    for number in (_MIDDLE, _MIDDLE + 1):
+        for value in _BAD:
+            these = frames | {number: _with(frames[number], bad, value)}
+            wrong += faults(finished(these, _MIDDLE, RADIUS))
+            if number == _MIDDLE:
+                result = gathered(these).radiance
+                change = relative_difference(result[~near], clean.radiance[~near])
+                changed = max(changed, change)
+    yield Measured("accumulation.nan.faults", float(wrong))
+    yield Measured("accumulation.nan.reach", changed)
+
+
+def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
+    """A frame that the renderer gave with `value` in its radiance at `bad` pixels.
+
+    `store` marks such pixels and empties them.
+    """
+    from xrds_core.temporal.frame import Frame, store
+
+    shape = frame.shape
+    picture = frame.picture.astype(np.float32)
+    radiance, albedo, normal = (
+        picture[:, i : i + 3].reshape(*shape, 3) for i in (0, 3, 6)
+    )
+    radiance[bad] = value
+    with np.errstate(divide="ignore"):
+        depth = (1.0 / frame.nearness).reshape(shape)
+    vector = None if frame.vector is None else frame.vector.astype(np.float32)
+    return store(
+        Frame(
+            frame.number,
+            frame.camera,
+            radiance,
+            albedo,
+            normal,
+            depth,
+            frame.samples,
+            alpha=picture[:, 9].reshape(shape),
+            vector=None if vector is None else vector.reshape(*shape, 4),
+        ),
+        np.float16,
+    )
+
+
+def missing(frames: Frames) -> Iterator[Measured]:
+    """A frame that could not be read is left out; the others are finished."""
+    shot = Shot(tuple(frames), RADIUS)
+    lost = _MIDDLE + 1
+    wrong, number_of = 0, []
+    for number, own, lenders in slide(shot, lambda n: frames[n] if n != lost else None):
+        number_of.append(number)
+        result = accumulate(own, list(lenders.values()))
+        wrong += faults(np.maximum(result.radiance, 0.0))
+    expected = [number for number in frames if number != lost]
+    yield Measured("accumulation.missing.faults", float(wrong))
+    yield Measured("accumulation.missing.unfinished", float(number_of != expected))
+
+
+def crashes(frames: Frames) -> int:
+    """Count frames with other passes that neither lend nor are refused in one line."""
+    own = frames[_MIDDLE]
+    others: Sequence[Stored] = (
+        replace(own, number=6, picture=own.picture[:, :9]),  # no alpha
+        replace(own, number=6, vector=None),
+        replace(own, number=6, nearness=np.full_like(own.nearness, np.nan)),
+        replace(own, number=6, samples=64.0),
+        replace(own, number=6, picture=own.picture.astype(np.float32)),
+    )
+    failed = 0
+    for other in others:
+        try:
+            result = accumulate(own, [other])
+            failed += not np.isfinite(result.radiance).all()
+        except PictureError as error:
+            failed += "\n" in str(error)
+    return failed
+
+
+def long(frames: Frames) -> Measured:
+    """Growth of memory in KiB per frame over a thousand frames, one after the other."""
+    from xrds_blender.frame.denoisers import load_denoiser
+    from xrds_blender.frame.job import RenderJob
+    from xrds_blender.shot.finishing import finish
+
+    originals = list(frames.values())
+    job = RenderJob(scale=1, samples=SAMPLES, temporal_radius=RADIUS, device="cpu")
+    denoiser, movement, memory = load_denoiser(job), Movement(), []
+
+    def load(number: int) -> Stored:
+        frame = originals[number % len(originals)]
+        return replace(frame, number=number, picture=frame.picture.copy())
+
+    for _, own, lenders in slide(Shot(tuple(range(LONG)), RADIUS), load):
+        finish(own, list(lenders.values()), job, denoiser, movement)
+        memory.append(resident() / 2**10)
+    late = memory[len(memory) // 3 :: 4]
+    above = {float(i): value - late[0] for i, value in enumerate(late)}
+    return Measured("accumulation.long.memory", growth(late) / 4, above)
+
+
+def gathered(frames: Frames) -> Accumulated:
+    """The middle frame with its neighbours' samples, before it is denoised."""
+    others = [frames[n] for n in Shot(tuple(frames), RADIUS).lenders(_MIDDLE)]
+    return accumulate(frames[_MIDDLE], others)
