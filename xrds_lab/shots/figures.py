@@ -209,7 +209,8 @@ def best_mode(clip: Clip, reference: Array) -> Denoiser:
 def _code() -> str:
     """A checksum of the code that the figures judge."""
     package = Path(xrds_core.__file__).parent
-    sources = [*package.glob("temporal/*.py"), *package.glob("denoising/*.py")]
+    parts = ("temporal", "denoising", "sequence")
+    sources = [path for part in parts for path in package.glob(f"{part}/*.py")]
     sources += [Path(finishing.__file__), Path(rivals.__file__)]
     whole = hashlib.sha256(bytes([GENERATION]))
     for path in sorted(sources):

@@ -98,6 +98,7 @@ class ShotFrames:
             samples=request.samples,
             **{name: arrays[name] for name in ("radiance", "albedo", "normal")},
             depth=arrays["depth"],
+            still=request.motion == "still",
             **{name: arrays.get(name) for name in _OPTIONAL},
         )
 
