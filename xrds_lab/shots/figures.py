@@ -123,8 +123,11 @@ class SceneFigures:
 
     def points(self) -> list[Figures]:
         """Every figure that the present code gave, in order of the cases."""
-        known = [(k, v) for k, v in self._known.items() if k.endswith(_code())]
-        return [dict(point) for _, point in known]
+        return [
+            dict(point)
+            for key, point in self._known.items()
+            if key.endswith(_code(point["method"] == XRDS))
+        ]
 
     def requests(self, motion: str, samples: int, radii: list[int]) -> list[Any]:
         """The frames that these figures need."""
@@ -192,7 +195,9 @@ class SceneFigures:
 
     def _key(self, motion: str, samples: int, method: str, radius: int) -> str:
         pair = self.pair_samples if motion != "still" else 0
-        return f"{motion}-{samples}-{method}-{radius}-pair{pair}-{_code()}"
+        return (
+            f"{motion}-{samples}-{method}-{radius}-pair{pair}-{_code(method == XRDS)}"
+        )
 
 
 def best_mode(clip: Clip, reference: Array) -> Denoiser:
@@ -205,13 +210,15 @@ def best_mode(clip: Clip, reference: Array) -> Denoiser:
     )
 
 
-@lru_cache(maxsize=1)
-def _code() -> str:
-    """A checksum of the code that the figures judge."""
-    package = Path(xrds_core.__file__).parent
-    parts = ("temporal", "denoising", "sequence")
-    sources = [path for part in parts for path in package.glob(f"{part}/*.py")]
-    sources += [Path(finishing.__file__), Path(rivals.__file__)]
+@lru_cache
+def _code(is_ours: bool) -> str:
+    """A checksum of the code that the figures judge, ours or the rivals'."""
+    sources = [Path(rivals.__file__)]
+    if is_ours:
+        package = Path(xrds_core.__file__).parent
+        parts = ("temporal", "denoising", "sequence")
+        sources = [path for part in parts for path in package.glob(f"{part}/*.py")]
+        sources.append(Path(finishing.__file__))
     whole = hashlib.sha256(bytes([GENERATION]))
     for path in sorted(sources):
         whole.update(path.read_bytes())
