@@ -26,6 +26,7 @@ from xrds_core.temporal.window import Shot
 
 from . import rivals
 from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
+from .motions import MOTIONS
 
 if TYPE_CHECKING:
     from xrds_blender.planning.denoiser import Denoiser
@@ -122,12 +123,23 @@ class SceneFigures:
         self._known: dict[str, Figures] = _stored(self._path)
 
     def points(self) -> list[Figures]:
-        """Every figure that the present code gave, in order of the cases."""
-        return [
-            dict(point)
-            for key, point in self._known.items()
-            if key.endswith(_code(point["method"] == XRDS))
-        ]
+        """Every figure that the present code gave, in order of motions and samples.
+
+        Of those with other pairs of references one each: this one's, if there is any.
+        """
+        found: dict[tuple[Any, ...], Figures] = {}
+        for key, point in self._known.items():
+            if not key.endswith(_code(point["method"] == XRDS)):
+                continue
+            case = (
+                list(MOTIONS).index(point["motion"]),
+                point["samples"],
+                [*RIVALS, XRDS].index(point["method"]),
+                point["radius"],
+            )
+            if case not in found or f"-pair{self.pair_samples}-" in key:
+                found[case] = dict(point)
+        return [found[case] for case in sorted(found)]
 
     def requests(self, motion: str, samples: int, radii: list[int]) -> list[Any]:
         """The frames that these figures need."""
