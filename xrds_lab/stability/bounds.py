@@ -155,7 +155,21 @@ BOUNDS |= {
     ),
 }
 
+_FINE = (
+    "what changes is finer than the 7x7 pixels in which light is compared: brighter "
+    "and darker pixels cancel in their sum"
+)
 EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
+    "accumulation.water.below_single": (Exemption("full_size *", 1.6, _FINE),),
+    "accumulation.fog.below_single": (
+        Exemption(
+            "full_size *",
+            0.5,
+            "light in the air does not move along with the surface behind it",
+        ),
+    ),
+    "accumulation.glass_ball.excess": (Exemption("full_size *", 0.5, _FINE),),
+    "accumulation.blinds.excess": (Exemption("full_size *", 0.35, _FINE),),
     "invalid.distance": (
         Exemption(
             "fast *",
