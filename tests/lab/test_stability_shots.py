@@ -43,15 +43,15 @@ def test_bad_frames_spoil_nothing() -> None:
     assert broken_shots.long(frames).curve
 
 
-def test_panoramas_are_rendered_frame_by_frame() -> None:
-    held(list(accumulation.panorama()))
+def test_under_a_fisheye_frames_are_rendered_by_themselves() -> None:
+    held(list(accumulation.fisheye()))
 
 
 def test_the_part_needs_no_weights_and_joins_the_report(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(moving_scenes, "SHOTS", {"cut": moving_scenes.cut})
-    monkeypatch.setattr(accumulation, "panorama", list)
+    monkeypatch.setattr(accumulation, "fisheye", list)
     monkeypatch.setattr(broken_shots, "shots", list)
     result = suite.stability(tmp_path, parts=["accumulation"])
     assert {x["preset"] for x in result["checks"]} == {"full_size"}

@@ -9,7 +9,7 @@ import numpy as np
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_core.errors import SceneError
-from xrds_core.temporal.frame import Camera, Frame
+from xrds_core.temporal.frame import Camera, Frame, Sphere
 
 from ..bench.inputs import Arrays, Folder, open_scene
 from .motions import animate
@@ -91,6 +91,7 @@ class ShotFrames:
             project=arrays["project"].astype(np.float64),
             size=_pair(arrays["size"]),
             window=_pair(arrays["corner"]),
+            sphere=_sphere(arrays.get("sphere")),
         )
         return Frame(
             number=request.number,
@@ -176,6 +177,8 @@ def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]
     camera = frame.camera
     arrays |= {"view": camera.view, "project": camera.project}
     arrays |= {"size": np.array(camera.size), "corner": np.array(camera.window)}
+    if camera.sphere is not None:
+        arrays["sphere"] = np.array((*camera.sphere.longitude, *camera.sphere.latitude))
     return {name: x for name, x in arrays.items() if x is not None}, seconds
 
 
@@ -194,3 +197,10 @@ def _truth(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]
 def _pair(array: Array) -> tuple[int, int]:
     first, second = array.tolist()
     return int(first), int(second)
+
+
+def _sphere(array: Array | None) -> Sphere | None:
+    if array is None:
+        return None
+    west, east, south, north = array.tolist()
+    return Sphere((west, east), (south, north))

@@ -95,8 +95,8 @@ def shot(name: str) -> Iterator[Measured]:
         yield Measured(f"accumulation.{name}.ghost", ghost(filmed.frames))
 
 
-def panorama() -> Iterator[Measured]:
-    """Frames of a panoramic camera that are not rendered each by itself."""
+def fisheye() -> Iterator[Measured]:
+    """Frames under a fisheye that are not rendered each by itself."""
     import tempfile
     from pathlib import Path
 
@@ -107,14 +107,14 @@ def panorama() -> Iterator[Measured]:
 
     from .moving_scenes import build
 
-    build("panorama")
+    build("fisheye")
     with tempfile.TemporaryDirectory() as folder:
-        blend = Path(folder) / "panorama.blend"
+        blend = Path(folder) / "fisheye.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(blend))
         job = RenderJob(scale=1, samples=1, temporal_radius=RADIUS, device="cpu")
         made = render_file(blend, f"{folder}/#.exr", job, frames=[1, 2, 3])
     lent = [frame for frame in made["frames"] if frame["temporal"] is not None]
-    yield Measured("accumulation.panorama.lent", float(len(lent)))
+    yield Measured("accumulation.fisheye.lent", float(len(lent)))
 
 
 def finished(frames: dict[int, Stored], number: int, radius: int) -> Array:

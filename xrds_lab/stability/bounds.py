@@ -134,8 +134,8 @@ BOUNDS |= {
     "accumulation.*.excess": Bound(
         0.2, "error of a pixel (sRGB, mean of 3x3) beyond its error in the frame alone"
     ),
-    "accumulation.panorama.lent": Bound(
-        0, "frames of a panoramic camera that took samples of others"
+    "accumulation.fisheye.lent": Bound(
+        0, "frames under a fisheye that took samples of others"
     ),
     "accumulation.nan.faults": Bound(
         0, "faults in the picture after NaN and infinities in one frame"

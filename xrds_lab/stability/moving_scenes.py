@@ -223,10 +223,17 @@ def orthographic(stage: Builder) -> None:
 
 
 def panorama(stage: Builder) -> None:
-    """A panoramic camera that moves: its frames can lend nothing."""
-    still(stage)
+    """An equirectangular camera that moves."""
+    fisheye(stage)
     lens = stage.scene.camera.data
-    lens.type = "PANO"
+    held = lens if hasattr(lens, "panorama_type") else lens.cycles  # before Blender 5
+    held.panorama_type = "EQUIRECTANGULAR"
+
+
+def fisheye(stage: Builder) -> None:
+    """A fisheye that moves: its frames can lend nothing."""
+    still(stage)
+    stage.scene.camera.data.type = "PANO"
     truck(stage)
 
 
@@ -250,6 +257,7 @@ SHOTS: dict[str, Callable[[Builder], None]] = {
     "resolution": resolution,
     "zoom": zoom,
     "orthographic": orthographic,
+    "panorama": panorama,
 }
 
 
@@ -259,7 +267,7 @@ def build(name: str) -> bpy.types.Scene:
 
     scene = empty_scene(*SIZE)
     ensure_registered()
-    (SHOTS | {"panorama": panorama})[name](Builder(scene))
+    (SHOTS | {"fisheye": fisheye})[name](Builder(scene))
     return scene
 
 

@@ -164,7 +164,7 @@ def _accumulation() -> Iterator[tuple[str, Work]]:
 
     for name in SHOTS:
         yield name, lambda _, name=name: accumulation.shot(name)
-    yield "panorama", lambda _: accumulation.panorama()
+    yield "fisheye", lambda _: accumulation.fisheye()
     yield "broken shots", lambda _: broken_shots.shots()
 
 
