@@ -32,18 +32,23 @@ COPIED = (
 )
 # Left out: what starts a Python of its own.
 MODULES = (
+    "cover",
     "engine",
+    "engine_loan",
     "features",
     "full_size",
     "guide_cache",
     "guide_changes",
     "guide_key",
+    "live",
     "low_camera",
     "omissions",
     "panels",
     "passes",
     "picking",
+    "record",
     "shot",
+    "spare_passes",
     "translations",
     "unchanged",
 )

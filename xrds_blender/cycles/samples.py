@@ -11,7 +11,7 @@ import numpy as np
 from xrds_core.arrays import Array
 from xrds_core.temporal.samples import Portion
 
-from . import session, spare_passes
+from . import live, session, spare_passes
 from .once import render_once
 from .pass_names import ALBEDO, COMBINED, DEPTH, FIRST_HIT, MOTION, NOISY, NORMAL
 
@@ -61,7 +61,9 @@ def sample_layer(
     clock = render_once(
         engine, depsgraph, samples=samples, seed=seed, noisy=True, portion=portion
     )
-    return samples_in(engine, layer_name, {name for name, _ in geometry}), clock
+    found = samples_in(engine, layer_name, {name for name, _ in geometry})
+    live.show(next(iter(found.values())).picture)
+    return found, clock
 
 
 def samples_in(

@@ -9,7 +9,7 @@ import numpy as np
 
 from xrds_core.errors import Cancelled
 
-from ..cycles import live, session
+from ..cycles import session
 from ..cycles.samples import sample_layer
 from ..planning.plan import Decision
 from . import progress
@@ -35,7 +35,6 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
         noisy, clock = sample_layer(
             engine, depsgraph, samples=job.samples, seed=job.seed
         )
-        live.show(next(iter(noisy.values())).picture)
         progress.begin(engine, progress.DENOISE, 2, 2)
         started = time.perf_counter()
         report = progress.reporter(engine)
