@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -298,3 +299,74 @@ def test_what_cannot_be_followed_is_said(what: str) -> None:
         red.data.materials[0] = surface.material
     with pytest.raises(NotFollowed, match=r"(?i)motion|hair|catcher|PORTAL"):
         key()
+
+
+def test_every_kind_of_thing_can_be_looked_at() -> None:
+    """Of any node, modifier and object all properties are read, and none crashes."""
+    scene = rich_scene()
+    every_object(scene)
+    every_modifier(bpy.data.objects["Red"])
+    for kind, tree in (
+        ("ShaderNode", shader_of("Thing").node_tree),
+        ("GeometryNode", bpy.data.node_groups.new("All", "GeometryNodeTree")),
+        ("FunctionNode", bpy.data.node_groups["All"]),
+    ):
+        added = every_node(kind, tree)
+        assert len(added) > 15, kind
+    item = bpy.data.objects["Floor"]
+    item.modifiers.new("All", "NODES").node_group = bpy.data.node_groups["All"]
+    graph = bpy.context.evaluated_depsgraph_get()
+    facts = replace(scene_facts(graph), unknown_nodes=(), shadow_catchers=False)
+    first, second = (guide_key(graph, facts, ()) for _ in range(2))
+    assert first == second
+
+
+def every_object(scene: Any) -> None:
+    """One of each type of data that an object can be made of."""
+    makers = {
+        "armatures": (),
+        "cameras": (),
+        "lattices": (),
+        "metaballs": (),
+        "speakers": (),
+        "hair_curves": (),
+        "pointclouds": (),
+        "volumes": (),
+        "grease_pencils_v3": (),
+        "lights": ("SUN",),
+        "lightprobes": ("SPHERE",),
+    }
+    for name, more in makers.items():
+        if hasattr(bpy.data, name):
+            data = getattr(bpy.data, name).new(name, *more)
+            scene.collection.objects.link(bpy.data.objects.new(name, data))
+    for kind in ("CURVE", "SURFACE", "FONT"):
+        item = bpy.data.objects.new(kind, bpy.data.curves.new(kind, kind))
+        scene.collection.objects.link(item)
+    for kind in kinds(bpy.types.Texture):
+        displace = bpy.data.objects["Floor"].modifiers.new(kind, "DISPLACE")
+        displace.texture = bpy.data.textures.new(kind, kind)
+
+
+def kinds(struct: Any) -> list[str]:
+    return [each.identifier for each in struct.bl_rna.properties["type"].enum_items]
+
+
+def every_modifier(item: Any) -> None:
+    for kind in kinds(bpy.types.Modifier):
+        # hair is not followed, and those of grease pencil are of no mesh
+        if kind != "PARTICLE_SYSTEM" and "GREASE" not in kind:
+            item.modifiers.new(kind, kind)
+
+
+def every_node(kind: str, tree: Any) -> list[str]:
+    """Those nodes that such a tree takes, but Ray Portals and scripts."""
+    added = []
+    for name in dir(bpy.types):
+        if name.startswith(kind) and name not in ("ShaderNodeScript",):
+            try:
+                tree.nodes.new(name)
+            except RuntimeError:  # of another tree, or no node
+                continue
+            added.append(name)
+    return added

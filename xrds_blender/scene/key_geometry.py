@@ -68,7 +68,7 @@ def geometry(
     if data is None or kind == "VOLUME":
         return
     if kind in {"CURVES", "POINTCLOUD"}:
-        if kind == "CURVES":
+        if kind == "CURVES" and len(data.curves):
             yield "offsets", _array(data.curve_offset_data, "value", 1, np.int32)
         yield from _attributes(data, only, left_out)
         return

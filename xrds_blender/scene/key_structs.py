@@ -32,6 +32,7 @@ _LEFT_OUT = {
     "Camera": "background_images",
     "Node": "location location_absolute width height width_hidden dimensions label "
     "parent select color use_custom_color internal_links inputs outputs "
+    "paired_output "
     "debug_zone_lazy_function_graph debug_zone_body_lazy_function_graph",
     "Image": "pixels packed_file packed_files bindcode is_dirty has_data depth "
     "channels size resolution frame_duration filepath_raw render_slots layers",
