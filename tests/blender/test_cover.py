@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-pytest.importorskip("bpy")
+bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
+from xrds_blender import render, run_job
 from xrds_blender.cycles.rendered import Guides
 from xrds_blender.frame import denoisers
 from xrds_blender.frame.cover import cover
@@ -54,6 +55,24 @@ def test_what_has_no_noise_stays_as_it_is(alpha: np.ndarray) -> None:
     samples = 4 if alpha.min() == 1.0 else None
     guides = guides_of(alpha, samples)
     assert cover(guides, RenderJob()) is guides.alpha
+
+
+def test_the_network_gets_it(life: Any, network: Any) -> None:
+    """Of four samples alpha is in quarters, but for Cycles' pixel filter."""
+    life.render.film_transparent = True
+    bpy.data.objects["Floor"].hide_render = True
+    raw = run_job(life, lambda passes: passes.guides(4, seed=1)).alpha
+    render(life, 2, seed=0)
+    (call,) = network[0].calls
+    assert np.abs(call["guide_alpha"] - raw).max() > 0.0
+    np.testing.assert_array_equal(
+        call["guide_alpha"], cover(guides_like(raw), RenderJob())
+    )
+
+
+def guides_like(alpha: np.ndarray) -> Guides:
+    nothing = np.zeros((*alpha.shape, 3), np.float32)
+    return Guides(nothing, nothing, alpha, None, None, 4)
 
 
 def test_without_the_library_it_stays_as_it_is(monkeypatch: Any) -> None:
