@@ -49,6 +49,7 @@ def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         monkeypatch.setattr(budget, "shipped", lambda: model)
         monkeypatch.setattr(picking, "_denoisers", lambda: tuple(Denoiser))
         monkeypatch.setattr(picking, "probe", lambda *_: COSTS)
+        monkeypatch.setattr(picking, "network_seconds_per_pixel", lambda *_: 1e-6)
 
     return leave
 
