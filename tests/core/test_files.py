@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from xrds_core.errors import PictureError
-from xrds_core.files import check_output
+from xrds_core.files import check_input, check_output
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="such files are POSIX'")
 
@@ -95,6 +96,30 @@ def test_many_may_begin_one_shot_together(
         for each in begun:
             each.result()
     assert not list((tmp_path / "new" / "folder").iterdir())
+
+
+@pytest.fixture
+def nobody() -> Iterator[None]:
+    """Root may look into every folder; others may not."""
+    if os.geteuid() != 0:
+        yield
+        return
+    os.seteuid(65534)
+    yield
+    os.seteuid(0)
+
+
+def test_a_folder_that_cannot_be_searched_is_told(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    closed = tmp_path / "closed"
+    closed.mkdir()
+    closed.chmod(0)
+    request.getfixturevalue("nobody")
+    with pytest.raises(PictureError, match=r"cannot read .*Permission denied"):
+        check_input(closed / "in.exr")
+    with pytest.raises(PictureError, match=r"cannot write .*Permission denied"):
+        check_output(closed / "out.exr")
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="POSIX only")
