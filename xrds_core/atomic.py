@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from . import children
+from .errors import XRDSError
 
 _NAME = re.compile(r"\.xrds-(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-\w+\.unfinished")
 _DEAD = 3600.0  # seconds without a byte written, after which no machine writes any more
@@ -61,6 +62,16 @@ def write_json(path: Path, value: Any) -> None:
     """Write a value as a JSON file for people to read too, whole or not at all."""
     with replacing(path) as part:
         part.write_text(json.dumps(value, indent=1) + "\n", "utf-8")
+
+
+def read_json(path: Path) -> Any:
+    """Read a JSON file of an earlier run; raises XRDSError if it is damaged."""
+    try:
+        return json.loads(path.read_text("utf-8"))
+    except ValueError as error:
+        raise XRDSError(
+            f"{path} is damaged ({error}); remove it to begin anew"
+        ) from error
 
 
 def try_folder(folder: Path) -> None:

@@ -9,17 +9,23 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterable
 
 _running: set[subprocess.Popen[str]] = set()
 
 
-def run_python(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run `python ARGUMENTS` where this process finds its modules; what it printed.
+def run_python(
+    *arguments: str, path: Iterable[str] = ()
+) -> subprocess.CompletedProcess[str]:
+    """Run `python ARGUMENTS`; returns its status and what it printed.
 
-    It is killed where this process is interrupted, also by `kill_all`.
+    It looks for modules in the folders of `path` first; not in all of `sys.path`
+    unasked, in which Blender puts another module `bpy`. It is killed where this process
+    is interrupted, also by `kill_all`.
     """
-    # "" stands for the working folder
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    environment = dict(os.environ)
+    if folders := [each for each in path if each]:  # "" is the working folder
+        environment["PYTHONPATH"] = os.pathsep.join(folders)
     command = [sys.executable, "-P", *arguments]
     with subprocess.Popen(
         command,

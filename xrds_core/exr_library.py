@@ -293,7 +293,7 @@ def _read_apart(path: str | Path, limit: int) -> list[Part]:
 def _apart(task: str, path: str | Path, archive: Path, how: str) -> None:
     """Do a task in a process without the program's library."""
     words = (task, os.fspath(path), str(archive), how)
-    done = run_python("-m", __name__, *words)
+    done = run_python("-m", __name__, *words, path=sys.path)
     if done.returncode:
         lines = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
         raise PictureError(lines[-1])

@@ -13,6 +13,7 @@ import pytest
 from xrds_blender.command import main
 from xrds_blender.command.scene_file import SceneChoice, open_scene
 from xrds_blender.interface.registration import ensure_registered
+from xrds_core.children import run_python
 from xrds_core.errors import SceneError
 
 
@@ -141,3 +142,9 @@ def test_the_options_lead_there(
     assert bpy.data.scenes["Second"].render.threads == 1
     assert main.main([*line.split(), "--scene", "Third"]) == 1
     assert "no scene 'Third'" in capfd.readouterr().err
+
+
+def test_a_child_process_finds_blender() -> None:
+    """Blender's own folders on `sys.path` hold half a module of that name."""
+    done = run_python("-c", "import bpy, os; print(bpy.app.version); os._exit(0)")
+    assert done.stdout.strip() == str(bpy.app.version), done.stderr

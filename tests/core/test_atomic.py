@@ -15,6 +15,7 @@ import pytest
 
 from xrds_core import atomic
 from xrds_core.atomic import replacing
+from xrds_core.errors import XRDSError
 
 
 def names(folder: Path) -> list[str]:
@@ -217,3 +218,13 @@ def test_a_process_that_ends_on_the_spot_leaves_nothing(tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", ENDING, str(tmp_path)], check=False)
     assert done.returncode == 3
     assert not names(tmp_path)
+
+
+@pytest.mark.parametrize("content", [b"", b"{", b"\xff\xfe", b"[1, 2"])
+def test_a_damaged_record_is_named(tmp_path: Path, content: bytes) -> None:
+    path = tmp_path / "runs.json"
+    atomic.write_json(path, {"a": [1]})
+    assert atomic.read_json(path) == {"a": [1]}
+    path.write_bytes(content)
+    with pytest.raises(XRDSError, match=r"runs\.json is damaged"):
+        atomic.read_json(path)

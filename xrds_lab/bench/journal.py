@@ -6,7 +6,7 @@ import json
 from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
-from xrds_core.atomic import replacing
+from xrds_core.atomic import read_json, replacing
 from xrds_core.errors import Cancelled
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ class Journal:
     def _read(self) -> None:
         if not self.path.is_file():
             return
-        record = json.loads(self.path.read_text("utf-8"))
+        record = read_json(self.path)
         self.kills = record["kills"]
         killed = record["running"]
         if killed is not None:

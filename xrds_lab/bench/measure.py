@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -12,7 +11,7 @@ from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.picking import probe
 from xrds_blender.planning import budget
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
-from xrds_core.atomic import write_json
+from xrds_core.atomic import read_json, write_json
 
 from . import tasks, workload
 from .inputs import OFF, Folder, open_scene
@@ -208,7 +207,7 @@ class SceneBench:
         """What the picker did at each budget, by the budget's multiple."""
         if not self._picks_file.is_file():
             return {}
-        return dict(json.loads(self._picks_file.read_text("utf-8")))
+        return dict(read_json(self._picks_file))
 
     def _budgets_left(self) -> list[float]:
         done = self.picks if self.settings.picker else {}

@@ -9,7 +9,6 @@ what they differ by into the model. None of the scenes of the report is used.
 from __future__ import annotations
 
 import argparse
-import json
 import statistics
 import sys
 import time
@@ -23,7 +22,7 @@ import numpy as np
 from xrds_blender.planning.budget import Choice, Curve, ErrorModel, Model
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 from xrds_core import metrics
-from xrds_core.atomic import write_json
+from xrds_core.atomic import read_json, write_json
 
 COUNTS = (1, 2, 4, 8, 16, 32, 64)
 REFERENCE_SAMPLES, REFERENCE_SEEDS, SEED = 64, (11, 12), 404
@@ -52,7 +51,7 @@ def main() -> None:
 
 
 def _read(path: Path) -> dict[str, Any]:
-    return json.loads(path.read_text("utf-8")) if path.is_file() else {}
+    return read_json(path) if path.is_file() else {}
 
 
 def measure(name: str, assets: Path | None) -> dict[str, Row]:

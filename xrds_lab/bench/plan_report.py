@@ -18,10 +18,10 @@ import numpy as np
 
 from xrds_blender.planning.plan import SAVINGS
 from xrds_core import metrics
-from xrds_core.atomic import replacing, write_json
+from xrds_core.atomic import read_json, replacing, write_json
 from xrds_core.children import run_python
-from xrds_core.errors import SceneError, UsageError
-from xrds_core.files import check_input
+from xrds_core.errors import SceneError, UsageError, XRDSError
+from xrds_core.files import check_input, check_output
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -84,7 +84,8 @@ def run(
         wall = time.perf_counter() - start
         answer = Path(folder) / "frames.json"
         if done.returncode or not answer.is_file():
-            raise RuntimeError(f"{scene} {kind} failed: {done.stderr[-2000:]}")
+            reason = (done.stderr.strip().splitlines() or ["it was killed"])[-1]
+            raise XRDSError(f"{scene} {kind} failed: {reason}")
         frames = json.loads(answer.read_text("utf-8"))
         pictures = [np.load(Path(folder) / f"{i}.npy") for i in range(len(frames))]
     return Run(wall, frames, pictures)
@@ -147,7 +148,8 @@ def report(
     """
     _check_scenes(scenes)
     path = out.with_suffix(".json")
-    records = json.loads(path.read_text("utf-8"))["records"] if path.is_file() else []
+    check_output(path)
+    records = _records(path)
     for kind in kinds:
         for scene in scenes:
             record = measure(scene, kind, setting, progress) | {
@@ -161,6 +163,14 @@ def report(
             with replacing(out.with_suffix(".md")) as part:
                 part.write_text(text(records), "utf-8")
     return {"records": records}
+
+
+def _records(path: Path) -> list[dict[str, Any]]:
+    """Those of an earlier report; raises XRDSError if the file holds none."""
+    kept = read_json(path) if path.is_file() else {"records": []}
+    if not isinstance(kept, dict) or not isinstance(kept.get("records"), list):
+        raise XRDSError(f"{path} is no report of the plan; name another with --out")
+    return kept["records"]
 
 
 def _check_scenes(scenes: Sequence[str]) -> None:

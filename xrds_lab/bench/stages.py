@@ -10,13 +10,12 @@ the product stand beside them as a check.
 
 from __future__ import annotations
 
-import json
 import statistics
 import time
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import write_json
+from xrds_core.atomic import read_json, write_json
 
 from . import machine
 from .inputs import OFF, Mode, open_scene
@@ -64,7 +63,7 @@ class StageTimes:
 
     def __post_init__(self) -> None:
         if self.path.is_file():
-            self.runs = json.loads(self.path.read_text("utf-8"))
+            self.runs = read_json(self.path)
 
     def add(self, name: str, run: Run) -> None:
         """Keep a run."""

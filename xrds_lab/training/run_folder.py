@@ -13,8 +13,8 @@ from typing import Any
 
 import torch
 
-from xrds_core.atomic import replacing
-from xrds_core.errors import UsageError
+from xrds_core.atomic import read_json, replacing
+from xrds_core.errors import UsageError, XRDSError
 
 from .checkpoint import read_checkpoint, write_checkpoint
 from .config import TrainingConfig, read_config, to_toml
@@ -81,7 +81,7 @@ class RunFolder:
 
     def open_windows(self, config: TrainingConfig) -> dict[str, WindowSet]:
         """The run's windows, by split."""
-        files = json.loads(self.files.read_text())
+        files = read_json(self.files)
         folders = [Path(folder) for folder in config.data]
         what = config.scale, config.guides
         memory = config.cache_gigabytes * 1e9
@@ -94,7 +94,13 @@ class RunFolder:
         """The lines of the statistics."""
         if not self.stats.exists():
             return []
-        return [json.loads(line) for line in self.stats.read_text().splitlines()]
+        lines = self.stats.read_text("utf-8").splitlines()
+        try:
+            return [json.loads(line) for line in lines]
+        except ValueError as error:
+            raise XRDSError(
+                f"{self.stats} is damaged ({error}); remove {self.path} to begin anew"
+            ) from error
 
     def write_records(self, records: list[dict[str, Any]]) -> None:
         """Replace the statistics."""
