@@ -106,7 +106,14 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
 
 def _check_points(report: dict[str, Any]) -> None:
     methods = {point["method"] for point in report["points"]}
-    assert methods == {"cycles", "oidn", "bicubic", "demodulated_bilinear", "xrds"}
+    assert methods == {
+        "cycles",
+        "oidn",
+        "bicubic",
+        "demodulated_bilinear",
+        "xrds",
+        "full_size",
+    }
     for point in report["points"]:
         assert set(point["seconds"]) == {*STAGES, "total"}
         parts = sum(s for stage, s in point["seconds"].items() if stage != "total")
