@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 from xrds_core import atomic
 from xrds_core.errors import Cancelled, UsageError, XRDSError, printable
 from xrds_core.notices import warn
+from xrds_core.stdout import flush_all
 
 from . import streams
 
@@ -156,5 +157,5 @@ def finished(status: int) -> int:
 def leave(status: int) -> NoReturn:
     """End the process; the bpy module can hang when the interpreter ends."""
     status = finished(status)
-    streams.flush_all()
+    flush_all()
     os._exit(status)

@@ -48,12 +48,17 @@ def set_portion(borrowed: Borrowed, scene: Any, portion: Portion) -> None:
     """Take a part of a sample sequence."""
     set_sampling(borrowed, scene, portion.whole, portion.seed)
     if portion.length != portion.whole:
-        borrowed.set(
-            scene.cycles,
-            use_sample_subset=True,
-            sample_offset=portion.offset,
-            sample_subset_length=portion.length,
-        )
+        set_subset(borrowed, scene, portion.offset, portion.length)
+
+
+def set_subset(borrowed: Borrowed, scene: Any, offset: int, length: int) -> None:
+    """Take only a part of the samples that are set."""
+    borrowed.set(
+        scene.cycles,
+        use_sample_subset=True,
+        sample_offset=offset,
+        sample_subset_length=length,
+    )
 
 
 def set_denoising(

@@ -32,6 +32,7 @@ __all__ = [
 GUIDE_BOUNCES = 4
 # What may be left out where a scene does not need it, by the names of the decisions.
 SAVINGS = (
+    "samples",
     "denoise",
     "guides",
     "guide samples",
