@@ -25,7 +25,6 @@ SHRINK = 2
 """Pixels along a side of what is compared: quick, and as telling as the full size."""
 TILE = 16  # pixels along a side of what is never split
 LEAST_SIDE = 2  # tiles: a smaller render is mostly overhead
-RECTANGLES = 32
 # Samples are given in proportion to error^(1 / (1 + FALL)). The error of a denoised
 # picture falls with samples^0.7; two halves only guess at it, so the rule is gentler.
 FALL = 1.2
@@ -55,9 +54,14 @@ class Half:
 
 
 def allot(
-    halves: Sequence[Half], taken: int, samples: int, most: int, exposure: float
+    halves: Sequence[Half],
+    taken: int,
+    samples: int,
+    most: int,
+    exposure: float,
+    rectangles: int = 32,
 ) -> list[tuple[Rectangle, int]]:
-    """Return rectangles that take more samples, and how many more per pixel.
+    """Return at most so many rectangles, and how many more samples a pixel there takes.
 
     Both halves together are `taken` samples per pixel; with what is returned the mean
     over the picture is about `samples`, and no pixel has more than `most`. `exposure`
@@ -68,7 +72,7 @@ def allot(
     if not error.any():
         whole = Rectangle(0, 0, width, height)
         return [(whole, samples - taken)] if samples > taken else []
-    parts = split(error + FLOOR * error.mean(), RECTANGLES)
+    parts = split(error + FLOOR * error.mean(), rectangles)
     counts = _counts(parts, taken, samples, most)
     edges = _Edges(width, height, error.shape)
     return [

@@ -132,7 +132,7 @@ def test_denoisers_that_are_not_there_are_not_chosen() -> None:
     costs = replace(COSTS, denoise={**COSTS.denoise, Denoiser.XRDS_HIGH: 14.0})
     picked = budget.choose(60.0, costs, errors, [])
     assert picked.choice.denoiser is Denoiser.XRDS_HIGH  # more samples fit
-    assert picked.choice.label == "full size, 9 samples, high denoising"
+    assert picked.choice.label == "full size, 10 samples, high denoising"
     assert "best plain for 60 s" in picked.decision(60.0).reason
     left = errors.limited({Denoiser.HIGH_ACCURATE})
     assert budget.choose(60.0, costs, left, []).choice.denoiser == "HIGH-ACCURATE"

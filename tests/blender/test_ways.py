@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from xrds_blender.planning import budget
-from xrds_blender.planning.budget import ALLOTTED_COST, Network
+from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import Denoiser
 from xrds_blender.planning.measured import GUIDE_SHARE, Measured, learn
 from xrds_blender.planning.ways import (
@@ -111,14 +111,14 @@ def test_nothing_is_known_before_the_first_render() -> None:
 
 def test_a_render_at_full_size_tells_of_all_ways() -> None:
     known = learn(None, Way.FULL_SIZE, ASKED, PIXELS, FULL, MODEL)
-    assert known.beauty == pytest.approx(2.0 / ALLOTTED_COST)
+    assert known.beauty == 2.0
     assert known.denoise == pytest.approx(10.0, rel=0.01)
 
     def seconds(way: Way, asked: Asked = ASKED, pixels: int = PIXELS) -> float:
         return known.seconds(way, asked, pixels, MODEL)
 
     assert seconds(Way.FULL_SIZE) == pytest.approx(39.667)
-    assert seconds(Way.PLAIN) == pytest.approx(1.5 + 32 / ALLOTTED_COST + 10, rel=0.01)
+    assert seconds(Way.PLAIN) == pytest.approx(1.5 + 32 + 10, rel=0.01)
     more = seconds(Way.FULL_SIZE, replace(ASKED, samples=32))
     assert more == pytest.approx(39.667 + 32, rel=0.01)
     guides = 4 * GUIDE_SHARE * 2.0

@@ -7,7 +7,6 @@ import pytest
 
 pytest.importorskip("mitsuba_oidn")
 
-from xrds_core import allocation
 from xrds_core.allocation import Half, allot, split
 
 HEIGHT, WIDTH = 270, 402  # no multiple of a tile
@@ -78,13 +77,13 @@ def test_any_size(size: tuple[int, int]) -> None:
 def test_parts_cover_everything_once() -> None:
     error = np.random.default_rng(2).random((17, 26)) ** 4
     covered = np.zeros_like(error)
-    parts = split(error, allocation.RECTANGLES)
+    parts = split(error, 32)
     for part in parts:
         inside = slice(part.top, part.bottom), slice(part.left, part.right)
         covered[inside] += 1
         assert part.error == pytest.approx(error[inside].mean())
     np.testing.assert_array_equal(covered, 1)
-    assert 10 < len(parts) <= allocation.RECTANGLES
+    assert 10 < len(parts) <= 32
 
 
 def test_splits_follow_the_edges() -> None:

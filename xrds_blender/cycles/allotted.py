@@ -28,6 +28,11 @@ from .settings import set_denoising, set_sampling, set_subset
 
 MOST = 4
 """How many times its share a pixel gets at the most."""
+RECTANGLES = (24, 256)
+"""Least and most: below it too little is gained, above it no more."""
+# Of one part's render, beside its samples: starting, and reading the result.
+PART_SECONDS, PART_SECONDS_PER_PIXEL = 0.003, 5e-9
+OVERHEAD = 0.04
 SEED_STEP, LARGEST_SEED = 104729, 2**31 - 1
 Report = Callable[[float], object]
 
@@ -87,7 +92,14 @@ class AllottedLayer(LayerSession):
                 sums.add(part, half, whole)
                 halves.append(Half(part.picture[..., :3], part.albedo, part.normal))
                 report(sums.mean_count / samples)
-            parts = allot(halves, 2 * half, samples, MOST * samples, exposure)
+            parts = allot(
+                halves,
+                2 * half,
+                samples,
+                MOST * samples,
+                exposure,
+                self._rectangles(samples, 2 * half),
+            )
             for step in _steps(parts, samples, 2 * half, seed, self._own_seed(seed)):
                 with _quietly():
                     sums.add(self._part(*step), step.count, step.place)
@@ -97,6 +109,13 @@ class AllottedLayer(LayerSession):
                 self._write(sums.mean())
             raise
         return sums.mean(), *self._seconds
+
+    def _rectangles(self, samples: int, taken: int) -> int:
+        """As many as take OVERHEAD of the seconds that are left for samples."""
+        left = self._seconds[1] * (samples - taken) / taken
+        width, height = self._size
+        each = PART_SECONDS + PART_SECONDS_PER_PIXEL * width * height
+        return int(np.clip(OVERHEAD * left / each, *RECTANGLES))
 
     def _own_seed(self, seed: int | None) -> int:
         """Of what is no part of the frame's sequence; another one in every frame."""

@@ -7,10 +7,12 @@ from typing import Any
 from ..cycles.allotted import sample_allotted
 from ..cycles.pass_names import COMBINED
 from ..cycles.samples import Samples, sample_layer
-from ..planning.budget import LEAST_ALLOTTED
 from ..planning.plan import Decision
 from . import progress
 from .job import RenderJob
+
+LEAST_SAMPLES = 8
+"""Of fewer, what two quarters show is mostly chance."""
 
 
 def sample(
@@ -43,9 +45,9 @@ def _why_even(engine: Any, depsgraph: Any, job: RenderJob) -> str:
     own_count = layer.samples and cycles.use_layer_samples != "IGNORE"
     fixed = job.samples is not None
     reasons = {
-        "nothing is to be left out": "samples" not in job.savings,
-        f"fewer than {LEAST_ALLOTTED} do not show where more are needed": (
-            (job.samples or cycles.samples) < LEAST_ALLOTTED
+        "even ones are asked for": "samples" not in job.savings,
+        f"fewer than {LEAST_SAMPLES} do not show where more are needed": (
+            (job.samples or cycles.samples) < LEAST_SAMPLES
         ),
         "other passes are to be Cycles' own": passes != {COMBINED},
         "the views are to be alike": len(result.views) > 1,

@@ -25,9 +25,6 @@ AIM = 0.97
 # Where nothing fits: what is as fast as the fastest, as far as predictions can tell.
 ALIKE = 1.1
 MOST_SAMPLES = 16384
-# Our denoiser's samples go where they pay, which are the dearer parts of a frame.
-LEAST_ALLOTTED = 8
-ALLOTTED_COST = 1.1
 
 
 class Network(NamedTuple):
@@ -73,12 +70,6 @@ class Choice:
         )
 
 
-def sample_cost(choice: Choice) -> float:
-    """Seconds of a sample of this choice, of those that an even one takes."""
-    allots = choice.samples >= LEAST_ALLOTTED and _can_allot(choice)
-    return ALLOTTED_COST if allots else 1.0
-
-
 @dataclass(frozen=True)
 class Costs:
     """Seconds of one frame's parts, all for the whole frame at its full size.
@@ -99,15 +90,11 @@ class Costs:
 
     def samples(self, choice: Choice, seconds: float) -> int:
         """Most samples for which the choice keeps to `seconds`; 0 if none does."""
-        left = max(seconds - self._without_samples(choice), 0.0)
-        even = math.floor(left / (self.beauty / choice.scale**2))
-        if even < LEAST_ALLOTTED or not _can_allot(choice):
-            return min(MOST_SAMPLES, even)
-        allotted = math.floor(left / (self.beauty * ALLOTTED_COST))
-        return min(MOST_SAMPLES, max(allotted, LEAST_ALLOTTED - 1))
+        left = seconds - self._without_samples(choice)
+        return max(0, min(MOST_SAMPLES, math.floor(left / self._sample(choice))))
 
     def _sample(self, choice: Choice) -> float:
-        return self.beauty / choice.scale**2 * sample_cost(choice)
+        return self.beauty / choice.scale**2
 
     def _without_samples(self, choice: Choice) -> float:
         seconds = self.fixed + self.denoise[choice.denoiser] / choice.scale**2
@@ -330,10 +317,6 @@ def _least_samples(curve: Curve, psnr: float) -> int:
 def _picked(family: Choice, samples: int, costs: Costs, curve: Curve) -> Picked:
     choice = _with_count(family, samples)
     return Picked(choice, costs.seconds(choice), curve.at(samples))
-
-
-def _can_allot(choice: Choice) -> bool:
-    return choice.scale == 1 and choice.denoiser.is_ours
 
 
 def _merit(picked: Picked) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from .budget import Choice, Costs, Model, Network, sample_cost
+from .budget import Choice, Costs, Model, Network
 from .denoiser import DEFAULT_DENOISER, Denoiser
 from .ways import Asked, Way, choice_of
 
@@ -100,7 +100,6 @@ def learn(
         mode = Denoiser(f"XRDS-{asked.denoise.upper()}")
         denoise = seconds["denoise"] / model.denoiser_speed[mode]
         beauty = seconds["beauty"] / asked.samples
-        beauty /= sample_cost(Choice(mode, asked.samples))
         return replace(now, beauty=beauty, denoise=denoise)
     return _of_plain(now, asked, seconds["beauty"], model)
 

@@ -59,6 +59,7 @@ def measure(name: str, assets: Path | None) -> dict[str, Row]:
 
     And under `seconds` those of denoising a picture of 1920 x 1080 pixels.
     """
+    from xrds_blender import run_job
     from xrds_blender.interface.registration import ensure_registered
 
     from ..studio.scenes import build_scene
@@ -71,38 +72,30 @@ def measure(name: str, assets: Path | None) -> dict[str, Row]:
     render.border_min_x, render.border_max_x = BORDER[:2]
     render.border_min_y, render.border_max_y = BORDER[2:]
     scene.cycles.use_adaptive_sampling = False
-    halves = [_plain(scene, REFERENCE_SAMPLES, seed) for seed in REFERENCE_SEEDS]
-    return {str(n): _row(scene, n, sum(halves) / len(halves)) for n in COUNTS}
+    exposure = 2.0**scene.view_settings.exposure
+    return run_job(scene, lambda passes: _errors(passes, exposure))
 
 
-def _plain(scene: Any, count: int, seed: int) -> Any:
-    from xrds_blender import run_job
+def _errors(passes: Any, exposure: float) -> dict[str, Row]:
+    halves = [
+        passes.beauty(1, REFERENCE_SAMPLES, denoiser=DEFAULT_DENOISER, seed=seed)
+        for seed in REFERENCE_SEEDS
+    ]
+    reference = sum(half.radiance for half in halves) / len(halves) * exposure
+    return {str(n): _row(passes, n, reference, exposure) for n in COUNTS}
 
-    beauty = run_job(
-        scene,
-        lambda passes: passes.beauty(1, count, denoiser=DEFAULT_DENOISER, seed=seed),
-    )
-    return beauty.radiance
 
-
-def _row(scene: Any, count: int, reference: Any) -> Row:
-    from xrds_blender.frame.allotting import sample
-    from xrds_blender.frame.job import RenderJob
-    from xrds_blender.frame.rendering import call_engine
+def _row(passes: Any, count: int, reference: Any, exposure: float) -> Row:
     from xrds_core.denoising import Denoiser as OurDenoiser
 
-    job = RenderJob(scale=1, samples=count, seed=SEED)
-    views = call_engine(scene, lambda *given: sample(*given, job)[0])
-    noisy = next(iter(views.values()))
-    images = noisy.picture[..., :3], noisy.albedo, noisy.normal
-    pictures = {str(DEFAULT_DENOISER): _plain(scene, count, SEED)} | {
-        str(mode): OurDenoiser(mode.quality)(*images).radiance for mode in OUR_DENOISERS
-    }
-    exposure = scene.view_settings.exposure
-    return {
-        name: metrics.psnr(picture, reference, exposure)
-        for name, picture in pictures.items()
-    }
+    rival = passes.beauty(1, count, denoiser=DEFAULT_DENOISER, seed=SEED)
+    noisy = passes.beauty(1, count, denoise=False, seed=SEED).radiance
+    guides = passes.guides(count, full=True, seed=SEED)
+    row = {str(DEFAULT_DENOISER): metrics.psnr(rival.radiance * exposure, reference)}
+    for mode in OUR_DENOISERS:
+        ours = OurDenoiser(mode.quality)(noisy, guides.albedo, guides.normal).radiance
+        row[str(mode)] = metrics.psnr(ours * exposure, reference)
+    return row
 
 
 def joined(model: Model, measured: dict[str, dict[str, Row]]) -> Model:
