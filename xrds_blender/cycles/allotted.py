@@ -19,6 +19,7 @@ from xrds_core.arrays import Array
 from xrds_core.errors import Cancelled
 from xrds_core.stdout import muted
 
+from . import live
 from .borrowed import Borrowed
 from .layer_session import LayerSession
 from .low_camera import Region
@@ -91,6 +92,7 @@ class AllottedLayer(LayerSession):
                 part = self._part(whole, half, seed, samples, offset)
                 sums.add(part, half, whole)
                 halves.append(Half(part.picture[..., :3], part.albedo, part.normal))
+                live.show(sums.mean().picture)
                 report(sums.mean_count / samples)
             parts = allot(
                 halves,
