@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..cycles.passes import CyclesPasses
-from . import history, progress
+from . import history, progress, torch_folder
 from .full_size import render_full_size
 from .job import Picture, RenderJob
 from .networks import load_upscaler
@@ -36,6 +36,8 @@ def render_layer(
         elif job.scale == 1:
             picture = render_full_size(engine, depsgraph, job)
         else:
+            if torch_folder.loaded() is None:  # which takes some seconds
+                progress.begin(engine, progress.LOADING, 0)
             # first: missing weights are to cost no render
             upscaler = load_upscaler(job)
             picture = render_enlarged(engine, depsgraph, job, upscaler)

@@ -14,6 +14,7 @@ from typing import Any
 
 from ..cycles import session, status
 
+LOADING = "Loading PyTorch"
 LOW, GUIDES, NETWORK = "Low resolution", "Guides", "Network"
 SAMPLES, DENOISE = "Samples", "Denoising"
 STAGES = (
