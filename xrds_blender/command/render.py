@@ -8,6 +8,7 @@ from typing import Any
 
 from xrds_core.errors import UsageError
 
+from ..planning.plan import GUIDE_CACHE
 from . import arguments
 from .deferred import need_blender
 from .options import add_job, add_output, choice_of, encoding_of, job_of
@@ -106,4 +107,11 @@ def _lines(result: dict[str, Any]) -> list[str]:
         f"{frame['output']}: {frame['seconds']['total']:.1f} s"
         for frame in result["frames"]
     ]
-    return lines + [f"  {_decision(each)}" for each in result["plan"]]
+    return lines + [f"  {_outcome(each)}" for each in result["plan"]]
+
+
+def _outcome(decision: dict[str, Any]) -> str:
+    """A decision after a render: with its reason where this tells what was found."""
+    told = _decision(decision)
+    found = decision["decision"] == GUIDE_CACHE
+    return f"{told}: {decision['reason']}" if found else told

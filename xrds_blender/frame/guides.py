@@ -18,13 +18,11 @@ from ..cycles.pass_names import ALBEDO, NORMAL, is_lasting
 from ..cycles.passes import CyclesPasses
 from ..cycles.rendered import Beauty, Guides, Probe
 from ..planning.facts import Facts
-from ..planning.plan import Decision, Plan
+from ..planning.plan import GUIDE_CACHE, Decision, Plan
 from ..scene.guide_key import NotFollowed, guide_key
 from . import guide_cache
 from .guide_cache import CachedGuides, GuideName
 from .job import RenderJob
-
-_NAME = "guide cache"
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ class GuideSource:
         self._portion = portion
         self.name: GuideName | None = None
         self._folder = None if job.guide_cache is None else Path(job.guide_cache)
-        self.decision = Decision(_NAME, "off", "as requested")
+        self.decision = Decision(GUIDE_CACHE, "off", "as requested")
 
     def guides(self, low: dict[str, Beauty] | None = None) -> dict[str, Guides]:
         """Guides by view; the render result then holds their passes.
@@ -76,16 +74,16 @@ class GuideSource:
         `low` is the picture by view, which an empty scene's guides are made of.
         """
         if low is not None and not self._chosen.render_guides:
-            self.decision = Decision(_NAME, "off", "there are no guides to keep")
+            self.decision = Decision(GUIDE_CACHE, "off", "there are no guides to keep")
             return self._of_background(low)
-        if self._job.guides == "full" or _NAME not in self._job.savings:
+        if self._job.guides == "full" or GUIDE_CACHE not in self._job.savings:
             return self._render(self._chosen.guide_samples)
         started = time.perf_counter()
         try:
             key = self._key()
         except NotFollowed as reason:
             self.decision = Decision(
-                _NAME, "not used", f"the cache cannot track {reason}"
+                GUIDE_CACHE, "not used", f"the cache cannot track {reason}"
             )
             return self._render(self._chosen.guide_samples)
         probe = self._passes.probe(self._chosen.guides)
@@ -182,7 +180,7 @@ class GuideSource:
                 f"in memory only: cannot write to {self._folder} ({error.strerror})"
             )
             warn(f"guides are kept {reason}")
-        self.decision = Decision(_NAME, value, f"{reason}; {look}")
+        self.decision = Decision(GUIDE_CACHE, value, f"{reason}; {look}")
         return _guides(guides, seconds)
 
     def _why_missed(self, look: _Look) -> str:
@@ -191,7 +189,7 @@ class GuideSource:
         reason = (
             "nothing XRDS looks at has changed, but a probe render shows other guides"
         )
-        self._report({"INFO"}, f"XRDS: {_NAME}: {reason}; they are rendered anew")
+        self._report({"INFO"}, f"XRDS: {GUIDE_CACHE}: {reason}; they are rendered anew")
         return reason
 
     def _report_hit(self, samples: int, look: _Look) -> None:
@@ -199,7 +197,7 @@ class GuideSource:
         expected = self._facts.guide_seconds
         saving = None if expected is None else max(0.0, expected - look.seconds)
         self.decision = Decision(
-            _NAME, f"used {samples} samples", f"{reason}; {look}", saving
+            GUIDE_CACHE, f"used {samples} samples", f"{reason}; {look}", saving
         )
 
 

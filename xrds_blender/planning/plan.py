@@ -14,6 +14,7 @@ from .facts import Facts, SceneFacts
 from .forecast import low_size
 
 __all__ = [
+    "GUIDE_CACHE",
     "SAVINGS",
     "Decision",
     "Facts",
@@ -30,6 +31,7 @@ __all__ = [
 
 # Mirrors and glass show other things' albedo and normals; four bounces hold them.
 GUIDE_BOUNCES = 4
+GUIDE_CACHE = "guide cache"
 # What may be left out where a scene does not need it, by the names of the decisions.
 SAVINGS = (
     "samples",
@@ -38,7 +40,7 @@ SAVINGS = (
     "guide samples",
     "guide bounces",
     "guide lights",
-    "guide cache",
+    GUIDE_CACHE,
     "motion blur",
     "network",
 )
