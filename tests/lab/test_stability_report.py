@@ -65,6 +65,16 @@ def test_other_weights_start_anew(
     assert names == {"energy.smooth", "grey.chroma"}
 
 
+def test_a_check_that_is_no_more_leaves_the_others(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    result = measure(monkeypatch, tmp_path, even)
+    result["checks"][0]["name"] = "energy.of.old"
+    (tmp_path / "results.json").write_text(json.dumps(result))
+    names = {c["name"] for c in measure(monkeypatch, tmp_path, uneven)["checks"]}
+    assert names == {"energy.smooth", "firefly.far_change", "grey.chroma"}
+
+
 def test_a_page_without_failures_says_so(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

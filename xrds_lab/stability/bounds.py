@@ -243,6 +243,12 @@ def bound(name: str) -> Bound:
     return BOUNDS.get(name) or BOUNDS[f"{first}.*.{rest.partition('.')[2]}"]
 
 
+def is_bound(name: str) -> bool:
+    """Return whether a value has an entry in the table."""
+    first, _, rest = name.partition(".")
+    return name in BOUNDS or f"{first}.*.{rest.partition('.')[2]}" in BOUNDS
+
+
 def judge(name: str, value: float, preset: str, scale: int, precision: str) -> Check:
     """Return a value with its verdict; raises KeyError without such a bound."""
     limit = bound(name).limit

@@ -11,7 +11,7 @@ from xrds_core.errors import UsageError
 
 from ..progress import silent
 from . import hues, lies, light, sameness, shapes, spoilt
-from .bounds import STIFF, judge
+from .bounds import STIFF, is_bound, judge
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -125,6 +125,7 @@ def _earlier(
         verdicts = [
             judge(*(x[k] for k in ("name", "value", "preset", "scale", "precision")))
             for x in result["checks"]
+            if is_bound(x["name"])  # not of a check that is no more
         ]
         curves = {
             (x["name"], x["subject"]): dict(x["points"]) for x in result["curves"]
