@@ -87,6 +87,8 @@ def test_installs_by_dropping_the_zip(window: Window) -> None:
     window.shot("03_installed")
     assert window.ask("'bl_ext.user_default.xrds' in bpy.context.preferences.addons")
     assert not window.ask("'torch' in __import__('sys').modules")
+    kept = "bpy.context.preferences.addons['bl_ext.user_default.xrds'].preferences"
+    assert "torch safetensors" in window.ask(f"{kept}.torch_command")
 
 
 def test_first_picture_from_the_render_menu(window: Window) -> None:

@@ -49,6 +49,10 @@ def _graphics_devices() -> Iterator[tuple[str, str, str, int]]:
         yield f"cuda:{i}", name, f"A graphics card ({build})", 10 + i
 
 
+def _command(_: Any) -> str:
+    return get_torch.command()
+
+
 def _apply_torch(preferences: Any, _: Any = None) -> None:
     """Look for torch where the preferences say; what is wrong is shown below."""
     get_torch.remember(preferences.torch)
@@ -109,7 +113,7 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
     torch_command: bpy.props.StringProperty(
         name="Command",
         description="Downloads PyTorch into a folder of XRDS: run it in a terminal",
-        get=lambda _: get_torch.command(),
+        get=_command,
     )
 
     def draw(self, context: bpy.types.Context) -> None:
