@@ -1,10 +1,10 @@
 """Noise of few samples taken out of albedo and normal, before a network sees them.
 
-Not from the paper. A small network predicts for every pixel two kernels over its
-neighbours, one for albedo and one for normal, as Bako et al. do, "Kernel-Predicting
-Convolutional Networks for Denoising Monte Carlo Renderings" (2017). It learns from
-pairs of noisy renders alone: Lehtinen et al., "Noise2Noise" (2018). Shape letters as in
-`network`.
+Guides of more samples are denoised by Open Image Denoise (`guide_noise`). Not from the
+paper. A small network predicts for every pixel two kernels over its neighbours, one for
+albedo and one for normal, as Bako et al. do, "Kernel-Predicting Convolutional Networks
+for Denoising Monte Carlo Renderings" (2017). It learns from pairs of noisy renders
+alone: Lehtinen et al., "Noise2Noise" (2018). Shape letters as in `network`.
 """
 
 from __future__ import annotations

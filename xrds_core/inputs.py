@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from .arrays import Array, float_array
 from .errors import PictureError, UsageError
 from .front_end import clean_radiance, pad_guide, transfer
 from .guide_filter import FEW_SAMPLES
+from .guide_noise import Quiet
 from .holes import clean_alpha, fill_holes
 from .layout import to_planes
 from .tiling import Tile
@@ -49,6 +50,11 @@ class Inputs:
         """Whether there is no light at all in the picture."""
         seen = (self.low[..., :3], self.guide_radiance)
         return not any(x is not None and x.any() for x in seen)
+
+    def with_guides(self, quiet: Quiet) -> Inputs:
+        """The same with albedo and normal as `quiet` makes them of these."""
+        albedo, normal = quiet(self.albedo, self.normal)
+        return replace(self, albedo=albedo, normal=normal, has_noisy_guides=False)
 
     def radiance_tensor(self, tile: Tile, exposure: float) -> Tensor:
         """Return the radiance of a tile in the transfer domain, (1, 3, h, w)."""

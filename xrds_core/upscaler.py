@@ -11,7 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from . import tiling
+from . import guide_noise, tiling
 from .alpha import finish
 from .arrays import Array
 from .cost import Cost, measure
@@ -122,8 +122,8 @@ class Upscaler:
             guide_radiance: (H, W, 3), for `full` guides and only for them.
             guide_alpha: (H, W), the alpha of the guides' render; in place of the
                 picture's own, too, where `radiance` has none.
-            guide_samples: per pixel of albedo and normal; the noise of a few of them
-                is filtered out first. None where they are many, or not known.
+            guide_samples: per pixel of albedo and normal; the noise of few of them
+                is taken out first. None where they are many, or not known.
             exposure: of a picture this is a part of; None finds it in `radiance`.
             memory_limit: bytes to aim at, beside the arrays given and returned. The
                 smallest tiles are taken where it is too small even for them.
@@ -149,6 +149,10 @@ class Upscaler:
         self._check_guides(inputs)
         exposure = choose_exposure(exposure, inputs.low)
         area = self._area(inputs, skip_idle)
+        device = self.device.type
+        quiet = guide_noise.remover(guide_samples, device, memory_limit, progress)
+        if quiet is not None and area is not None and not inputs.is_black():
+            inputs = inputs.with_guides(quiet)
         plan = self._tiles(area, memory_limit, tile)
         steps = Progress(progress)
         while True:

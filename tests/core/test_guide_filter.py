@@ -9,7 +9,7 @@ import pytest
 import torch
 from torch.nn import functional
 
-from xrds_core import guide_filter, weights
+from xrds_core import guide_filter, guide_noise, weights
 from xrds_core.errors import UsageError, WeightsError
 from xrds_core.exr_upscale import upscale_file
 from xrds_core.guide_filter import FEW_SAMPLES, STRENGTH, GuideFilter, filter_guides
@@ -102,6 +102,12 @@ def test_radiance_of_full_guides_is_no_guide_to_filter(shipped: GuideFilter) -> 
 # --- when it is asked -----------------------------------------------------------------
 
 
+@pytest.fixture
+def no_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Open Image Denoise, which does more, is missing."""
+    monkeypatch.setattr(guide_noise, "_denoiser", lambda *_: None)
+
+
 def arrays(side: int = 40) -> tuple[np.ndarray, ...]:
     random = np.random.default_rng(0)
     low = random.random((side, side, 3), np.float32)
@@ -109,6 +115,7 @@ def arrays(side: int = 40) -> tuple[np.ndarray, ...]:
     return low, albedo, normal
 
 
+@pytest.mark.usefixtures("no_library")
 def test_only_few_samples_are_filtered(upscaler: Upscaler) -> None:
     low, albedo, normal = arrays()
     many = upscaler(low, albedo, normal).radiance
@@ -140,6 +147,7 @@ def test_guides_of_no_samples_are_refused(upscaler: Upscaler) -> None:
         upscaler(*arrays(), guide_samples=0)
 
 
+@pytest.mark.usefixtures("no_library")
 def test_files_tell_no_samples(tmp_path: Path) -> None:
     """So the command is told of them; without, guides are taken as they are."""
     from xrds_core.exr import read_beauty, write_picture

@@ -171,6 +171,34 @@ class Denoiser:
             stages.tell(1.0)
         return Denoised(result, pictures.bad_pixels, prefiltered)
 
+    def guides(
+        self, albedo: Array, normal: Array, *, progress: Callback | None = None
+    ) -> tuple[Array, Array]:
+        """Denoise the guides alone; one that is clean is returned as it was given.
+
+        Args:
+            albedo: (H, W, 3), without NaN; values above 1 count as 1.
+            normal: (H, W, 3), without NaN.
+            progress: takes a fraction in [0, 1] that never falls; False as its result
+                cancels.
+
+        Raises Cancelled and OutOfMemory.
+        """
+        if self._device is None:
+            raise UsageError("this denoiser is closed; make another one")
+        stages = Stages(progress)
+        found = {"albedo": albedo, "normal": normal}
+        with self._lock, library.explained(self.device, albedo.shape):
+            stages.tell(0.0)
+            for name, guide in found.items():
+                stages.begin(1 / len(found))
+                if not self._is_clean(name, guide):
+                    held = np.clip(guide, *_RANGE[name])
+                    quiet = self._prefilter(name, held, name, stages)
+                    found[name] = quiet.astype(np.float32)
+            stages.tell(1.0)
+        return found["albedo"], found["normal"]
+
     def _to_prefilter(
         self, pictures: Pictures, are_clean: bool | None
     ) -> tuple[str, ...]:

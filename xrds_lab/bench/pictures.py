@@ -198,6 +198,8 @@ class Pictures:
         key = f"{config.key}-{self.networks.digest(config.network)}"
         if config.has_noisy_guides:
             key += f"-{self.networks.filter_digest}"
+        if config.denoises_guides:
+            key += "-denoised-guides"
         return key
 
     def errors(self, config: Config) -> dict[str, float]:

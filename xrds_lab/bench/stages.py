@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 ROUNDS = 3
 PLAIN_FRAME, XRDS_FRAME = "whole frame, plain", "whole frame, XRDS"
 GUIDE_FILTER = "filter of guides of few samples"
+GUIDE_DENOISER = "denoiser of guides of more"
 CYCLES = ("cycles", "oidn")
 STAGES = ("sync", "beauty", "denoise", "guides", "network", "other")
 
@@ -124,6 +125,8 @@ class StageTimes:
             stages["network"] = self.median(in_process_name(config), key)
         if config.has_noisy_guides:
             stages["network"] += self.median(GUIDE_FILTER, key)
+        if config.denoises_guides:
+            stages["network"] += self.median(GUIDE_DENOISER, key)
         return stages
 
     def line(

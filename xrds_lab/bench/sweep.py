@@ -83,6 +83,13 @@ class Config:
 
         return self.method == "xrds" and 0 < self.guide_samples < FEW_SAMPLES
 
+    @property
+    def denoises_guides(self) -> bool:
+        """Whether OIDN takes the noise of its guides out instead."""
+        from xrds_core.guide_noise import is_noisy
+
+        return self.method == "xrds" and is_noisy(self.guide_samples)
+
     def beauty(self) -> Request:
         """The render that the picture's light comes from."""
         if self.method == "full_size":  # our denoiser asks for the guides as well

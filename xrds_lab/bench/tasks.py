@@ -15,6 +15,7 @@ from .inputs import Request, open_scene
 from .rivals import ENLARGEMENTS
 from .stages import (
     CYCLES,
+    GUIDE_DENOISER,
     GUIDE_FILTER,
     PLAIN_FRAME,
     XRDS_FRAME,
@@ -57,6 +58,7 @@ def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str
     timed[PLAIN_FRAME] = lambda: frame(shot, plain_job())[1]
     if used:
         timed[GUIDE_FILTER] = _guide_filter(networks, used[0], window)
+        timed[GUIDE_DENOISER] = _guide_denoiser(networks, used[0], window)
         job = _quick_job(networks, used[0])
         timed[XRDS_FRAME] = lambda: frame(shot, job)[1]
     return timed
@@ -147,6 +149,22 @@ def _guide_filter(networks: Networks, network: Network, window: Window) -> Task:
 
         run()
         return clocked(run)
+
+    return task
+
+
+def _guide_denoiser(networks: Networks, network: Network, window: Window) -> Task:
+    """Time the denoising of a whole frame's guides; all networks share it."""
+    from xrds_core.guide_filter import FEW_SAMPLES
+    from xrds_core.guide_noise import remover
+
+    def task() -> Run:
+        upscaler, (_, full) = networks[network], noise(window, network.scale)
+        quiet = remover(FEW_SAMPLES, upscaler.device.type)
+        if quiet is None:
+            raise LookupError("Open Image Denoise is missing: install mitsuba-oidn")
+        quiet(full, full)
+        return clocked(lambda: quiet(full, full))
 
     return task
 
