@@ -37,23 +37,23 @@ def _in_part(scene: SceneFacts) -> tuple[Decision, ...]:
     causes = {
         "motion blur": (
             scene.motion_blur,
-            "Cycles gives no vectors: what moves by itself lends where it fits",
+            "Cycles gives no vectors with motion blur: what moves lends where it fits",
         ),
         "depth of field": (scene.depth_of_field, "blurred pixels mix many depths"),
         "volumes": (
             scene.volumes,
-            "they have no depth: they lend with the surface behind them",
+            "volumes have no depth: they lend with the surface behind them",
         ),
-        "hair": (scene.hair, "what is finer than a pixel is found again by chance"),
+        "hair": (scene.hair, "hair, finer than a pixel, is found again by chance"),
         "mirrors and glass": (
             scene.smooth,
-            "what they show moves otherwise than they do",
+            "what mirrors and glass show moves otherwise than they do",
         ),
     }
     found = {what: reason for what, (there, reason) in causes.items() if there}
     if not found:
         return ()
-    reason = "; ".join(f"{what}: {why}" for what, why in found.items())
+    reason = "; ".join(found.values())
     return (Decision("left out by pixel", ", ".join(found), reason),)
 
 
