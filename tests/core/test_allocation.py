@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip("mitsuba_oidn")
 
+from xrds_core import allocation
 from xrds_core.allocation import Half, allot, split
 
 HEIGHT, WIDTH = 270, 402  # no multiple of a tile
@@ -16,13 +17,13 @@ def halves(noise: np.ndarray | float, light: float = 0.5) -> list[Half]:
     """Two halves of a flat picture whose noise is as strong as the map says."""
     random = np.random.default_rng(5)
     flat = np.full((HEIGHT, WIDTH, 3), light, np.float32)
-    guide = np.full_like(flat, 0.5)
+    guides = [np.full_like(flat, 0.5) for _ in range(4)]
 
     def radiance() -> np.ndarray:
         spread = random.standard_normal((HEIGHT, WIDTH, 1)).astype(np.float32)
         return np.maximum(flat + np.asarray(noise, np.float32) * spread, 0.0)
 
-    return [Half(radiance(), guide, guide) for _ in range(2)]
+    return [Half(radiance(), guides.pop(), guides.pop()) for _ in range(2)]
 
 
 def counts(parts: list, taken: int) -> np.ndarray:
@@ -51,6 +52,17 @@ def test_without_any_noise_all_take_the_same(light: float) -> None:
     )
 
 
+def test_what_meets_nothing_is_cheap_and_takes_more_for_the_same_cost() -> None:
+    pictures = halves(0.3)
+    for half in pictures:
+        half.normal[:, : WIDTH // 2] = 0.0
+    total = counts(allot(pictures, 4, 16, 64, 0.0), 4)
+    sky, ground = total[:, : WIDTH // 2].mean(), total[:, WIDTH // 2 :].mean()
+    assert sky > 1.3 * ground
+    cost = allocation.MISS_COST
+    assert (cost * sky + ground) / (1 + cost) == pytest.approx(16, rel=0.05)
+
+
 def test_exposure_decides_what_is_seen() -> None:
     noise = np.zeros((HEIGHT, WIDTH, 1), np.float32)
     noise[:, :200], noise[:, 200:] = 0.2, 0.002
@@ -77,7 +89,7 @@ def test_any_size(size: tuple[int, int]) -> None:
 def test_parts_cover_everything_once() -> None:
     error = np.random.default_rng(2).random((17, 26)) ** 4
     covered = np.zeros_like(error)
-    parts = split(error, 32)
+    parts = split(error, np.ones_like(error), 32)
     for part in parts:
         inside = slice(part.top, part.bottom), slice(part.left, part.right)
         covered[inside] += 1
@@ -89,5 +101,5 @@ def test_parts_cover_everything_once() -> None:
 def test_splits_follow_the_edges() -> None:
     error = np.full((20, 20), 0.01)
     error[4:12, 6:16] = 1.0
-    parts = split(error, 8)
+    parts = split(error, np.ones_like(error), 8)
     assert any(part[:4] == (4, 12, 6, 16) for part in parts)

@@ -33,7 +33,8 @@ RECTANGLES = (24, 256)
 """Least and most: below it too little is gained, above it no more."""
 # Of one part's render, beside its samples: starting, and reading the result.
 PART_SECONDS, PART_SECONDS_PER_PIXEL = 0.003, 5e-9
-OVERHEAD = 0.04
+SAMPLE_SECONDS = 1e-6
+OVERHEAD = 0.03
 SEED_STEP, LARGEST_SEED = 104729, 2**31 - 1
 Report = Callable[[float], object]
 
@@ -100,7 +101,7 @@ class AllottedLayer(LayerSession):
                 samples,
                 MOST * samples,
                 exposure,
-                self._rectangles(samples, 2 * half),
+                self._rectangles(samples),
             )
             for step in _steps(parts, samples, 2 * half, seed, self._own_seed(seed)):
                 with _quietly():
@@ -112,12 +113,15 @@ class AllottedLayer(LayerSession):
             raise
         return sums.mean(), *self._seconds
 
-    def _rectangles(self, samples: int, taken: int) -> int:
-        """As many as take OVERHEAD of the seconds that are left for samples."""
-        left = self._seconds[1] * (samples - taken) / taken
-        width, height = self._size
-        each = PART_SECONDS + PART_SECONDS_PER_PIXEL * width * height
-        return int(np.clip(OVERHEAD * left / each, *RECTANGLES))
+    def _rectangles(self, samples: int) -> int:
+        """As many parts as add OVERHEAD to the seconds of samples, on two cores.
+
+        Clocks are not asked: the same scene is to give the same picture again.
+        """
+        pixels = self._size[0] * self._size[1]
+        each = PART_SECONDS + PART_SECONDS_PER_PIXEL * pixels
+        count = OVERHEAD * SAMPLE_SECONDS * pixels * samples / each
+        return int(np.clip(count, *RECTANGLES))
 
     def _own_seed(self, seed: int | None) -> int:
         """Of what is no part of the frame's sequence; another one in every frame."""
