@@ -18,7 +18,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import render
-from xrds_core import front_end, inputs
+from xrds_core import inputs, upscaler
 from xrds_core.metrics import psnr
 from xrds_lab.demo import scene as demo
 
@@ -65,9 +65,10 @@ def test_decibels_do_not_fall(
     assert found <= golden + BOUND, "better: hold it with --record-decibels"
 
 
-def dimmed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The logarithm begins to bend at another brightness."""
-    monkeypatch.setattr(front_end, "TRANSFER_GAIN", 0.1 * front_end.TRANSFER_GAIN)
+def brightened(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The way back from the logarithm is off by a tenth."""
+    back = upscaler.inverse_transfer
+    monkeypatch.setattr(upscaler, "inverse_transfer", lambda t, e: back(t, e) * 1.1)
 
 
 def shifted(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -80,7 +81,7 @@ def shifted(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("scale", [2, 4, 8])
-@pytest.mark.parametrize("fault", [dimmed, shifted])
+@pytest.mark.parametrize("fault", [brightened, shifted])
 def test_a_broken_front_end_is_seen(
     fault: Callable[[pytest.MonkeyPatch], None],
     scale: int,
