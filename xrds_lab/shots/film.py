@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     Point = dict[str, Any]
 
 FRAME_MILLISECONDS = 83  # 12 frames a second
-QUALITY = 80
+QUALITY = 60
 _GAP = 4  # white pixels between both
 
 
