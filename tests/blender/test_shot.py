@@ -95,7 +95,7 @@ def test_frames_that_are_there_only_lend(
 ) -> None:
     render(blend, "shot")
     folder = blend.parent / "shot"
-    whole = {number: (folder / f"{number}.exr").read_bytes() for number in FRAMES}
+    whole = picture(folder / "5.exr")
     (folder / "5.exr").unlink()
     rendered = []
 
@@ -107,7 +107,8 @@ def test_frames_that_are_there_only_lend(
     result = render(blend, "shot", resume=True)
     assert result["kept"] == [1, 2, 3, 4]
     assert rendered == [3, 4, 5]
-    assert (folder / "5.exr").read_bytes() == whole[5]
+    # the files differ: each tells its seconds
+    assert np.array_equal(picture(folder / "5.exr"), whole)
 
 
 def test_no_two_frames_have_the_same_noise(blend: Path) -> None:
