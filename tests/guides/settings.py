@@ -38,7 +38,7 @@ def _modifier(name: str, modifier: str, /, **values: Any) -> dict[str, Any]:
 
 SHADE = 'objects["Scattered"].modifiers["Scatter"]'
 """The input of geometry nodes that the colour of their instances comes from."""
-if hasattr(bpy.types, "GeometryNodesModifierInterface"):  # from Blender 5.2 on
+if "properties" in bpy.types.NodesModifier.bl_rna.properties:  # in Blender 5.2
     SHADE += ".properties.inputs.Socket_2.value"
 else:
     SHADE += '["Socket_2"]'
