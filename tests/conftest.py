@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import signal
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -13,6 +14,16 @@ try:
     import bpy
 except ImportError:  # tests without Blender ask for none of these
     bpy = None
+
+# A shell that runs the tests in the background makes them deaf to these, and with them
+# the programs that they start and interrupt.
+for _name, _usual in (
+    ("SIGINT", signal.default_int_handler),
+    ("SIGHUP", signal.SIG_DFL),
+):
+    _number = getattr(signal, _name, None)  # Windows has no SIGHUP
+    if _number is not None and signal.getsignal(_number) is signal.SIG_IGN:
+        signal.signal(_number, _usual)
 
 
 def principled(name: str, **inputs: Any) -> Any:
