@@ -114,8 +114,8 @@ _folder: Path | None = None
 
 def loaded() -> Path | None:
     """Where the torch lies that is loaded already, None before the first use."""
-    module = sys.modules.get("torch")
-    return Path(str(module.__file__)).parents[1] if module else None
+    file = getattr(sys.modules.get("torch"), "__file__", None)
+    return Path(file).parents[1] if file else None  # a folder without code has no file
 
 
 def available() -> Torch:
