@@ -51,6 +51,11 @@ def set_portion(borrowed: Borrowed, scene: Any, portion: Portion) -> None:
         set_subset(borrowed, scene, portion.offset, portion.length)
 
 
+def has_subsets(scene: Any) -> bool:
+    """Whether this Blender's Cycles can take a part of a sequence; from 4.4 on."""
+    return hasattr(scene.cycles, "use_sample_subset")
+
+
 def set_subset(borrowed: Borrowed, scene: Any, offset: int, length: int) -> None:
     """Take only a part of the samples that are set."""
     borrowed.set(

@@ -7,6 +7,7 @@ from typing import Any
 from ..cycles.allotted import sample_allotted
 from ..cycles.pass_names import COMBINED
 from ..cycles.samples import Samples, sample_layer
+from ..cycles.settings import has_subsets
 from ..planning.plan import Decision
 from . import progress
 from .job import RenderJob
@@ -55,7 +56,10 @@ def _why_even(engine: Any, depsgraph: Any, job: RenderJob) -> str:
         "the memory is limited": job.memory_limit is not None,
         "Cycles' adaptive sampling is on": not fixed and cycles.use_adaptive_sampling,
         "the file limits its seconds": not fixed and cycles.time_limit > 0.0,
-        "the file takes a part of a sequence": not fixed and cycles.use_sample_subset,
+        "this Blender continues no sequence": not has_subsets(depsgraph.scene_eval),
+        "the file takes a part of a sequence": (
+            not fixed and getattr(cycles, "use_sample_subset", False)
+        ),
         "the view layer has a count of its own": not fixed and own_count,
         "a shadow catcher is no mean of samples": any(
             item.object.is_shadow_catcher for item in depsgraph.object_instances

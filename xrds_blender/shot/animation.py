@@ -26,9 +26,9 @@ from ..frame import history, progress
 from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.layer import render_layer
 from ..scene.cuts import cuts
-from ..scene.facts import requested_passes, shapes_move, stands_still
+from ..scene.facts import requested_passes, shapes_move
 from .method import FullSize, method_of
-from .sampling import Sampled, can_lend
+from .sampling import Sampled, can_continue, can_lend
 
 _Passes = dict[tuple[str, str], Array]
 _First = tuple[int, _Passes]
@@ -236,7 +236,7 @@ def _sample(
     """
     scene = depsgraph.scene_eval
     asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
-    if not stands_still(scene.camera) or (asked and shapes_move(depsgraph)):
+    if not can_continue(scene) or (asked and shapes_move(depsgraph)):
         return window.method.sample(engine, depsgraph, between=between)
     number, camera = scene.frame_current, scene.camera.name_full
     first, kept = window.first.get(camera, (number, {}))

@@ -13,6 +13,7 @@ from xrds_core.temporal.frame import Camera, Frame, store
 from xrds_core.temporal.samples import Portion, continued
 
 from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
+from ..cycles.settings import has_subsets
 from ..cycles.view import cameras_of, can_track
 from ..frame import progress
 from ..frame.job import RenderJob
@@ -88,6 +89,11 @@ def can_lend(scene: Any, job: RenderJob) -> bool:
     return scene.camera is not None and can_track(scene)
 
 
+def can_continue(scene: Any) -> bool:
+    """Whether frames can take parts of one sequence: where pixels stand still."""
+    return stands_still(scene.camera) and has_subsets(scene)
+
+
 def sampling_of(
     engine: Any, depsgraph: Any, job: RenderJob, place: int | None
 ) -> Sampling:
@@ -101,7 +107,7 @@ def sampling_of(
     cameras = cameras_of(engine, depsgraph)
     if not cameras:
         raise SceneError("such panoramas lend nothing; set the temporal radius to 0")
-    if not job.temporal_radius or not stands_still(scene.camera):
+    if not job.temporal_radius or not can_continue(scene):
         place = None
     geometry = _geometry(depsgraph)
     return Sampling(
