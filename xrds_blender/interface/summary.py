@@ -128,7 +128,7 @@ def last_render(last: LastRender) -> list[Row]:
     rows = [("Way", way)]
     for stage, name in _STAGES.items():
         spent = last.seconds.get(stage, 0.0)
-        if spent >= 0.05:
+        if spent >= 0.05 or stage == "total":
             rows.append((_stage(stage, name, last.way), f"{spent:.1f} s"))
     return rows
 
