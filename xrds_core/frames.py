@@ -6,6 +6,9 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+RADIUS = 4
+"""Frames before and after that lend their samples, by default: more bring little."""
+
 
 def frame_path(pattern: str, frame: int) -> Path:
     """Put the frame number in place of the last run of #, as Blender does.

@@ -8,13 +8,13 @@ from typing import Any
 
 from xrds_core.errors import UsageError
 from xrds_core.exr_encoding import CODECS, FLOAT_ZIP, Encoding
+from xrds_core.frames import RADIUS
 
 from ..frame.job import GUIDES, PRESETS, QUALITIES, SCALES, RenderJob
 from ..planning.plan import SAVINGS
 from . import arguments
 from .scene_file import SceneChoice
 
-RADIUS = 4  # frames, by default: more bring little
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
 
 

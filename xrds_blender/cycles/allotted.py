@@ -25,7 +25,7 @@ from .layer_session import LayerSession
 from .low_camera import Region
 from .pass_names import ALBEDO, COMBINED, NOISY, NORMAL
 from .samples import Samples, read_samples
-from .settings import set_denoising, set_sampling, set_subset
+from .settings import LARGEST_SEED, set_denoising, set_sampling, set_subset
 
 MOST = 4
 """How many times its share a pixel gets at the most."""
@@ -35,7 +35,7 @@ RECTANGLES = (24, 256)
 PART_SECONDS, PART_SECONDS_PER_PIXEL = 0.003, 5e-9
 SAMPLE_SECONDS = 1e-6
 OVERHEAD = 0.03
-SEED_STEP, LARGEST_SEED = 104729, 2**31 - 1
+SEED_STEP = 104729
 Report = Callable[[float], object]
 
 
@@ -63,6 +63,10 @@ class _Sums:
             self.total[rows, columns, start:end] += image * np.float32(count)
             start = end
         self.counts[rows, columns] += count
+
+    @property
+    def picture(self) -> Array:
+        return self.total[..., :4] / self.counts[..., None]
 
     def mean(self) -> Samples:
         mean = self.total / self.counts[..., None]
@@ -93,7 +97,7 @@ class AllottedLayer(LayerSession):
                 part = self._part(whole, half, seed, samples, offset)
                 sums.add(part, half, whole)
                 halves.append(Half(part.picture[..., :3], part.albedo, part.normal))
-                live.show(sums.mean().picture)
+                live.show(sums.picture)
                 report(sums.mean_count / samples)
             parts = allot(
                 halves,
@@ -144,13 +148,7 @@ class AllottedLayer(LayerSession):
             clock = self._run((self.width, self.height), window, exact=False)
         for n, seconds in enumerate((clock.sync, clock.render)):
             self._seconds[n] += seconds
-        view = self.views[0]
-
-        def read(name: str) -> Array | None:
-            pixels = self._read(name, view)
-            return None if pixels is None else self._read_corner(pixels, window)
-
-        return read_samples(read, ())
+        return read_samples(self._corner_reader(self.views[0], window), ())
 
     def _write(self, mean: Samples) -> None:
         view = self.views[0]

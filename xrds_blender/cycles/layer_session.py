@@ -17,7 +17,7 @@ from . import session, spare_passes
 from .borrowed import Borrowed, PipelineSettings
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
 from .pass_names import COMBINED, DEPTH, GUIDE_PASSES, NOISY, is_light
-from .samples import read_geometry
+from .samples import Reader, read_geometry
 from .settings import set_box_filter
 from .size import border_start, frame_size
 
@@ -187,6 +187,15 @@ class LayerSession:
     def _read_corner(self, pixels: Array, window: Region) -> Array:
         """What a smaller render left in the lower left of the result."""
         return pixels[-window.height :, : window.width]
+
+    def _corner_reader(self, view: str, window: Region) -> Reader:
+        """What a smaller render left of a pass of this view."""
+
+        def read(name: str) -> Array | None:
+            pixels = self._read(name, view)
+            return None if pixels is None else self._read_corner(pixels, window)
+
+        return read
 
     def geometry(self, view: str) -> tuple[Array, Array | None]:
         """Depth (H, W) and vectors (H, W, 4) or None, of the last full-size render."""

@@ -11,7 +11,7 @@ from . import live, session, spare_passes
 from .borrowed import Borrowed
 from .clock import StageClock
 from .pass_names import GUIDE_PASSES
-from .settings import set_denoising, set_portion, set_sampling
+from .settings import set_denoising, set_samples
 
 
 def render_once(
@@ -37,10 +37,7 @@ def render_once(
         for name, letters, _ in GUIDE_PASSES:
             spare_passes.add(engine, layer.name, name, letters)
     with Borrowed() as borrowed:
-        if portion is None:
-            set_sampling(borrowed, scene, samples, seed)
-        else:
-            set_portion(borrowed, scene, portion)
+        set_samples(borrowed, scene, samples, seed, portion)
         if noisy:
             set_denoising(borrowed, scene, layer, False)
         elif denoiser is not None and session.has_denoiser():

@@ -11,7 +11,6 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from xrds_core.arrays import Array
 from xrds_core.temporal.samples import Portion
 
 from ..planning.denoiser import Denoiser
@@ -25,7 +24,7 @@ from .low_samples import LowPlace, LowSamples
 from .pass_names import ALBEDO, DEPTH, NOISY, NORMAL
 from .rendered import Beauty, Guides, InProcess, Probe
 from .samples import read_samples
-from .settings import set_denoising, set_portion, set_repeatable, set_sampling
+from .settings import set_denoising, set_repeatable, set_samples, set_sampling
 
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
@@ -106,7 +105,7 @@ class CyclesPasses(LayerSession):
         """
         grid = self._grid(scale)
         with Borrowed() as borrowed:
-            self._set_samples(borrowed, samples, seed, portion)
+            set_samples(borrowed, self._scene, samples, seed, portion)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             live.samples(scale)
             clock = self._run_low(borrowed, grid)
@@ -175,7 +174,7 @@ class CyclesPasses(LayerSession):
         how = how or GuideRender(shadows=False)
         settings = nullcontext() if full else guide_settings(self._depsgraph, how)
         with Borrowed() as borrowed, settings:
-            self._set_samples(borrowed, samples, seed, portion)
+            set_samples(borrowed, self._scene, samples, seed, portion)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             live.guides()
             clock = self._run((self.width, self.height), self.region, exact=full)
@@ -213,54 +212,28 @@ class CyclesPasses(LayerSession):
         seconds = time.perf_counter() - started
         return Probe(np.concatenate(values), window.width, window.height, seconds)
 
-    def _set_samples(
-        self,
-        borrowed: Borrowed,
-        samples: int | None,
-        seed: int | None,
-        portion: Portion | None,
-    ) -> None:
-        if portion is None:
-            set_sampling(borrowed, self._scene, samples, seed)
-        else:
-            set_portion(borrowed, self._scene, portion)
-
     def _read_beauty(
         self, view: str, grid: LowGrid, denoised: bool, seconds: dict[str, float]
     ) -> Beauty:
-        rendered = grid.rendered(self._size)
-
-        def low(pixels: Array) -> Array:
-            return grid.resample(self._read_corner(pixels, rendered), rendered)
-
-        picture = low(self._radiance(view, denoised))
-        noisy = self._read(NOISY, view) if denoised else None
-        return Beauty(
-            picture[..., :3].copy(),
-            picture[..., 3].copy(),
-            None if noisy is None else low(noisy)[..., :3],
-            grid.offset(self.region),
-            seconds,
-            {name: low(pixels) for name, pixels in self._light_passes(view)},
-        )
+        place = self._place(view, grid, seconds)
+        picture = self._read_corner(self._radiance(view, denoised), place.window)
+        noisy = self._corner_reader(view, place.window)(NOISY) if denoised else None
+        return place.beauty(picture, noisy)
 
     def _read_low(
         self, view: str, grid: LowGrid, seconds: dict[str, float]
     ) -> LowSamples:
+        place = self._place(view, grid, seconds)
+        read = self._corner_reader(view, place.window)
+        return LowSamples(read_samples(read, self._geometry), place)
+
+    def _place(self, view: str, grid: LowGrid, seconds: dict[str, float]) -> LowPlace:
         window = grid.rendered(self._size)
-
-        def read(name: str) -> Array | None:
-            pixels = self._read(name, view)
-            return None if pixels is None else self._read_corner(pixels, window)
-
         others = {
             name: grid.resample(self._read_corner(pixels, window), window)
             for name, pixels in self._light_passes(view)
         }
-        samples = read_samples(read, self._geometry)
-        offset = grid.offset(self.region)
-        place = LowPlace(grid, window, offset, others, dict(seconds))
-        return LowSamples(samples, place)
+        return LowPlace(grid, window, grid.offset(self.region), others, dict(seconds))
 
     def _read_guides(
         self,

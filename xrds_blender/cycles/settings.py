@@ -9,6 +9,8 @@ from xrds_core.temporal.samples import Portion
 from ..planning.denoiser import Denoiser
 from .borrowed import Borrowed
 
+LARGEST_SEED = 2**31 - 1
+
 
 def set_sampling(
     borrowed: Borrowed, scene: Any, samples: int | None, seed: int | None
@@ -44,8 +46,17 @@ def set_repeatable(borrowed: Borrowed, scene: Any) -> None:
     )
 
 
-def set_portion(borrowed: Borrowed, scene: Any, portion: Portion) -> None:
-    """Take a part of a sample sequence."""
+def set_samples(
+    borrowed: Borrowed,
+    scene: Any,
+    samples: int | None,
+    seed: int | None,
+    portion: Portion | None,
+) -> None:
+    """Take samples as `set_sampling`, or in their place a part of a sequence."""
+    if portion is None:
+        set_sampling(borrowed, scene, samples, seed)
+        return
     set_sampling(borrowed, scene, portion.whole, portion.seed)
     if portion.length != portion.whole:
         set_subset(borrowed, scene, portion.offset, portion.length)

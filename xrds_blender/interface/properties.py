@@ -5,6 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from xrds_core.frames import RADIUS
+
 from ..frame import ways
 from ..frame.job import RenderJob
 from ..planning.ways import Way
@@ -136,7 +138,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
     temporal_radius: IntProperty(
         name="Temporal Radius",
         translation_context=CONTEXT,
-        default=4,
+        default=RADIUS,
         min=0,
         soft_max=8,
         max=32,

@@ -15,10 +15,10 @@ from xrds_core.temporal.takes import same_take
 
 from ..cycles.rendered import Beauty, Guides
 from ..frame.enlarging import enlarge
-from ..frame.job import NetworkFailed, Picture, RenderJob, Temporal
+from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.memory import peak_memory
 from .enlarged import View
-from .finishing import accumulation
+from .finishing import accumulation, lent
 
 if TYPE_CHECKING:
     from xrds_core import Upscaler
@@ -63,12 +63,6 @@ def finish_enlarged(
         "denoise": denoised - accumulated,
         "network": time.perf_counter() - denoised,
     }
-    temporal = Temporal(
-        job.temporal_radius,
-        gathered.frames,
-        float(gathered.samples.mean()),
-        gathered.rejected,
-    )
     return Picture(
         radiance=np.ascontiguousarray(picture[..., :3]),
         alpha=np.ascontiguousarray(picture[..., 3]),
@@ -76,10 +70,10 @@ def finish_enlarged(
         normal=guides.normal,
         low_resolution=beauty.radiance,
         seconds=seconds,
-        plan=(*own.plan.decisions, accumulation(gathered.frames)),
+        plan=(*own.plan.decisions, accumulation(gathered)),
         peak_memory=peak_memory(),
         device=str(upscaler.device),
-        temporal=temporal,
+        temporal=lent(job, gathered),
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from xrds_core.sequence.finishing import finish_frame
+from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.frame import Stored
 from xrds_core.temporal.moving import Movement
 
@@ -34,27 +35,31 @@ def finish(
     """
     finished = finish_frame(own, lenders, denoiser, movement, progress)
     gathered = finished.gathered
-    temporal = Temporal(
-        job.temporal_radius,
-        finished.frames,
-        float(gathered.samples.mean()),
-        gathered.rejected,
-    )
-    decision = accumulation(finished.frames)
     return Picture(
         radiance=np.ascontiguousarray(finished.picture[..., :3]),
         alpha=np.ascontiguousarray(finished.picture[..., 3]),
         albedo=gathered.albedo,
         normal=gathered.normal,
         seconds=finished.seconds,
-        plan=(*job.plan().decisions, decision, prefilter(finished.denoised)),
+        plan=(
+            *job.plan().decisions,
+            accumulation(gathered),
+            prefilter(finished.denoised),
+        ),
         peak_memory=peak_memory(),
         device=denoiser.device,
-        temporal=temporal,
+        temporal=lent(job, gathered),
     )
 
 
-def accumulation(frames: Sequence[int]) -> Decision:
-    """What was decided where these frames were asked for their samples."""
+def lent(job: RenderJob, gathered: Accumulated) -> Temporal:
+    """What neighbours lent to a picture, as it tells."""
+    samples = float(gathered.samples.mean())
+    return Temporal(job.temporal_radius, gathered.frames, samples, gathered.rejected)
+
+
+def accumulation(gathered: Accumulated) -> Decision:
+    """What was decided where frames were asked for their samples."""
+    frames = gathered.frames
     reason = "neighbouring frames show the same: their samples count here as well"
     return Decision("accumulation", f"frames {frames[0]} to {frames[-1]}", reason)

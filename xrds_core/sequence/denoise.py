@@ -14,7 +14,7 @@ import numpy as np
 from .. import exr
 from ..errors import PictureError, UsageError
 from ..files import check_folder, check_place
-from ..frames import frame_numbers, frame_path
+from ..frames import RADIUS, frame_numbers, frame_path
 from ..temporal.moving import Movement
 from ..temporal.window import Shot, slide
 from ..time_left import Clock
@@ -26,8 +26,6 @@ from .reading import FrameFile, Reading
 if TYPE_CHECKING:
     from ..denoising import Denoiser
 
-RADIUS = 4
-"""Frames before and after that lend, where nobody says how many."""
 Say = Callable[[str], object]
 
 
@@ -210,7 +208,7 @@ def _entry(
         "seconds": seconds | {"total": sum(seconds.values())},
         "temporal": {
             "radius": radius,
-            "frames": finished.frames,
+            "frames": gathered.frames,
             "mean_samples": float(gathered.samples.mean()),
             "rejected": gathered.rejected,
         },

@@ -24,14 +24,11 @@ class Finished:
     """A finished frame.
 
     `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of `gathered`,
-    or the region of it that was asked for;
-    `frames` are the numbers of those whose samples went in, its own too; `seconds`:
-    accumulate, denoise.
+    or the region of it that was asked for; `seconds`: accumulate, denoise.
     """
 
     denoised: Denoised
     gathered: Accumulated
-    frames: tuple[int, ...]
     seconds: dict[str, float]
 
     @property
@@ -69,4 +66,4 @@ def finish_frame(
         "accumulate": accumulated - started,
         "denoise": time.perf_counter() - accumulated,
     }
-    return Finished(denoised, gathered, gathered.frames, seconds)
+    return Finished(denoised, gathered, seconds)
