@@ -1,4 +1,4 @@
-"""How long each piece of long work took, and the rest will take."""
+"""How long work took, and what is left of it will take."""
 
 from __future__ import annotations
 
@@ -19,13 +19,15 @@ class Clock:
         self._done += 1
         if not left:
             return f"{took:.1f} s"
-        rest = _words((now - self._start) / self._done * left)
+        rest = duration((now - self._start) / self._done * left)
         return f"{took:.1f} s; {left} left, about {rest}"
 
 
-def _words(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes} min"
-    return f"{minutes} min {rest} s" if minutes else f"{rest} s"
+def duration(seconds: float) -> str:
+    """Seconds as a person reads them: 4.2 s, 45 s, 12 min, 3.4 h."""
+    if seconds < 10:
+        return f"{seconds:.1f} s"
+    if seconds < 100:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 100 else f"{minutes / 60:.1f} h"

@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from xrds_core.time_left import duration
+
 from ..cycles import session, status
 
 LOADING = "Loading PyTorch"
@@ -83,15 +85,8 @@ def begin_frame(number: int, left: int, seconds: float | None = None) -> None:
     global _frames_left
     rest = "the last one" if not left else f"{left} left"
     if seconds is not None:
-        rest += f", about {_time(seconds)}"
+        rest += f", about {duration(seconds)}"
     _frames_left = f"Frame {number} ({rest}). "
-
-
-def _time(seconds: float) -> str:
-    minutes = round(seconds / 60)
-    if minutes < 1:
-        return f"{seconds:.0f} s"
-    return f"{minutes} min" if minutes < 90 else f"{minutes / 60:.1f} h"
 
 
 def reporter(engine: Any) -> Callable[[float], bool]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from xrds_core.time_left import duration
+
 from ..planning.ways import WAYS, Outlook, Way
 from .paragraph import translated
 from .translations import CONTEXT
@@ -76,15 +78,3 @@ def _quality(look: Outlook) -> str:
         return translated("best")
     digits = 1 if look.decibels > -1 else 0
     return f"{look.decibels:.{digits}f} dB".replace("-", "−")
-
-
-def duration(seconds: float) -> str:
-    """Seconds as a person reads them."""
-    if seconds < 10:
-        return f"{seconds:.1f} s"
-    if seconds < 100:
-        return f"{seconds:.0f} s"
-    minutes = round(seconds / 60)
-    if minutes < 100:
-        return f"{minutes} min"
-    return f"{minutes / 60:.1f} h"

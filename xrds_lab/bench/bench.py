@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from xrds_blender.command import streams
 from xrds_blender.planning.budget import Network
 from xrds_core.atomic import replacing, write_json
+from xrds_core.time_left import duration
 
 from ..progress import report_line
 from . import analysis, machine, report, workload
@@ -158,12 +159,12 @@ def _estimate(parts: Sequence[SceneBench], growth: Sequence[tuple[int, int]]) ->
     seconds = []
     for part in parts:
         seconds.append(part.estimate())
-        report_line(f"{part.name}: about {workload.duration(seconds[-1])}")
+        report_line(f"{part.name}: about {duration(seconds[-1])}")
     if growth:
         first, pixels = parts[0], sum(w * h for w, h in growth) / 1e6
         seconds.append(first.growth_estimate(pixels))
-        report_line(f"growth: at most about {workload.duration(seconds[-1])}")
-    report_line(f"all of it: about {workload.duration(sum(seconds))}")
+        report_line(f"growth: at most about {duration(seconds[-1])}")
+    report_line(f"all of it: about {duration(sum(seconds))}")
     return sum(seconds)
 
 

@@ -82,10 +82,3 @@ class Meter:
     def close(self) -> None:
         """End the bar."""
         self._bar.close()
-
-
-def duration(seconds: float) -> str:
-    """A duration to read: 45 s, 12 min, 3.4 h."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"
