@@ -12,6 +12,7 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_blender import render
 from xrds_blender.cycles import allotted, session
+from xrds_blender.cycles.pass_names import NOISY
 from xrds_blender.cycles.samples import sample_layer
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.rendering import call_engine
@@ -88,6 +89,21 @@ def test_what_decides(steady: Any) -> None:
     steady.cycles.use_adaptive_sampling = True
     assert taken(steady).startswith("even")
     assert taken(steady, samples=8).startswith("where they pay")
+
+
+def test_the_noisy_image_holds_all_samples(steady: Any) -> None:
+    """Cycles makes that pass wherever its denoiser is on, as it is in a new file."""
+    steady.cycles.use_denoising = steady.view_layers[0].cycles.use_denoising = True
+
+    def work(engine: Any, depsgraph: Any) -> Any:
+        views, _ = allotted.sample_allotted(engine, depsgraph, 16, 2)
+        result = engine.get_result()
+        size = result.resolution_x, result.resolution_y
+        return session.read_pass(result.layers[0], NOISY, "", size), views[""].picture
+
+    noisy, picture = call_engine(steady, work)
+    np.testing.assert_array_equal(noisy, picture)
+    assert taken(steady, samples=16).startswith("where they pay")
 
 
 def test_settings_return(steady: Any) -> None:

@@ -16,7 +16,6 @@ import numpy as np
 
 from xrds_core.allocation import Half, Rectangle, allot
 from xrds_core.arrays import Array
-from xrds_core.errors import Cancelled
 from xrds_core.stdout import muted
 
 from . import live
@@ -84,7 +83,7 @@ class AllottedLayer(LayerSession):
 
         `samples` per pixel are the mean over the frame, 4 at least. `exposure` is the
         view's, in stops; `report` gets the share that is done. Raises Cancelled when
-        the user stops it; the result holds the means so far then.
+        the user stops it. The result holds the means so far.
         """
         self._seconds = [0.0, 0.0]
         width, height = self._size
@@ -111,10 +110,9 @@ class AllottedLayer(LayerSession):
                 with _quietly():
                     sums.add(self._part(*step), step.count, step.place)
                 report(sums.mean_count / samples)
-        except Cancelled:
+        finally:  # stopped by the user, too
             if halves:
                 self._write(sums.mean())
-            raise
         return sums.mean(), *self._seconds
 
     def _rectangles(self, samples: int) -> int:
@@ -200,7 +198,7 @@ def sample_allotted(
     """Render without Cycles' denoiser; samples by view, and seconds by stage.
 
     As `sample_layer`, for a single view, with `samples` per pixel as the mean over the
-    frame. No pass of the result is Cycles' own.
+    frame. No pass of the result is Cycles' own, and only light and guides are whole.
     """
     exposure = depsgraph.scene_eval.view_settings.exposure
     with AllottedLayer(engine, depsgraph, noisy=True) as layer:

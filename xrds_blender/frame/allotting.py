@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..cycles.allotted import sample_allotted
-from ..cycles.pass_names import COMBINED
+from ..cycles.pass_names import COMBINED, NOISY
 from ..cycles.samples import Samples, sample_layer
 from ..cycles.settings import has_subsets
 from ..planning.plan import Decision
@@ -50,7 +50,7 @@ def _why_even(engine: Any, depsgraph: Any, job: RenderJob) -> str:
         f"fewer than {LEAST_SAMPLES} do not show where more are needed": (
             (job.samples or cycles.samples) < LEAST_SAMPLES
         ),
-        "other passes are to be Cycles' own": passes != {COMBINED},
+        "other passes are to be Cycles' own": bool(passes - {COMBINED, NOISY}),
         "the views are to be alike": len(result.views) > 1,
         "a graphics card is slow with small parts": cycles.device != "CPU",
         "the memory is limited": job.memory_limit is not None,
