@@ -32,6 +32,7 @@ COPIED = (
 )
 # Left out: what starts a Python of its own.
 MODULES = (
+    "borrowed",
     "cover",
     "engine",
     "engine_loan",
@@ -48,6 +49,7 @@ MODULES = (
     "picking",
     "record",
     "shot",
+    "shot_enlarged",
     "spare_passes",
     "translations",
     "unchanged",

@@ -49,13 +49,18 @@ def finished(window: Window, patience: float = 600.0) -> list[str]:
     return window.ask("[e[0] for e in EVENTS]")
 
 
-def result(window: Window, name: str) -> np.ndarray:
-    """What the Render Result shows, (height, width, 3) of bytes."""
+def picture_of(path: Path) -> np.ndarray:
+    """An image file, (height, width, 3), from 0 to 255."""
     image = pytest.importorskip("PIL.Image")
+    return np.asarray(image.open(path).convert("RGB")).astype(np.float32)
+
+
+def result(window: Window, name: str) -> np.ndarray:
+    """What the Render Result shows, as `picture_of`."""
     path = window.program.share / name
     seen = window.program.seen(path)
     window.ask(f"bpy.data.images['Render Result'].save_render({seen!r})")
-    return np.asarray(image.open(path).convert("RGB")).astype(np.float32)
+    return picture_of(path)
 
 
 def settings(window: Window) -> Any:
@@ -258,6 +263,38 @@ for frame in (1, 3):
     frames = sorted(folder.iterdir())
     assert [path.stem for path in frames] == ["0001", "0002", "0003"]
     assert len({path.read_bytes() for path in frames}) == 3
+
+
+def test_escape_shows_the_frame_under_way_of_an_animation(window: Window) -> None:
+    """Not the frame ahead that was being sampled; no file is written of either."""
+    frames = window.program.share / "frames"
+    true = [picture_of(path) for path in sorted(frames.iterdir())]
+    small_scene(window, 1000)
+    folder = window.program.share / "stopped"
+    window.ask(
+        f"""
+scene = bpy.data.scenes[0]
+scene.cycles.use_adaptive_sampling = False
+scene.render.filepath = {window.program.seen(folder)!r} + '/'
+"""
+    )
+    press(window, RENDER_ANIMATION)
+    window.wait(
+        """
+import sys
+progress = sys.modules.get('xrds_blender.frame.progress')
+progress and 'frame 2' in (progress.current() or '')
+"""
+    )
+    window.move(400, 620)
+    window.key("Escape")
+    assert finished(window)[-1] == "render_cancel"
+    assert not folder.exists() or not list(folder.iterdir())
+    kept = result(window, "stopped.png")
+    errors = [np.abs(kept - each).mean() for each in true]
+    assert errors[0] < 0.5 * min(errors[1:])
+    window.settle()
+    window.shot("10_stopped_animation")
 
 
 def test_the_compositors_result_is_saved(window: Window) -> None:

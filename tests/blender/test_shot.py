@@ -15,7 +15,9 @@ pytest.importorskip("mitsuba_oidn")
 from xrds_blender import run_job
 from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
+from xrds_blender.cycles import session
 from xrds_blender.cycles.settings import has_subsets
+from xrds_blender.frame import progress
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.shot import shot
@@ -232,6 +234,46 @@ def test_an_animation_is_the_shot_of_the_command(animation: Any, blend: Path) ->
         ours = combined(blend.parent / "f12" / f"{number}.exr")
         theirs = picture(blend.parent / "command" / f"{number}.exr")
         np.testing.assert_allclose(ours, theirs, atol=2e-3)
+
+
+@pytest.mark.parametrize("stage", ["Samples of frame 3", "Denoising"])
+def test_a_stopped_frame_shows_itself(
+    animation: Any, blend: Path, monkeypatch: pytest.MonkeyPatch, stage: str
+) -> None:
+    """Denoised, whatever frame ahead was being sampled.
+
+    Blender itself knows nothing of the stop here, so it saves what it would show.
+    """
+    for frame in (1, 3):
+        animation.camera.location.x = 0.4 * frame
+        animation.camera.keyframe_insert("location", frame=frame)
+    animation.frame_end = 3
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            session, "is_stopped", lambda _: stage in (progress.current() or "")
+        )
+        bpy.ops.render.render(animation=True)
+    path = blend.parent / "f12" / "1.exr"
+    true = {}
+    for number in (1, 3):
+        animation.frame_set(number)
+        true[number] = run_job(animation, lambda p: p.beauty(1, 64, denoise=False))
+    noisy = run_job(animation, lambda p: p.beauty(1, 1, denoise=False)).radiance
+
+    def error(number: int) -> float:
+        return float(np.abs(combined(path) - true[number].radiance).mean())
+
+    assert error(1) < 0.5 * error(3)
+    assert error(1) < 0.6 * np.abs(noisy - true[3].radiance).mean()
+    (name,) = [n for n in layers(path) if n.endswith("Normal.X")]
+    normals = run_job(animation, lambda p: p.guides(16)).normal  # of frame 3
+    animation.frame_set(1)
+    own = run_job(animation, lambda p: p.guides(16)).normal
+    there = layers(path)[name]
+    assert (
+        np.abs(there - own[..., 0]).mean()
+        < 0.5 * np.abs(there - normals[..., 0]).mean()
+    )
 
 
 def test_passes_are_those_of_the_frame(animation: Any, blend: Path) -> None:

@@ -7,10 +7,15 @@ to the render pipeline's own copy of the render settings.
 from __future__ import annotations
 
 import ctypes
+import threading
+import time
 from collections.abc import Callable
 from typing import Any
 
 from xrds_core.errors import SceneError
+
+_WHILE_DRAWING = "Writing to ID classes in this context is not allowed"
+_LONGEST_DRAWING = 60.0  # seconds
 
 
 class Borrowed:
@@ -39,16 +44,34 @@ class Borrowed:
             old = getattr(owner, name)
             if old != value:
                 self._old.append((again, name, old))
-                setattr(owner, name, value)
+                write(owner, name, value)
 
     def give_back(self) -> None:
         while self._old:
             again, name, value = self._old.pop()
-            setattr(again(), name, value)
+            write(again(), name, value)
 
     def forget(self) -> None:
         """Give nothing back: the owners are gone, and touching them would crash."""
         self._old.clear()
+
+
+def write(owner: Any, name: str, value: Any) -> None:
+    """Set an attribute, as soon as Blender lets a render's thread do so.
+
+    While Python draws a part of the window, Blender lets no thread write.
+    """
+    end = time.monotonic() + _LONGEST_DRAWING
+    while True:
+        try:
+            setattr(owner, name, value)
+            return
+        except AttributeError as error:
+            is_drawing = _WHILE_DRAWING in str(error)
+            draws_itself = threading.current_thread() is threading.main_thread()
+            if not is_drawing or draws_itself or time.monotonic() > end:
+                raise
+        time.sleep(0.001)  # lets the main thread go on
 
 
 def _finder(owner: Any) -> Callable[[], Any]:
@@ -115,11 +138,11 @@ class PipelineSettings:
         is_flag = isinstance(old, bool)
         before = ctypes.string_at(base, cls._SPAN)
         try:
-            setattr(render, name, (not old) if is_flag else old ^ 0x0155)
+            write(render, name, (not old) if is_flag else old ^ 0x0155)
             other = getattr(render, name)
             after = ctypes.string_at(base, cls._SPAN)
         finally:
-            setattr(render, name, old)
+            write(render, name, old)
         changed = [i for i in range(cls._SPAN) if before[i] != after[i]]
         if is_flag and len(changed) == 1:
             mask = before[changed[0]] ^ after[changed[0]]

@@ -14,7 +14,7 @@ import numpy as np
 from xrds_core.arrays import Array
 
 from ..cycles import session
-from ..cycles.passes import CyclesPasses
+from ..cycles.low_samples import LowSamples
 from ..cycles.rendered import Beauty
 from ..cycles.samples import samples_in
 from .denoisers import in_process, load_denoiser
@@ -26,7 +26,7 @@ def keep_samples(engine: Any, layer_name: str, job: RenderJob) -> None:
     """Denoise the full-size samples that are in the result, if the job asks for it."""
     if not job.stop_keeps:
         return
-    denoiser = load_denoiser(_quick(job))
+    denoiser = load_denoiser(quick(job))
     noisy = samples_in(engine, layer_name)
     pictures = {
         view: denoiser(each.picture, each.albedo, each.normal).radiance
@@ -36,16 +36,24 @@ def keep_samples(engine: Any, layer_name: str, job: RenderJob) -> None:
     session.write_combined(engine, layer_name, pictures)
 
 
-def stopped_beauties(passes: CyclesPasses, job: RenderJob) -> dict[str, Beauty]:
-    """The low-resolution picture that is in the result, denoised; empty if none is."""
-    denoise = in_process(_quick(job))
-    return {
+def keep_low_samples(
+    engine: Any, layer_name: str, job: RenderJob, light: dict[str, LowSamples]
+) -> None:
+    """Denoise low-resolution samples, if the job asks for it, and as `keep_beauties`.
+
+    Views without any are left out.
+    """
+    if not job.stop_keeps:
+        return
+    denoise = in_process(quick(job))
+    beauties = {
         view: low.place.beauty(low.samples.picture)
         if denoise is None
         else low.denoised(denoise)
-        for view, low in passes.stopped_samples(job.scale).items()
+        for view, low in light.items()
         if low.samples.picture.any()
     }
+    keep_beauties(engine, layer_name, job, beauties)
 
 
 def keep_beauties(
@@ -72,5 +80,6 @@ def enlarged(
     }
 
 
-def _quick(job: RenderJob) -> RenderJob:
+def quick(job: RenderJob) -> RenderJob:
+    """The job with the quickest denoiser, for somebody who waits."""
     return replace(job, denoise="fast", denoiser=None)

@@ -23,7 +23,7 @@ from .facts import find_facts
 from .guides import GuideSource
 from .job import NetworkFailed, Picture, RenderJob
 from .memory import peak_memory
-from .stopping import enlarged, keep_beauties, stopped_beauties
+from .stopping import enlarged, keep_beauties, keep_low_samples
 
 if TYPE_CHECKING:
     from xrds_core import Upscaler
@@ -155,9 +155,8 @@ class _Renders:
                 in_process=in_process(job),
             )
         except Cancelled:
-            if job.stop_keeps:
-                beauties = stopped_beauties(self.passes, job)
-                keep_beauties(self.engine, self.layer, job, beauties)
+            light = self.passes.stopped_samples(job.scale)
+            keep_low_samples(self.engine, self.layer, job, light)
             raise
         first = next(iter(beauties.values()))
         live.show(np.dstack((first.radiance, first.alpha)), job.scale, first.offset)

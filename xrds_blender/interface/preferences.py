@@ -92,8 +92,8 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
     )
     stop_keeps: bpy.props.BoolProperty(
         name="Stop Keeps the Picture",
-        description="A still that you stop with Esc keeps the samples taken so far, "
-        "quickly denoised",
+        description="What you stop with Esc keeps the samples taken so far, quickly "
+        "denoised. The frame of an animation is shown, not saved",
         default=True,
     )
     weights: bpy.props.StringProperty(

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.errors import Cancelled
 from xrds_core.temporal.window import Shot
 
 from ..cycles import session
@@ -133,15 +134,29 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
         window = _windows[scene.name, layer_name] = _Window(job)
     window.forget_before(needed[0])
     window.begin_frame(scene)
-    _sample_missing(engine, depsgraph, window, number, needed)
-
-    lenders = [window.sampled[n] for n in needed if n != number]
-    if window.method.lacks(window.sampled[number], lenders):
-        with CyclesPasses(engine, depsgraph) as passes:
-            window.sampled[number] = _sample(engine, depsgraph, window, passes)
-    picture = _finish(engine, layer_name, window, window.sampled[number], lenders)
+    try:
+        _sample_missing(engine, depsgraph, window, number, needed)
+        lenders = [window.sampled[n] for n in needed if n != number]
+        if window.method.lacks(window.sampled[number], lenders):
+            with CyclesPasses(engine, depsgraph) as passes:
+                window.sampled[number] = _sample(engine, depsgraph, window, passes)
+        picture = _finish(engine, layer_name, window, window.sampled[number], lenders)
+    except Cancelled:
+        _keep(engine, layer_name, window, number)
+        raise
     picture.seconds["total"] = time.perf_counter() - started
     return picture
+
+
+def _keep(engine: Any, layer_name: str, window: _Window, number: int) -> None:
+    """Leave what there is of a frame that was stopped, if the job asks for it.
+
+    Where it has not been sampled, its samples so far are in the result already.
+    """
+    own = window.sampled.get(number)
+    if own is not None and window.job.stop_keeps:
+        _write_light(engine, layer_name, window, own)
+        session.write_combined(engine, layer_name, window.method.stopped(own))
 
 
 def _finish(
@@ -152,7 +167,7 @@ def _finish(
     lenders: Sequence[Sampled],
 ) -> Picture:
     """Make the picture of each view and write it; returns the first view's."""
-    method, layer = window.method, engine.get_result().layers[layer_name]
+    method = window.method
     report = method.begin_finishing(engine)
     pictures: dict[str, Picture] = {}
     more: dict[str, Array] = {}
@@ -163,15 +178,27 @@ def _finish(
         more[COMBINED] = np.dstack((error.radiance, error.alpha))
         raise
     finally:
-        for view in own.views:
-            for name, light in method.light_passes(own, view, more).items():
-                session.write_pass(layer, name, view, light)
-        engine.update_result(engine.get_result())
+        _write_light(engine, layer_name, window, own, more)
     combined = {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
     session.write_combined(engine, layer_name, combined)
     first = next(iter(pictures.values()))
     first.seconds.update({**own.seconds, **first.seconds})
     return first
+
+
+def _write_light(
+    engine: Any,
+    layer_name: str,
+    window: _Window,
+    own: Sampled,
+    more: Mapping[str, Array] | None = None,
+) -> None:
+    """Write what `light_passes` of the method gives of each view."""
+    result = engine.get_result()
+    for view in own.views:
+        for name, light in window.method.light_passes(own, view, more).items():
+            session.write_pass(result.layers[layer_name], name, view, light)
+    engine.update_result(result)
 
 
 def _needed(scene: Any, job: RenderJob) -> list[int]:
@@ -207,8 +234,8 @@ def _sample_missing(
         finally:
             if number != depsgraph.scene_eval.frame_current:
                 engine.frame_set(number, 0.0)
-        if number in window.passes:
-            passes.put_back(window.passes.pop(number))
+            if number in window.passes:
+                passes.put_back(window.passes.pop(number))
 
 
 def _is_between(scene: Any, number: int) -> bool:

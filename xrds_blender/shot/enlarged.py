@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from xrds_core.errors import Cancelled
 from xrds_core.temporal.frame import Camera, Frame, Stored, store
 
 from ..cycles.low_samples import LowPlace, LowSamples
@@ -22,6 +23,7 @@ from ..frame.facts import find_facts
 from ..frame.guide_cache import GuideName
 from ..frame.guides import GuideSource
 from ..frame.job import RenderJob
+from ..frame.stopping import keep_low_samples
 from ..planning.plan import Decision, Facts, Plan
 from ..scene.facts import shapes_move
 from .sampling import Sampled, Sampling, light_of, sampling_of
@@ -66,17 +68,24 @@ def sample_enlarged(
     `between` two others takes its guides from them where that costs no detail.
     """
     how = sampling_of(engine, depsgraph, job, place)
+    layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     with CyclesPasses(engine, depsgraph, noisy=True, geometry=how.geometry) as passes:
         facts = find_facts(depsgraph, job)
         chosen = job.plan(facts)
         if not chosen.motion_blur:
             passes.hold_still()
         renders = _Renders(engine, depsgraph, job, how, passes, facts, chosen)
-        light = renders.light()
-        views = renders.views(light)
-        if between and renders.is_told_by_others():
-            return Sampled(_with_decision(views, _OF_OTHERS), _seconds(light))
-        return renders.with_guides(views, light)
+        light: dict[str, LowSamples] = {}
+        try:
+            light = renders.light()
+            views = renders.views(light)
+            if between and renders.is_told_by_others():
+                return Sampled(_with_decision(views, _OF_OTHERS), _seconds(light))
+            return renders.with_guides(views, light)
+        except Cancelled:
+            light = light or passes.stopped_samples(job.scale)
+            keep_low_samples(engine, layer_name, job, light)
+            raise
 
 
 @dataclass(frozen=True)

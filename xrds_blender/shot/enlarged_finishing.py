@@ -77,6 +77,11 @@ def finish_enlarged(
     )
 
 
+def finish_alone(own: View, denoiser: Denoiser) -> Beauty:
+    """The light of a view with its own samples alone, denoised."""
+    return _denoised(own, accumulate(own.light, (), Movement()), denoiser)
+
+
 def _denoised(own: View, gathered: Accumulated, denoiser: Denoiser) -> Beauty:
     assert gathered.radiance is not None
     picture = np.dstack((gathered.radiance, gathered.alpha))

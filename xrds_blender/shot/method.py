@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from xrds_core.arrays import Array
 from xrds_core.temporal.moving import Movement
 
@@ -13,8 +15,9 @@ from ..frame.denoisers import load_denoiser
 from ..frame.enlarging import enlarged_lights
 from ..frame.job import Picture, RenderJob
 from ..frame.networks import load_upscaler
+from ..frame.stopping import enlarged, quick
 from .enlarged import sample_enlarged
-from .enlarged_finishing import finish_enlarged, lacks_guides
+from .enlarged_finishing import finish_alone, finish_enlarged, lacks_guides
 from .finishing import finish
 from .sampling import Keep, Sampled, sample_frame
 
@@ -63,6 +66,19 @@ class FullSize:
         return finish(
             own.views[view], others, self._job, self._denoiser, self._movement, report
         )
+
+    def stopped(self, own: Sampled) -> dict[str, Array]:
+        """What the user sees of a frame that was stopped, by view, (H, W, 4).
+
+        The frame's own samples, denoised as quickly as can be.
+        """
+        job = quick(self._job)
+        denoiser = load_denoiser(job)
+        alone = {
+            view: finish(each, (), job, denoiser, Movement())
+            for view, each in own.views.items()
+        }
+        return {view: np.dstack((p.radiance, p.alpha)) for view, p in alone.items()}
 
     def light_passes(
         self, own: Sampled, view: str, more: Mapping[str, Array] | None = None
@@ -118,6 +134,12 @@ class Enlarged(FullSize):
             self._movement,
             report,
         )
+
+    def stopped(self, own: Sampled) -> dict[str, Array]:
+        denoiser = load_denoiser(quick(self._job))
+        low = {view: finish_alone(each, denoiser) for view, each in own.views.items()}
+        shape = next(iter(own.views.values())).shape
+        return enlarged(low, self._job.scale, shape)
 
     def light_passes(
         self, own: Sampled, view: str, more: Mapping[str, Array] | None = None

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.errors import SceneError
+from xrds_core.errors import Cancelled, SceneError
 from xrds_core.temporal.frame import Camera, Frame, store
 from xrds_core.temporal.samples import Portion, continued
 
@@ -17,6 +17,7 @@ from ..cycles.settings import LARGEST_SEED, has_subsets
 from ..cycles.view import cameras_of, can_track
 from ..frame import progress
 from ..frame.job import RenderJob
+from ..frame.stopping import keep_samples
 from ..scene.facts import scene_facts, shapes_move, stands_still
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
@@ -149,15 +150,20 @@ def noisy_frame(
     Cancelled when the user stops it, and what `sampling_of` does.
     """
     how = sampling_of(engine, depsgraph, job, place)
+    layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     progress.begin(engine, f"{progress.SAMPLES} of frame {how.number}", 1, 2)
-    noisy, clock = sample_layer(
-        engine,
-        depsgraph,
-        samples=job.samples,
-        seed=how.own_seed,
-        portion=how.portion(how.count),
-        geometry=how.geometry,
-    )
+    try:
+        noisy, clock = sample_layer(
+            engine,
+            depsgraph,
+            samples=job.samples,
+            seed=how.own_seed,
+            portion=how.portion(how.count),
+            geometry=how.geometry,
+        )
+    except Cancelled:
+        keep_samples(engine, layer_name, job)
+        raise
     frames = {
         view: light_of(how, how.cameras[view], samples)
         for view, samples in noisy.items()
