@@ -276,6 +276,7 @@ def test_escape_shows_the_frame_under_way_of_an_animation(window: Window) -> Non
 scene = bpy.data.scenes[0]
 scene.cycles.use_adaptive_sampling = False
 scene.render.filepath = {window.program.seen(folder)!r} + '/'
+bpy.context.preferences.view.render_display_type = 'AREA'
 """
     )
     press(window, RENDER_ANIMATION)
@@ -293,8 +294,16 @@ progress and 'frame 2' in (progress.current() or '')
     kept = result(window, "stopped.png")
     errors = [np.abs(kept - each).mean() for each in true]
     assert errors[0] < 0.5 * min(errors[1:])
+    window.move(400, 600)
     window.settle()
     window.shot("10_stopped_animation")
+    window.ask(
+        """
+for area in window.screen.areas:
+    if area.type == 'IMAGE_EDITOR':
+        area.type = 'VIEW_3D'
+"""
+    )
 
 
 def test_the_compositors_result_is_saved(window: Window) -> None:
