@@ -14,21 +14,24 @@ import bpy
 import numpy as np
 import pytest
 
+from xrds_blender import run_job
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import UsageError
-from xrds_lab.bench import growth, machine, measure, pictures, tasks
+from xrds_lab.bench import growth, inputs, machine, measure, pictures, sweep, tasks
 from xrds_lab.bench.bench import bench
 from xrds_lab.bench.crops import SHOWN
 from xrds_lab.bench.stages import PLAIN_FRAME, STAGES
 from xrds_lab.bench.sweep import Sweep
+from xrds_lab.bench.windows import find_shots
 
 SWEEP = Sweep(
     (Network("fast", 4, "fast"),),
     plain_samples=(1, 2),
     low_samples={4: (4,)},
     guide_samples=(1, 2),
+    noise_thresholds=(0.3,),
 )
 SIZE = (72, 52)  # that 4 does not divide: the low picture reaches beyond the frame
 
@@ -75,6 +78,7 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
 ) -> None:
     # on a busy machine one stage may take many times what it takes on an idle one
     monkeypatch.setattr(measure, "MOST_OVER_BUDGET", 1e3)
+    monkeypatch.setattr(sweep, "MOST_ADAPTIVE_SAMPLES", 30)
     report = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
     out = world.folder / "out"
     assert report["failures"] == {}
@@ -109,6 +113,7 @@ def _check_points(report: dict[str, Any]) -> None:
     assert methods == {
         "cycles",
         "oidn",
+        "oidn_adaptive",
         "bicubic",
         "demodulated_bilinear",
         "xrds",
@@ -125,6 +130,22 @@ def _check_points(report: dict[str, Any]) -> None:
     assert scene["frame"] == list(SIZE)
     assert scene["rho"] > 0
     assert scene["reference_psnr_floor"] > 10
+
+
+@pytest.mark.timeout(300)
+def test_adaptive_sampling_stops_early_where_it_may(world: World) -> None:
+    (shot,) = find_shots([world.scene], None, None, SIZE)
+    counted = {}
+    for threshold in (1.0, 1e-9):
+        scene = inputs.open_scene(shot.path, shot.window)
+        inputs.sample_adaptively(scene, 40, threshold)
+        request = inputs.Request("plain", 40, 1, inputs.OFF, noise_threshold=threshold)
+        arrays, _ = run_job(scene, request.render)
+        counted[threshold] = arrays["radiance"]
+    scene = inputs.open_scene(shot.path, shot.window)
+    fixed = run_job(scene, inputs.Request("plain", 40, 1, inputs.OFF).render)[0]
+    assert np.array_equal(counted[1e-9], fixed["radiance"])
+    assert not np.array_equal(counted[1.0], fixed["radiance"])
 
 
 def _check_growth(report: dict[str, Any]) -> None:
@@ -144,7 +165,7 @@ def _check_picker(report: dict[str, Any]) -> None:
 
 
 def _check_page(page: str, report: dict[str, Any]) -> None:
-    assert page.count("<svg") >= 3  # over all, of the scene, growth
+    assert page.count("<svg") >= 4  # over all, same picture, of the scene, growth
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing beside it
     crops = re.search(r'class="crops">(.*?)</script>', page, re.DOTALL)
     assert crops is not None

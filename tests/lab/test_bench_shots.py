@@ -21,7 +21,7 @@ from xrds_blender.planning.denoiser import CYCLES_DENOISERS
 from xrds_core.errors import SceneError, UsageError
 from xrds_core.temporal.frame import Camera, Frame
 from xrds_lab.bench.windows import Window
-from xrds_lab.shots import equal, figures, film, motions, rivals
+from xrds_lab.shots import equal, figures, film, motions, report, rivals
 from xrds_lab.shots.bench import Measure, bench_shots
 from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
 from xrds_lab.shots.frames import MIDDLE, ShotFrames
@@ -294,3 +294,30 @@ def test_films_show_the_largest_and_the_smallest_gain() -> None:
     chosen = film.chosen(points, 2)
     assert chosen == {"best": ("b", "pan"), "worst": ("a", "pan")}
     assert film.chosen(points, 16) == {}
+
+
+def test_seconds_of_the_same_picture_follow_the_line_of_samples() -> None:
+    known = {2: 10.0, 16: 24.0}
+    assert equal.seconds_for(9.0, known) == pytest.approx(17.0)
+    assert equal.seconds_for(9.0, {2: 10.0}) is None
+    assert equal.seconds_for(None, known) is None
+    case = {"scene": "car", "motion": "pan"}
+    points = [
+        case
+        | {"method": method, "samples": n, "radius": radius, "seconds_per_frame": s}
+        for method, n, radius, s in (
+            (DEFAULT, 2, 0, 10.0),
+            (DEFAULT, 16, 0, 24.0),
+            (XRDS, 2, 4, 8.5),
+            (XRDS, 16, 4, None),
+        )
+    ]
+    entries = [
+        case | {"samples": n, "cycles_samples": needed, "psnr": 30.0, "curve": {}}
+        for n, needed in ((16, 64.0), (2, 9.0))
+    ]
+    first, last = equal.with_seconds(entries, points)
+    assert (first["samples"], first["gain"]) == (2, pytest.approx(2.0))
+    assert last["gain"] is None
+    page = "\n\n".join(report._equal([first, last]))
+    assert "| car | 2 | 30.00 | 8.5 | 17.0 | 2.00 |" in page

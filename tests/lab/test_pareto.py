@@ -11,7 +11,7 @@ import pytest
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import Cancelled
-from xrds_lab.bench import growth, machine, pareto
+from xrds_lab.bench import growth, machine, pareto, same_picture
 from xrds_lab.bench.inputs import OFF
 from xrds_lab.bench.journal import MOST_KILLS, Journal
 from xrds_lab.bench.stages import (
@@ -23,7 +23,7 @@ from xrds_lab.bench.stages import (
     in_process_name,
     task_name,
 )
-from xrds_lab.bench.sweep import Config, Sweep, anchor, anchors, xrds
+from xrds_lab.bench.sweep import Config, Sweep, adaptive, anchor, anchors, xrds
 
 
 def point(seconds: float, psnr: float, method: str = "oidn", **more: Any) -> Any:
@@ -69,6 +69,31 @@ def test_crossings_name_who_is_better_from_where() -> None:
     assert [change["ours_better"] for change in found] == [True, False]
     assert found[0]["seconds"] == 5
     assert pareto.at(OIDN, found[1]["seconds"]) >= 26
+
+
+def test_seconds_of_the_same_picture_are_read_off_the_rivals_frontier() -> None:
+    plain = [
+        point(10, 20, samples=1),
+        point(40, 30, samples=4),
+        point(15, 19, samples=2),
+    ]
+    ours = point(8, 25, "xrds", samples=16, scale=4, guides="fast", guide_samples=2)
+    lost = point(60, 26, "full_size", samples=4)
+    found = same_picture.entries("car", [*plain, ours, lost], 10.0, (0.5, 1.0, 8.0))
+    assert [e["budget"] for e in found] == [1.0, 8.0]
+    first, last = found
+    assert first["rival_seconds"] == pytest.approx(20)  # between 10 and 40 s
+    assert first["gain"] == pytest.approx(2.5)
+    assert (first["samples"], first["rival_samples"]) == (3.0, pytest.approx(2.0))
+    assert last["gain"] < 1
+    unreached = point(9, 31, "xrds", samples=4, scale=2, guides="fast")
+    (none,) = same_picture.entries("cave", [*plain, unreached], 10.0, (1.0,))
+    assert none["rival_seconds"] is none["gain"] is None
+    assert same_picture.in_order([none, first, last]) == [last, first, none]
+
+
+def test_a_picture_worse_than_any_rival_costs_the_quickest() -> None:
+    assert same_picture.least(OIDN, 10.0, lambda p: p["seconds"]["total"]) == 10
 
 
 def test_cached_guides_cost_nothing() -> None:
@@ -167,6 +192,38 @@ def test_full_size_pays_for_its_guides_and_for_our_denoiser(tmp_path: Path) -> N
     assert cost.seconds["denoise"] == 3.0
     assert cost.total == pytest.approx(0.5 + 10.1 + 3.0 + 0.25)
     assert cost.peak_memory == 200
+
+
+def test_adaptive_sampling_costs_what_its_own_frames_took(tmp_path: Path) -> None:
+    times = timed(tmp_path)
+    config = adaptive(0.1, Denoiser.HIGH_FAST)
+    with pytest.raises(KeyError, match=r"adaptive 0\.1"):
+        times.cost(config)
+    for seconds in (7.0, 9.0, 8.0):
+        run = {"seconds": seconds, "cpu": 15.0, "peak": 70, "other": 0.5, "sync": 1.5}
+        times.add(config.label, run)
+    cost = times.cost(config)
+    assert cost.total == pytest.approx(8.0)
+    assert cost.seconds["beauty"] == pytest.approx(6.0)
+    assert (cost.cpu_seconds, cost.peak_memory) == (15.0, 70)
+
+
+def test_adaptive_sampling_is_a_rival_of_its_own() -> None:
+    found = Sweep((NETWORK,), noise_thresholds=(0.1, 0.3)).configurations()
+    rivals = [c for c in found if c.method == "oidn_adaptive"]
+    assert {c.noise_threshold for c in rivals} == {0.1, 0.3}
+    assert len({c.key for c in rivals}) == len(rivals) == 4
+    assert not [c for c in SWEEP.configurations() if c.method == "oidn_adaptive"]
+    assert anchors(found) == anchors(SWEEP.configurations())
+    groups = pareto.groups([*OIDN, point(7, 24, "oidn_adaptive")])
+    assert groups["OIDN, best mode"] == OIDN
+    assert len(groups["OIDN, adaptive sampling"]) == 1
+
+
+def test_names_of_kept_errors_stay_as_they_are() -> None:
+    key = Config("oidn", 4, Denoiser.HIGH_FAST).key
+    assert key == "oidn_4_HIGH-FAST_1_0"
+    assert adaptive(0.1, Denoiser.HIGH_FAST).key.endswith("_0.1")
 
 
 def test_runs_are_kept(tmp_path: Path) -> None:

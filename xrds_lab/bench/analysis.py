@@ -9,7 +9,7 @@ from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Curve
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 
-from . import pareto
+from . import pareto, same_picture
 from .stages import PLAIN_FRAME, XRDS_FRAME, in_process_name
 from .sweep import DENOISERS, Config, xrds
 
@@ -25,7 +25,7 @@ OURS, CACHED, RIVAL = "XRDS", pareto.CACHED, "OIDN, best mode"
 
 
 def analysed(report: Report, budgets: Sequence[float]) -> Report:
-    """The report with frontier, budgets, mean and crossings of its points."""
+    """The report with what its points tell: from the frontier to the picker."""
     by_scene = {
         scene["scene"]: [p for p in report["points"] if p["scene"] == scene["scene"]]
         for scene in report["scenes"]
@@ -47,6 +47,13 @@ def analysed(report: Report, budgets: Sequence[float]) -> Report:
         "crossings": [
             _crossing(name, points, units[name]) for name, points in by_scene.items()
         ],
+        "same_picture": same_picture.in_order(
+            [
+                entry
+                for name, points in by_scene.items()
+                for entry in same_picture.entries(name, points, units[name], budgets)
+            ]
+        ),
         "picker": _picker(entries),
     }
 

@@ -24,7 +24,7 @@ from .journal import Journal
 from .measure import SceneBench, Settings
 from .pictures import Networks
 from .stages import ROUNDS
-from .sweep import Sweep
+from .sweep import NOISE_THRESHOLDS, Sweep
 from .windows import find_shots
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def bench(
     timing: bool = True,
     picker: bool = True,
     growth: Sequence[tuple[int, int]] = (),
+    noise_thresholds: Sequence[float] = NOISE_THRESHOLDS,
     model: Path | None = None,
     weights: Path | None = None,
     device: str = "auto",
@@ -62,7 +63,8 @@ def bench(
     mean of two renders of `reference_samples` each. `resolution` replaces the
     files' own. `presets` None takes all whose weights are there. Without `timing`
     only errors are measured. `growth` are frame sizes at which the first scene is
-    timed beside. `model` is where to write the picker's model.
+    timed beside. `noise_thresholds` are of Cycles' adaptive sampling. `model` is where
+    to write the picker's model.
     Raises UsageError for missing files and unknown names, before anything is rendered.
     """
     out.mkdir(parents=True, exist_ok=True)
@@ -70,7 +72,8 @@ def bench(
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal.json", report_line)
     chosen = Settings(
-        sweep or Sweep(_chosen(networks, presets)),
+        sweep
+        or Sweep(_chosen(networks, presets), noise_thresholds=tuple(noise_thresholds)),
         folder,
         networks,
         journal,

@@ -40,7 +40,8 @@ class Request:
     low: beauty at 1/scale, denoised and before; guides: albedo and normal; full: the
     same with the radiance of all bounces; plain: denoised full-resolution Cycles.
     `denoiser` None is the standard measure's: Blender's default for plain, the scene's
-    own mode for low.
+    own mode for low. With a `noise_threshold`, of plain alone, Cycles samples
+    adaptively: `samples` are the most that a pixel gets.
     """
 
     kind: str
@@ -48,6 +49,7 @@ class Request:
     scale: int = 1
     denoiser: Mode | None = None
     seed: int | None = None
+    noise_threshold: float | None = None
 
     @property
     def is_guide(self) -> bool:
@@ -60,13 +62,18 @@ class Request:
 
         mode = "" if self.denoiser is None else f"-{self.denoiser}"
         what = f"{self.kind}{self.scale}-{self.samples}spp{mode}-seed{self._seed}"
+        if self.noise_threshold is not None:
+            what += f"-noise{self.noise_threshold:g}"
         what += f"-v{GENERATION}"
         version = bpy.app.version_string.replace(" ", "")
         scene = f"{shot.name}-{shot.digest}-{shot.window.label}"
         return f"{scene}-{what}-blender{version}.npz"
 
     def render(self, passes: Any) -> tuple[Arrays, dict[str, float]]:
-        """Arrays and seconds by stage, from inside run_job."""
+        """Arrays and seconds by stage, from inside run_job.
+
+        Adaptive sampling is the scene's: `sample_adaptively` sets it before.
+        """
         seed = self._seed
         if self.is_guide:
             full = self.kind == "full"
@@ -75,7 +82,8 @@ class Request:
             return arrays | ({"radiance": guides.radiance} if full else {}), (
                 guides.seconds
             )
-        beauty = passes.beauty(self.scale, self.samples, seed=seed, **self._denoising())
+        samples = self.samples if self.noise_threshold is None else None
+        beauty = passes.beauty(self.scale, samples, seed=seed, **self._denoising())
         if any(beauty.offset):
             raise SceneError(
                 f"the window does not start on whole pixels at scale {self.scale}: "
@@ -150,3 +158,16 @@ def open_scene(path: Path, window: Window) -> Any:
     scene.cycles.use_adaptive_sampling = False
     scene.cycles.time_limit = 0
     return scene
+
+
+def sample_adaptively(scene: Any, samples: int, noise_threshold: float) -> None:
+    """Let Cycles stop early where the noise is below a threshold.
+
+    Its least samples stay Cycles' own choice, as for users.
+    """
+    scene.cycles.samples = samples
+    scene.cycles.use_adaptive_sampling = True
+    scene.cycles.adaptive_threshold = noise_threshold
+    scene.cycles.adaptive_min_samples = 0
+    for layer in scene.view_layers:
+        layer.samples = 0

@@ -36,6 +36,7 @@ GROUPS: dict[str, Callable[[Point], bool]] = {
     "Cycles": lambda p: p["method"] == "cycles",
     "OIDN, default": _oidn_default,
     "OIDN, best mode": lambda p: p["method"] == "oidn",
+    "OIDN, adaptive sampling": lambda p: p["method"] == "oidn_adaptive",
     "bicubic": lambda p: p["method"] == "bicubic",
     "demodulated bilinear": lambda p: p["method"] == "demodulated_bilinear",
     "XRDS": lambda p: p["method"] in {"xrds", "full_size"},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from xrds_core.atomic import replacing
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError
 
-from .inputs import Folder, Request, open_scene
+from .inputs import Folder, Request, open_scene, sample_adaptively
 from .journal import Strict
 from .rivals import ENLARGEMENTS
 
@@ -119,8 +119,8 @@ class Pictures:
         if not left:
             return
 
-        def job(passes: Any) -> None:
-            for request in left:
+        def job(passes: Any, part: Sequence[Request], exposure: np.float32) -> None:
+            for request in part:
                 with journal.attempt(names[request]):
                     arrays, seconds = request.render(passes)
                     arrays["view_exposure"] = exposure
@@ -128,10 +128,14 @@ class Pictures:
                     self.folder.write(name, arrays, seconds)
                 done(request)
 
-        with journal.attempt(f"{self.shot.name}: rendering its inputs"):
-            scene = open_scene(self.shot.path, self.shot.window)
-            exposure = np.float32(scene.view_settings.exposure)
-            run_job(scene, job)
+        for part in _sessions(left):
+            with journal.attempt(f"{self.shot.name}: rendering its inputs"):
+                scene = open_scene(self.shot.path, self.shot.window)
+                exposure = np.float32(scene.view_settings.exposure)
+                first = part[0]
+                if first.noise_threshold is not None:
+                    sample_adaptively(scene, first.samples, first.noise_threshold)
+                run_job(scene, partial(job, part=part, exposure=exposure))
 
     def render_missing(self, configs: Sequence[Config], progress: Progress) -> None:
         """Render what the configurations still need; raises the first failure."""
@@ -264,6 +268,16 @@ def has_lpips() -> bool:
 @lru_cache(maxsize=2)
 def _reference_file(path: Path) -> Array:
     return np.asarray(exr.read_beauty(path).radiance[..., :3])
+
+
+def _sessions(requests: Sequence[Request]) -> list[list[Request]]:
+    """Requests that one session of Cycles renders: adaptive sampling is a session's."""
+    sessions: dict[tuple[float, int] | None, list[Request]] = {}
+    for request in requests:
+        threshold = request.noise_threshold
+        key = None if threshold is None else (threshold, request.samples)
+        sessions.setdefault(key, []).append(request)
+    return list(sessions.values())
 
 
 def _identity(shot: Shot) -> str:

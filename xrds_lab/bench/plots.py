@@ -19,6 +19,7 @@ STYLES = {
     "Cycles": ("#999999", ":", "."),
     "OIDN, default": ("#d55e00", "--", "s"),
     "OIDN, best mode": ("#000000", "-", "o"),
+    "OIDN, adaptive sampling": ("#e69f00", "--", "P"),
     "bicubic": ("#bbbbbb", "-.", "v"),
     "demodulated bilinear": ("#cc79a7", "-.", "^"),
     "XRDS": ("#0072b2", "-", "D"),
@@ -60,6 +61,28 @@ def mean_plot(scenes: dict[str, tuple[Sequence[Point], float]]) -> bytes:
             }
             _draw(panel, name, pareto.mean_curve(members, measure))
         panel.axvline(1.0, color="#cccccc", zorder=0, linewidth=1)
+    return _svg(figure, panels)
+
+
+def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
+    """SVG of how many times as long Cycles takes for XRDS's picture, over budgets.
+
+    Samples beside seconds; a line for each scene, from `same_picture.entries`.
+    """
+    title = "the same PSNR: Cycles' best mode, as a multiple of XRDS"
+    figure, panels = _figure(title, "budget, of 1 spp + OIDN (Blender's default)")
+    keys = (("seconds", "seconds"), ("samples", "samples per pixel"))
+    for panel, (key, label) in zip(panels, keys, strict=True):
+        panel.set_yscale("log", base=2)
+        panel.yaxis.set_major_formatter("{x:g}")
+        panel.set_ylabel(f"times the {label}")
+        panel.axhline(1.0, color="#cccccc", zorder=0, linewidth=1)
+        for number, scene in enumerate(dict.fromkeys(e["scene"] for e in entries)):
+            here = [e for e in entries if e["scene"] == scene and e[f"rival_{key}"]]
+            line = sorted((e["budget"], e[f"rival_{key}"] / e[key]) for e in here)
+            if line:
+                panel.plot(*zip(*line, strict=True), color=f"C{number}", label=scene,
+                           marker="osD^v<>"[number % 7], markersize=4)  # fmt: skip
     return _svg(figure, panels)
 
 

@@ -37,7 +37,7 @@ ROUNDS = 3
 PLAIN_FRAME, XRDS_FRAME = "whole frame, plain", "whole frame, XRDS"
 GUIDE_FILTER = "filter of guides of few samples"
 GUIDE_DENOISER = "denoiser of guides of more"
-CYCLES = ("cycles", "oidn")
+CYCLES = ("cycles", "oidn", "oidn_adaptive")
 STAGES = ("sync", "beauty", "denoise", "guides", "network", "other")
 
 
@@ -97,6 +97,8 @@ class StageTimes:
 
         Raises KeyError when a stage of it could not be timed.
         """
+        if config.noise_threshold is not None:
+            return self._whole(config.label)
         wall, cpu = (self._stages(config, key) for key in ("seconds", "cpu"))
         beauty, *guide = config.requests()
         names = [task_name(anchor(beauty.kind, beauty.scale, beauty.denoiser))]
@@ -104,6 +106,16 @@ class StageTimes:
         names += [in_process_name(config)] * (config.method not in CYCLES)
         total = sum(wall.values())
         return Cost(wall | {"total": total}, sum(cpu.values()), self.peak(*names))
+
+    def _whole(self, name: str) -> Cost:
+        """The cost of frames that were timed whole: `beauty` holds their denoising."""
+        total, other, sync = (
+            self.median(name, k) for k in ("seconds", "other", "sync")
+        )
+        stages = dict.fromkeys(STAGES, 0.0) | {"sync": sync, "other": other}
+        stages["beauty"] = max(total - sync - other, 0.0)
+        stages["total"] = sum(stages.values())
+        return Cost(stages, self.median(name, "cpu"), self.peak(name))
 
     def _stages(self, config: Config, key: str) -> dict[str, float]:
         plain = config.scale == 1

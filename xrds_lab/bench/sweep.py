@@ -31,16 +31,19 @@ LOW_SAMPLES = {
     4: (4, 8, 16, 32, 64, 128),
     8: (16, 32, 64, 128, 256),
 }
+NOISE_THRESHOLDS = (0.01, 0.03, 0.1, 0.3)
+MOST_ADAPTIVE_SAMPLES = 64
 GUIDE_SAMPLES = (1, 2, 4, 8, 16)
 FULL_SAMPLES = (1, 2, 4)
 
 
 @dataclass(frozen=True)
 class Config:
-    """One way to a picture: Cycles, OIDN, `rivals.ENLARGEMENTS`, full_size or xrds.
+    """One way to a picture.
 
-    `samples` are per pixel of the beauty render, at 1/`scale` of the size. `denoiser`
-    OFF is none; None is as of `Request`.
+    cycles, oidn, oidn_adaptive (Cycles' adaptive sampling, of `samples` at most),
+    `rivals.ENLARGEMENTS`, full_size or xrds. `samples` are per pixel of the beauty
+    render, at 1/`scale` of the size. `denoiser` OFF is none; None is as of `Request`.
     """
 
     method: str
@@ -50,12 +53,16 @@ class Config:
     preset: str = ""
     guides: str = ""
     guide_samples: int = 0
+    noise_threshold: float | None = None
 
     @property
     def label(self) -> str:
         """Name in plots and tables."""
         if self.method == "full_size":
             return f"XRDS full size, {self.samples} spp, {self.denoiser}"
+        if self.noise_threshold is not None:
+            until = f"adaptive {self.noise_threshold:g}, at most {self.samples} spp"
+            return f"OIDN {self.denoiser}, {until}"
         if self.method in {"cycles", "oidn"}:
             name = "Cycles" if self.method == "cycles" else f"OIDN {self.denoiser}"
             return f"{name}, {self.samples} spp"
@@ -69,7 +76,7 @@ class Config:
     @property
     def key(self) -> str:
         """Unique name in files and journals."""
-        return "_".join(str(value) for value in asdict(self).values() if value != "")
+        return "_".join(str(value) for value in _chosen(self).values() if value != "")
 
     @property
     def network(self) -> Network:
@@ -95,7 +102,13 @@ class Config:
         if self.method == "full_size":  # our denoiser asks for the guides as well
             return Request("full", self.samples)
         kind = "plain" if self.scale == 1 else "low"
-        return Request(kind, self.samples, self.scale, self.denoiser)
+        return Request(
+            kind,
+            self.samples,
+            self.scale,
+            self.denoiser,
+            noise_threshold=self.noise_threshold,
+        )
 
     def guide(self) -> Request | None:
         """The guides' render, None for methods that need none."""
@@ -122,6 +135,8 @@ class Sweep:
     )
     guide_samples: tuple[int, ...] = GUIDE_SAMPLES
     full_samples: tuple[int, ...] = FULL_SAMPLES
+    noise_thresholds: tuple[float, ...] = ()
+    """Of Cycles' adaptive sampling; each is timed as whole frames of its own."""
 
     @property
     def scales(self) -> list[int]:
@@ -136,6 +151,11 @@ class Sweep:
             for n in self.plain_samples
             for denoiser in DENOISERS
             if n <= FEW_SAMPLES or denoiser in MANY_DENOISERS
+        ]
+        configs += [
+            adaptive(threshold, denoiser)
+            for threshold in self.noise_thresholds
+            for denoiser in MANY_DENOISERS
         ]
         configs += [
             Config("full_size", n, denoiser)
@@ -187,6 +207,16 @@ def xrds(
     return Config("xrds", samples, denoiser, scale, preset, guides, guide_samples)
 
 
+def adaptive(noise_threshold: float, denoiser: Mode) -> Config:
+    """Cycles with its adaptive sampling and its denoiser."""
+    return Config(
+        "oidn_adaptive",
+        MOST_ADAPTIVE_SAMPLES,
+        denoiser,
+        noise_threshold=noise_threshold,
+    )
+
+
 def anchor(
     kind: str, scale: int = 1, denoiser: Mode | None = OFF, more: bool = False
 ) -> Request:
@@ -200,10 +230,11 @@ def anchors(configs: Iterable[Config]) -> list[Request]:
     """Renders of a whole frame from which the seconds of every configuration follow.
 
     Two sample counts for the line through each kind of render, and every mode of the
-    denoiser once.
+    denoiser once. Not of adaptive sampling, whose seconds are no line.
     """
     needed: dict[Request, None] = {}
-    for request in (request for config in configs for request in config.requests()):
+    lines = [config for config in configs if config.noise_threshold is None]
+    for request in (request for config in lines for request in config.requests()):
         for more in (False, True):
             needed[anchor(request.kind, request.scale, more=more)] = None
         if not request.is_guide and request.denoiser != OFF:
@@ -213,4 +244,12 @@ def anchors(configs: Iterable[Config]) -> list[Request]:
 
 def describe(config: Config) -> dict[str, Any]:
     """The entry `settings` of results.json."""
-    return {key: value for key, value in asdict(config).items() if key != "method"}
+    return {key: value for key, value in _chosen(config).items() if key != "method"}
+
+
+def _chosen(config: Config) -> dict[str, Any]:
+    """The fields; the noise threshold only where there is one."""
+    fields = asdict(config)
+    if config.noise_threshold is None:
+        del fields["noise_threshold"]
+    return fields

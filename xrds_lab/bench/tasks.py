@@ -11,7 +11,7 @@ from xrds_blender.frame.job import RenderJob
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_blender.planning.plan import savings_but
 
-from .inputs import Request, open_scene
+from .inputs import Request, open_scene, sample_adaptively
 from .rivals import ENLARGEMENTS
 from .stages import (
     CYCLES,
@@ -45,6 +45,9 @@ def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str
     used: list[Network] = []
     noisy = cache(lambda: _noisy_frame(shot))
     for config in configs:
+        if config.noise_threshold is not None:
+            timed[config.label] = _adaptive_frame(shot, config)
+            continue
         name = in_process_name(config)
         if config.method in CYCLES or name in timed:
             continue
@@ -69,23 +72,33 @@ def plain_job() -> RenderJob:
     return RenderJob(plain=True, samples=1, denoiser=DEFAULT_DENOISER)
 
 
-def frame(shot: Shot, job: RenderJob) -> tuple[Picture, Run]:
+def _adaptive_frame(shot: Shot, config: Config) -> Task:
+    job = RenderJob(plain=True, denoiser=Denoiser(config.denoiser))
+    return lambda: frame(shot, job, config)[1]
+
+
+def frame(
+    shot: Shot, job: RenderJob, adaptive: Config | None = None
+) -> tuple[Picture, Run]:
     """Render a whole frame as a user does, from a freshly opened file.
 
     Every frame renders its own guides. `other` is the time outside all stages;
-    weights are loaded before.
+    weights are loaded before. `adaptive` tells how Cycles samples adaptively.
     """
     from xrds_blender import render
     from xrds_blender.frame.networks import load_upscaler
 
     scene = open_scene(shot.path, shot.window.whole)
+    if adaptive is not None and adaptive.noise_threshold is not None:
+        sample_adaptively(scene, adaptive.samples, adaptive.noise_threshold)
     if not job.is_picked and job.is_enlarged:
         load_upscaler(job)
     pictures: list[Picture] = []
     choices = vars(job) | {"savings": savings_but("guide cache")}
     run = clocked(lambda: pictures.append(render(scene, **choices)))
     stages = {k: s for k, s in pictures[0].seconds.items() if k != "total"}
-    return pictures[0], run | {"other": run["seconds"] - sum(stages.values())}
+    other = run["seconds"] - sum(stages.values())
+    return pictures[0], run | {"other": other, "sync": stages["sync"]}
 
 
 def noise(window: Window, scale: int) -> tuple[Array, Array]:

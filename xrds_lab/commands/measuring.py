@@ -202,6 +202,11 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         default=(),
         help="frames, as 512x512,1920x1080",
     )
+    add(
+        "--no-adaptive",
+        action="store_true",
+        help="leave out Cycles' adaptive sampling, whose frames take long to time",
+    )
     add("--model", type=Path, help="where to write what --time-budget goes by")
     add("--device", default="auto", help=DEVICE_HELP)
     add("--weights", type=Path, help="folder of weights files")
@@ -246,6 +251,7 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
     if options.shots:
         return _bench_shots(options)
     from ..bench.bench import bench
+    from ..bench.sweep import NOISE_THRESHOLDS
 
     return bench(
         options.scenes,
@@ -261,6 +267,7 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         timing=not options.errors_only,
         picker=not options.errors_only,
         growth=options.growth,
+        noise_thresholds=() if options.no_adaptive else NOISE_THRESHOLDS,
         model=options.model,
         weights=options.weights,
         device=options.device,

@@ -204,6 +204,8 @@ def _films(parts: Sequence[_Scene], points: Sequence[Any], out: Path) -> None:
 
 
 def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
+    points = [point for part in parts for point in part.points()]
+    equals = [entry for part in parts for entry in part.equals]
     results = {
         "settings": {
             "middle": "the file's own view",
@@ -215,8 +217,8 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
             {"scene": part.shot.name, "reference_psnr_floor": part.pictures.floor()}
             for part in parts
         ],
-        "shots": [point for part in parts for point in part.points()],
-        "equal_quality": [entry for part in parts for entry in part.equals],
+        "shots": points,
+        "equal_quality": equal.with_seconds(equals, points),
         "failures": journal.failures,
     }
     write_json(out / "results.json", results)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
 from ..bench.sweep import Config
-from .figures import REACH, XRDS
+from .figures import DEFAULT, REACH, XRDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -70,6 +70,41 @@ def comparisons(
         }
         for point in targets(points)
     ]
+
+
+def with_seconds(
+    entries: Sequence[dict[str, Any]], points: Sequence[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """The comparisons with the seconds per frame of both, where both were timed.
+
+    The slowest of XRDS first. Cycles' time is linear in its samples: two numbers of
+    them tell that of any other.
+    """
+    found = []
+    for entry in entries:
+        case = {key: entry[key] for key in ("scene", "motion")}
+        here = [p for p in points if case.items() <= p.items()]
+        own = next((p for p in targets(here) if p["samples"] == entry["samples"]), None)
+        rivals = {
+            p["samples"]: p["seconds_per_frame"]
+            for p in here
+            if p["method"] == DEFAULT and p["seconds_per_frame"]
+        }
+        seconds = own and own["seconds_per_frame"]
+        needed = seconds_for(entry["cycles_samples"], rivals)
+        gain = needed / seconds if needed and seconds else None
+        timed = {"seconds": seconds, "cycles_seconds": needed, "gain": gain}
+        found.append(dict(entry) | timed)
+    return sorted(found, key=lambda e: math.inf if e["gain"] is None else e["gain"])
+
+
+def seconds_for(samples: float | None, known: Mapping[int, float]) -> float | None:
+    """Seconds of a frame by the line through those of the fewest and most samples."""
+    if samples is None or len(known) < 2:
+        return None
+    few, many = min(known), max(known)
+    slope = (known[many] - known[few]) / (many - few)
+    return known[few] + max(slope, 0.0) * (samples - few)
 
 
 def targets(points: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:

@@ -155,6 +155,25 @@ def _equal(entries: Sequence[dict[str, Any]]) -> Iterator[str]:
         cells = [_needed(found.get((scene, count))) for count in counts]
         lines.append(f"| {scene} | {' | '.join(cells)} |")
     yield "\n".join(lines)
+    yield from _same_picture(entries)
+
+
+def _same_picture(entries: Sequence[dict[str, Any]]) -> Iterator[str]:
+    timed = [entry for entry in entries if entry["gain"] is not None]
+    if not timed:
+        return
+    yield (
+        "The same picture in how many seconds per frame, where XRDS gains least first; "
+        "those of Cycles by the line through its fewest and most samples."
+    )
+    lines = [
+        "| scene | samples | PSNR | s of XRDS | s of Cycles + OIDN | times |",
+        "|---|---|---|---|---|---|",
+    ]
+    for e in timed:
+        seconds = f"{e['seconds']:.1f} | {e['cycles_seconds']:.1f} | {e['gain']:.2f}"
+        lines.append(f"| {e['scene']} | {e['samples']} | {e['psnr']:.2f} | {seconds} |")
+    yield "\n".join(lines)
 
 
 def _needed(entry: dict[str, Any] | None) -> str:
