@@ -1,71 +1,99 @@
-"""One PNG that compares the methods at a glance."""
+"""Pictures that compare the ways at a glance: crops in a PNG, the shot as a film."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.metrics import to_srgb
 
+from ..shots import film
+
+if TYPE_CHECKING:
+    from xrds_core.arrays import Array
+
+    Spot = tuple[int, int]
+    Column = tuple[str, Array]
+
 # Crops of the 960 x 540 picture: left, top; each CROP pixels wide and high.
-CROP = (100, 68)
-SPOTS = ((395, 103), (345, 195), (700, 238), (40, 355), (560, 395))
+CROP = (130, 84)
+SPOTS: tuple[Spot, ...] = ((364, 96), (30, 345), (745, 205), (310, 200))
 ZOOM = 3
 GAP = 6
-LABEL = 46
+HEADING, LABEL = 30, 46  # pixels in height
+FILM = (0.33, 0.71, 0.14, 0.68)  # of the frame: left, right, top, bottom
+FILM_QUALITY = 45  # of WebP: some hundred kilobytes
 PAPER, INK = (24, 24, 26), (235, 235, 230)
 
 
-def to_bytes(linear: Array) -> Array:
-    """Scene-linear (H, W, 3) to sRGB bytes."""
-    return np.round(to_srgb(linear) * 255.0).astype(np.uint8)
+def compare(heading: str, columns: Sequence[Column], path: Path) -> None:
+    """Write the same enlarged crops of every picture side by side as a PNG.
 
-
-def enlarged(low: Array, height: int, width: int) -> Array:
-    """Repeat low-resolution pixels, to show the network's input."""
-    scale = -(-height // low.shape[0])
-    grown = low.repeat(scale, axis=0).repeat(scale, axis=1)
-    return grown[:height, :width]
-
-
-def compare(columns: Sequence[tuple[str, Array]], path: Path) -> None:
-    """Write the crops of every method side by side.
-
-    Args:
-        columns: label of at most two lines, picture (H, W, 3) scene-linear; all of
-            one size.
-        path: the PNG.
+    `columns`: labels of at most two lines, and pictures (H, W, 3), scene-linear, all
+    of one size.
     """
     height, width = columns[0][1].shape[:2]
     cell = (CROP[0] * ZOOM, CROP[1] * ZOOM)
-    sheet = Image.new(
-        "RGB",
-        (
-            GAP + len(columns) * (cell[0] + GAP),
-            LABEL + len(SPOTS) * (cell[1] + GAP),
-        ),
-        PAPER,
+    top = HEADING + LABEL
+    size = (
+        GAP + len(columns) * (cell[0] + GAP),
+        top + len(SPOTS) * (cell[1] + GAP),
     )
+    sheet = Image.new("RGB", size, PAPER)
     draw = ImageDraw.Draw(sheet)
-    font = ImageFont.load_default(size=16)
+    draw.text((GAP, 6), heading, fill=INK, font=ImageFont.load_default(size=18))
     for number, (label, linear) in enumerate(columns):
         left = GAP + number * (cell[0] + GAP)
-        draw.multiline_text((left + 2, 3), label, fill=INK, font=font, spacing=3)
-        picture = Image.fromarray(to_bytes(linear))
+        _write(draw, (left, HEADING + 3), label)
+        picture = Image.fromarray(_bytes(linear))
         for row, spot in enumerate(SPOTS):
-            box = _box(spot, width, height)
-            crop = picture.crop(box).resize(cell, Image.Resampling.NEAREST)
-            sheet.paste(crop, (left, LABEL + row * (cell[1] + GAP)))
+            crop = picture.crop(_box(spot, width, height))
+            shown = crop.resize(cell, Image.Resampling.NEAREST)
+            sheet.paste(shown, (left, top + row * (cell[1] + GAP)))
     with replacing(path) as unfinished:
         sheet.save(unfinished, "PNG")
 
 
-def _box(spot: tuple[int, int], width: int, height: int) -> tuple[int, int, int, int]:
+def move(shots: Sequence[Sequence[Array]], labels: Sequence[str], path: Path) -> None:
+    """Write two shots side by side as an animated WebP, labels of two lines above.
+
+    Of every frame (H, W, 3), scene-linear, the middle is shown in its own size.
+    """
+    frames = []
+    for pair in zip(*shots, strict=True):
+        picture = film.beside(*(to_srgb(_middle(frame)) for frame in pair))
+        sheet = Image.new("RGB", (picture.width, LABEL + picture.height), PAPER)
+        for number, label in enumerate(labels):
+            place = GAP + number * picture.width // 2, 3
+            _write(ImageDraw.Draw(sheet), place, label)
+        sheet.paste(picture, (0, LABEL))
+        frames.append(sheet)
+    film.save(path, frames, FILM_QUALITY)
+
+
+def _write(draw: ImageDraw.ImageDraw, place: tuple[int, int], text: str) -> None:
+    font = ImageFont.load_default(size=16)
+    draw.multiline_text(place, text, fill=INK, font=font, spacing=3)
+
+
+def _bytes(linear: Array) -> Array:
+    """Scene-linear (H, W, 3) to sRGB bytes."""
+    return np.round(to_srgb(linear) * 255.0).astype(np.uint8)
+
+
+def _middle(frame: Array) -> Array:
+    height, width = frame.shape[:2]
+    left, right, top, bottom = FILM
+    rows = slice(int(top * height), int(bottom * height))
+    return frame[rows, int(left * width) : int(right * width)]
+
+
+def _box(spot: Spot, width: int, height: int) -> tuple[int, int, int, int]:
     """The crop about a place of the 960 x 540 picture, in a picture of any size."""
     left = min(spot[0] * width // 960, max(0, width - CROP[0]))
     top = min(spot[1] * height // 540, max(0, height - CROP[1]))

@@ -1,106 +1,195 @@
-"""Render the demo scene by every method: XRDS, and Cycles with the same seconds."""
+"""Renders the demo's shot and still by every way; each gets the same seconds."""
 
 from __future__ import annotations
 
-import sys
 import time
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from xrds_blender import render
-from xrds_blender.frame.job import Picture, RenderJob
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_blender.planning.plan import savings_but
-from xrds_core import metrics
+from xrds_blender.shot.shot import render_shot
 
-LOW_SAMPLES = 16  # per low-resolution pixel, the standard measure's
-GUIDE_SAMPLES = 4
-FIT_SAMPLES = (1, 3)  # of the plain renders that samples and fixed costs are fitted to
-REFERENCE_SAMPLES = 512  # at most
+from .scene import MIDDLE, SHOT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from xrds_core.arrays import Array
+
+    from .countdown import Countdown
+
+RADIUS = 4
+PAIR = (MIDDLE, MIDDLE + 1)
+"""Frames that have a reference: their difference tells what flickers."""
+REFERENCE_SAMPLES = (64, 512)  # at least and at most
+_SEED = 77  # of references: no method shares their noise
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to a picture; `trials` are samples of the renders that tell its seconds."""
+
+    name: str
+    label: str
+    job: RenderJob
+    trials: tuple[int, int] = (1, 4)
+    where: str = ""
+
+
+CYCLES = Way(
+    "cycles_oidn_default",
+    "Cycles + OIDN",
+    RenderJob(plain=True, denoiser=DEFAULT_DENOISER),
+)
+QUICK = Way(
+    "cycles_oidn_quick",
+    "Cycles + OIDN, fast prefilter",
+    RenderJob(plain=True, denoiser=Denoiser.HIGH_FAST),
+)
+FULL_SIZE = Way("xrds_x1", "XRDS, full size", RenderJob(scale=1))
+ENLARGED = Way(
+    "xrds_x2",
+    "XRDS, super-resolution x2",
+    # every picture is to pay for its own guides
+    RenderJob(scale=2, guide_samples=1, savings=savings_but("guide cache")),
+    trials=(4, 16),
+    where=" at half size",
+)
+ACCUMULATED = Way("xrds_shot", "XRDS, shot", RenderJob(scale=1, temporal_radius=RADIUS))
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One method's picture and its seconds."""
+    """What a way made: `frames` are radiance (H, W, 3), scene-linear, by number.
 
-    name: str
-    label: str
-    picture: Picture
+    `seconds` are wall clock, of one frame.
+    """
+
+    way: Way
+    samples: int
     seconds: float
-    """Wall clock of the whole call."""
+    frames: dict[int, Array]
 
-    def errors(self, reference: Picture) -> dict[str, float]:
-        """PSNR in dB of the sRGB values, RelMSE of the scene-linear ones."""
-        shown, truth = self.picture.radiance, reference.radiance
-        return {
-            "seconds": round(self.seconds, 2),
-            "psnr": round(metrics.psnr(shown, truth), 3),
-            "relmse": round(metrics.relmse(shown, truth), 6),
-        }
+    @property
+    def label(self) -> str:
+        """The way and its samples, to be shown."""
+        return f"{self.way.label}, {self.samples} spp{self.way.where}"
+
+
+def fitting(seconds: float, fixed: float, each: float) -> int:
+    """The samples of `each` seconds that fit beside what is fixed; one at least."""
+    return max(1, int((seconds - fixed) / each))
 
 
 class Contest:
     """Renders one scene again and again; every call is timed as the user waits."""
 
-    def __init__(self, scene: Any, preset: str, weights: Path | None) -> None:
-        self.scene, self.preset, self.weights = scene, preset, weights
-        self._fit: tuple[float, float] | None = None
+    def __init__(self, scene: Any, countdown: Countdown) -> None:
+        self._scene, self._countdown = scene, countdown
+        self._lines: dict[Way, tuple[float, float]] = {}
 
-    def warm_up(self) -> None:
-        """Load Cycles, OIDN and torch, so that no method pays for being the first."""
-        size = self.scene.render.resolution_percentage
-        self.scene.render.resolution_percentage = 10
-        for scale in (2, 4):
-            self.xrds(scale)
-        self.plain("warm-up", 1)
-        self.scene.render.resolution_percentage = size
+    def warm_up(self, ways: Sequence[Way]) -> None:
+        """Load Cycles, OIDN and torch, so that no way pays for being the first."""
+        self._countdown.say("loading Cycles, OIDN and PyTorch")
+        size = self._scene.render.resolution_percentage
+        self._scene.render.resolution_percentage = 10
+        for way in ways:
+            self._still(way, 4)
+        self._scene.render.resolution_percentage = size
 
-    def xrds(self, scale: int) -> Entry:
-        """Render at `1 / scale` and let the network enlarge it."""
-        job = RenderJob(
-            scale=scale,
-            samples=LOW_SAMPLES,
-            guide_samples=GUIDE_SAMPLES,
-            preset=self.preset,
-            weights=self.weights,
-            savings=savings_but("guide cache"),  # every entry is to pay for its own
-        )
-        return self._run(f"xrds_x{scale}", f"XRDS x{scale}", job)
+    def plain_shot(self, samples: int, way: Way = CYCLES) -> Entry:
+        """Every frame by itself, by Cycles and OIDN."""
+        return self._separately(way, samples, SHOT)
 
-    def plain(self, name: str, samples: int, label: str = "Cycles + OIDN") -> Entry:
-        """Render with Cycles and OIDN as the file sets them, at full resolution."""
-        job = RenderJob(plain=True, samples=samples)
-        return self._run(name, f"{label}, {samples} spp", job)
+    def pair(self, way: Way, seconds: float) -> Entry:
+        """The two frames that have a reference, with the samples that fit."""
+        return self._separately(way, self.samples_in(way, seconds), PAIR)
 
-    def plain_in(self, seconds: float, name: str) -> Entry:
-        """Cycles and OIDN with as many samples as fit into `seconds`, one at least."""
-        fixed, each = self.fit()
-        samples = max(1, round((seconds - fixed) / each))
-        return self.plain(name, samples)
+    def shot(self, seconds: float) -> Entry:
+        """The shot as XRDS renders shots, with the samples that fit into `seconds`."""
+        fixed, each = self._line(FULL_SIZE)
+        samples = fitting(seconds, fixed + self._accumulating(), each)
+        taken, made = self._shoot(samples, SHOT)
+        frames = {number: picture.radiance for number, picture in made.items()}
+        return Entry(ACCUMULATED, samples, taken / len(SHOT), frames)
 
-    def reference(self, seconds: float) -> Entry:
-        """Cycles and OIDN with as many samples as fit into the time that is left."""
-        fixed, each = self.fit()
-        samples = int((seconds - fixed) / each)
-        samples = max(16, min(REFERENCE_SAMPLES, samples))
-        return self.plain("reference", samples, "Reference")
+    def still(self, way: Way, seconds: float) -> Entry:
+        """The middle frame with the samples that fit into `seconds`."""
+        samples = self.samples_in(way, seconds)
+        self._countdown.say(f"the still: {way.label}, {samples} spp")
+        taken, radiance = self._still(way, samples)
+        return Entry(way, samples, taken, {MIDDLE: radiance})
 
-    def fit(self) -> tuple[float, float]:
-        """Seconds of a plain render without samples, and of one sample."""
-        if self._fit is None:
-            few, many = FIT_SAMPLES
-            low, high = (self.plain("fit", n).seconds for n in FIT_SAMPLES)
-            each = max(0.01, (high - low) / (many - few))
-            self._fit = max(0.0, low - few * each), each
-        return self._fit
+    def references(self) -> Entry:
+        """Two frames by Cycles and OIDN, with the samples that the time left allows."""
+        fixed, each = self._line(CYCLES)
+        least, most = REFERENCE_SAMPLES
+        samples = fitting(self._countdown.left / len(PAIR), fixed, each)
+        samples = max(least, min(most, samples))
+        self._countdown.needs(len(PAIR) * (fixed + samples * each))
+        job = replace(CYCLES.job, seed=_SEED)
+        way = replace(CYCLES, name="reference", label="Reference", job=job)
+        return self._separately(way, samples, PAIR)
 
-    def _run(self, name: str, label: str, job: RenderJob) -> Entry:
-        print(f"demo: {label}", file=sys.stderr, flush=True)
+    def samples_in(self, way: Way, seconds: float) -> int:
+        """The samples that fit into so many seconds; one at least."""
+        return fitting(seconds, *self._line(way))
+
+    # --- seconds ----------------------------------------------------------------------
+
+    def _line(self, way: Way) -> tuple[float, float]:
+        """Seconds of a still without samples, and of one sample."""
+        if way not in self._lines:
+            self._countdown.say(f"how long a sample takes: {way.label}")
+            few, more = way.trials
+            low, high = (self._still(way, n)[0] for n in way.trials)
+            each = max(0.01, (high - low) / (more - few))
+            self._lines[way] = max(0.0, low - few * each), each
+        return self._lines[way]
+
+    def _accumulating(self) -> float:
+        """Seconds in which a frame takes the samples of all its neighbours."""
+        self._countdown.say("how long a neighbour takes")
+        few = range(MIDDLE - 1, MIDDLE + 2)
+        _, made = self._shoot(1, few)
+        of_one = made[MIDDLE].seconds["accumulate"] / (len(few) - 1)
+        return float(2 * RADIUS * of_one)
+
+    # --- renders ----------------------------------------------------------------------
+
+    def _shoot(self, samples: int, numbers: Sequence[int]) -> tuple[float, Any]:
+        job, name = replace(ACCUMULATED.job, samples=samples), ACCUMULATED.label
+        start, made = time.perf_counter(), {}
+        self._countdown.say(f"{name}, {samples} spp, {len(numbers)} frames")
+        for number, picture in render_shot(self._scene, job, numbers):
+            made[number] = picture
+            self._countdown.say(f"{name}, {samples} spp, frame {number} of {SHOT[-1]}")
+        return time.perf_counter() - start, made
+
+    def _separately(self, way: Way, samples: int, numbers: Sequence[int]) -> Entry:
+        frames, seconds = {}, 0.0
+        for number in numbers:
+            self._countdown.say(
+                f"{way.label}, {samples} spp, frame {number} of {SHOT[-1]}"
+            )
+            taken, frames[number] = self._still(way, samples, number)
+            seconds += taken
+        return Entry(way, samples, seconds / len(numbers), frames)
+
+    def _still(
+        self, way: Way, samples: int, number: int = MIDDLE
+    ) -> tuple[float, Array]:
+        """Seconds and radiance (H, W, 3) of one frame."""
+        job = replace(way.job, samples=samples)
         start = time.perf_counter()
-        picture = render(self.scene, **vars(job))
+        self._scene.frame_set(number)
+        radiance = render(self._scene, **vars(job)).radiance
         seconds = time.perf_counter() - start
-        if not np.isfinite(picture.radiance).all():
-            raise FloatingPointError(f"{label} holds values that are not finite")
-        return Entry(name, label, picture, seconds)
+        if not np.isfinite(radiance).all():
+            raise FloatingPointError(f"{way.label} holds values that are not finite")
+        return seconds, radiance

@@ -10,11 +10,18 @@ import math
 from typing import Any
 
 import bpy
+from mathutils import Matrix, Vector
 
 from ..studio.builder import ORIGIN, Builder, empty_scene
 from ..studio.geometry import Point, Shape, box, curved, lathe, sphere, tube
 from . import materials
 
+SHOT = range(1, 10)
+"""The frames of the shot that `orbit` makes."""
+MIDDLE = 5
+"""Its middle frame, which shows the still life as it is built."""
+PIVOT = (0.02, 0.1, 0.195)  # what the camera looks at
+TURN = 0.4  # degrees per frame about it: 2 to 4 pixels at a width of 960
 WALL = 0.62  # y of the tiled wall, metres behind the middle of the table
 POT = (0.5, 0.24, 0.0)
 BOOKS = (-0.47, 0.16)
@@ -60,8 +67,23 @@ def build(width: int = 960, height: int = 540) -> Any:
     _books(kitchen)
     _recipe(kitchen)
     _lights(kitchen)
-    kitchen.camera((0.06, -1.62, 0.58), (0.02, 0.1, 0.195), 48.0)
+    kitchen.camera((0.06, -1.62, 0.58), PIVOT, 48.0)
     return scene
+
+
+def orbit(scene: Any) -> None:
+    """Make the still life a shot: the camera circles about what it looks at."""
+    camera, pivot = scene.camera, Matrix.Translation(Vector(PIVOT))
+    scene.frame_start, scene.frame_end = SHOT[0], SHOT[-1]
+    bpy.context.view_layer.update()  # a new camera has no place before
+    view = camera.matrix_world.copy()
+    camera.rotation_mode = "QUATERNION"
+    for number in SHOT:
+        turn = Matrix.Rotation(math.radians(TURN * (number - MIDDLE)), 4, "Z")
+        camera.matrix_world = pivot @ turn @ pivot.inverted() @ view
+        camera.keyframe_insert("location", frame=number)
+        camera.keyframe_insert("rotation_quaternion", frame=number)
+    scene.frame_set(MIDDLE)
 
 
 class Kitchen(Builder):

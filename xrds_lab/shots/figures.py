@@ -102,10 +102,15 @@ def flicker(
         return float(np.std(np.stack(shown), axis=0, dtype=np.float64).mean())
     if pair is None:
         return None
-    shown = [to_srgb(paint(number), stops) for number in (MIDDLE, MIDDLE + 1)]
-    true = [to_srgb(picture, stops) for picture in pair]
-    error = (shown[1] - shown[0]) - (true[1] - true[0])
-    return float(np.abs(error).mean(dtype=np.float64))
+    return wrong_change((paint(MIDDLE), paint(MIDDLE + 1)), pair, stops)
+
+
+def wrong_change(
+    shown: tuple[Array, Array], true: tuple[Array, Array], stops: float = 0.0
+) -> float:
+    """Mean absolute error, in sRGB, of the change from a frame to the next."""
+    before, after, was, then = (to_srgb(x, stops) for x in (*shown, *true))
+    return float(np.abs((after - before) - (then - was)).mean(dtype=np.float64))
 
 
 class SceneFigures:

@@ -45,25 +45,31 @@ def chosen(points: Sequence[Point], samples: int) -> dict[str, tuple[str, str]]:
 def write(path: Path, clip: Clip) -> None:
     """Write all frames of a shot as an animated WebP: Cycles + OIDN, then XRDS."""
     frames = [
-        _beside(
+        beside(
             to_srgb(clip.oidn(number, DEFAULT_DENOISER), clip.stops),
             to_srgb(clip.xrds(number, REACH), clip.stops),
         )
         for number in sorted(clip.frames)
     ]
+    save(path, frames)
+
+
+def save(path: Path, frames: Sequence[Image.Image], quality: int = QUALITY) -> None:
+    """Write pictures as an animated WebP that runs there and back without end."""
     with replacing(path) as part, part.open("wb") as file:
         frames[0].save(
             file,
             "WEBP",
             save_all=True,
-            append_images=frames[1:] + frames[-2:0:-1],  # there and back
+            append_images=[*frames[1:], *frames[-2:0:-1]],
             duration=FRAME_MILLISECONDS,
             loop=0,
-            quality=QUALITY,
+            quality=quality,
         )
 
 
-def _beside(left: Array, right: Array) -> Image.Image:
+def beside(left: Array, right: Array) -> Image.Image:
+    """Two pictures (H, W, 3), sRGB from 0 to 1, with a white line between them."""
     from PIL import Image
 
     gap = np.ones((left.shape[0], _GAP, 3), np.float32)

@@ -1,0 +1,119 @@
+"""What the demo leaves: figures, pictures, crops side by side and a film."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_blender.command.picture_file import save
+from xrds_core import metrics
+from xrds_core.atomic import write_json
+
+from ..bench import machine
+from ..shots.figures import wrong_change
+from . import comparison
+from .contest import PAIR
+from .scene import MIDDLE, SHOT
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from .comparison import Column
+    from .contest import Entry
+
+    Row = dict[str, Any]
+
+PICTURES = ("comparison.png", "shot.webp", "ways.png")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All that was rendered: two shots, Cycles' quicker mode, stills, references."""
+
+    rival: Entry
+    quick: Entry
+    shot: Entry
+    stills: tuple[Entry, ...]
+    reference: Entry
+
+    @property
+    def entries(self) -> tuple[Entry, ...]:
+        """What is measured."""
+        return self.rival, self.quick, *self.stills, self.shot
+
+
+def write(out: Path, scene: Any, outcome: Outcome) -> list[Row]:
+    """Write everything into the folder `out`; returns the rows of results.json."""
+    rows = [_row(entry, outcome.reference) for entry in outcome.entries]
+    for entry in (*outcome.entries, outcome.reference):
+        picture = entry.frames[MIDDLE]
+        opaque = np.ones(picture.shape[:2], np.float32)
+        for suffix in (".exr", ".png"):
+            save(out / f"{entry.way.name}{suffix}", picture, opaque, scene)
+    _write_comparisons(out, outcome, rows)
+    settings = {
+        "resolution": [scene.render.resolution_x, scene.render.resolution_y],
+        "frames": len(SHOT),
+        "reference_samples": outcome.reference.samples,
+    }
+    report = {"settings": settings, "machine": machine.describe(), "ways": rows}
+    write_json(out / "results.json", report)
+    return rows
+
+
+def line(row: Row) -> str:
+    """A row to read."""
+    flickers = "" if row["flicker"] is None else f"  flicker {row['flicker']:.4f}"
+    return (
+        f"{row['label']:46} {row['seconds_per_frame']:6.2f} s per frame  "
+        f"PSNR {row['psnr']:5.2f} dB{flickers}"
+    )
+
+
+def _row(entry: Entry, reference: Entry) -> Row:
+    picture, truth = entry.frames[MIDDLE], reference.frames[MIDDLE]
+    return {
+        "label": entry.label,
+        "way": entry.way.name,
+        "samples": entry.samples,
+        "seconds_per_frame": round(entry.seconds, 2),
+        "psnr": round(metrics.psnr(picture, truth), 2),
+        "relmse": round(metrics.relmse(picture, truth), 5),
+        "flicker": _flicker(entry, reference),
+    }
+
+
+def _flicker(entry: Entry, reference: Entry) -> float | None:
+    """How wrongly the picture changes from frame to frame; None for a still."""
+    if not set(PAIR) <= set(entry.frames):
+        return None
+    shown, true = ((x.frames[PAIR[0]], x.frames[PAIR[1]]) for x in (entry, reference))
+    return round(wrong_change(shown, true), 5)
+
+
+def _write_comparisons(out: Path, outcome: Outcome, rows: Sequence[Row]) -> None:
+    known = {row["way"]: row for row in rows}
+
+    def columns(*entries: Entry) -> list[Column]:
+        shown = [(_label(known[x.way.name]), x.frames[MIDDLE]) for x in entries]
+        return [*shown, (outcome.reference.label, outcome.reference.frames[MIDDLE])]
+
+    first, *others = PICTURES
+    rival, shot = outcome.rival, outcome.shot
+    heading = "A frame of a shot with a moving camera; the same seconds for both"
+    comparison.compare(heading, columns(rival, shot), out / first)
+    film = [[entry.frames[n] for n in SHOT] for entry in (rival, shot)]
+    names = tuple(_label(known[x.way.name]) for x in (rival, shot))
+    comparison.move(film, names, out / others[0])
+    stills = (*outcome.stills, rival, outcome.quick)
+    ordered = sorted(stills, key=lambda x: known[x.way.name]["psnr"])
+    heading = "A still; the same seconds for all, the least decibels first"
+    comparison.compare(heading, columns(*ordered), out / others[1])
+
+
+def _label(row: Row) -> str:
+    figures = f"{row['seconds_per_frame']:.1f} s, {row['psnr']:.1f} dB"
+    return f"{row['label']}\n{figures}"
