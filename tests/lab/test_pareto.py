@@ -86,6 +86,10 @@ def test_seconds_of_the_same_picture_are_read_off_the_rivals_frontier() -> None:
     assert first["gain"] == pytest.approx(2.5)
     assert (first["samples"], first["rival_samples"]) == (3.0, pytest.approx(2.0))
     assert last["gain"] < 1
+    quick = point(12, 26, "oidn_adaptive", samples=64)
+    more = same_picture.entries("car", [*plain, ours, quick], 10.0, (1.0,))
+    assert 10 < more[0]["rival_seconds"] < 12  # on the way to the adaptive one
+    assert more[0]["rival_samples"] == first["rival_samples"]
     unreached = point(9, 31, "xrds", samples=4, scale=2, guides="fast")
     (none,) = same_picture.entries("cave", [*plain, unreached], 10.0, (1.0,))
     assert none["rival_seconds"] is none["gain"] is None

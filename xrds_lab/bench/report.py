@@ -118,9 +118,10 @@ def _same_picture(out: Path, entries: Sequence[dict[str, Any]]) -> str:
     head = ["scene", "budget", "XRDS", "PSNR", "its s", "s of Cycles", "times"]
     note = (
         "XRDS's best picture within each budget, and the seconds that the best mode of "
-        "Cycles + OIDN needs for the same PSNR on that scene. Where XRDS loses (below "
-        "1) comes first. Samples are per pixel of the full size, those of guides "
-        "counted; interpolated over the logarithm of seconds or samples."
+        "Cycles + OIDN, with adaptive sampling or without, needs for the same PSNR on "
+        "that scene. Where XRDS loses (below 1) comes first. Samples are per pixel of "
+        "the full size, those of guides counted, adaptive ones left out; interpolated "
+        "over the logarithm of seconds or samples."
     )
     table = _rows([*head, "its samples", "samples of Cycles"], rows)
     title = "<h2>The same picture in how many seconds</h2>"

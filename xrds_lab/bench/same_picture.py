@@ -17,21 +17,25 @@ if TYPE_CHECKING:
     Point = dict[str, Any]
     Entry = dict[str, Any]
 
-OURS, RIVAL = "XRDS", "OIDN, best mode"
+OURS, EVEN, ADAPTIVE = "XRDS", "OIDN, best mode", "OIDN, adaptive sampling"
 
 
 def entries(
     scene: str, points: Sequence[Point], unit: float, budgets: Sequence[float]
 ) -> list[Entry]:
-    """For XRDS's best picture within each budget what the best mode of Cycles needs.
+    """For XRDS's best picture within each budget what Cycles at its best needs.
 
     `seconds` and `samples` are XRDS's, of a whole frame and per pixel of it;
     `rival_seconds` and `rival_samples` what Cycles needs for the same PSNR, None where
-    none of its points reaches it; `gain` is rival's over own seconds, above 1 where
-    XRDS is quicker. A picture worse than Cycles' quickest one is set against that.
+    none of its points reaches it; the seconds with adaptive sampling or without, the
+    samples without, because nobody counts adaptive ones; `gain` is rival's over own
+    seconds, above 1 where XRDS is quicker. A picture worse than Cycles' quickest one is
+    set against that.
     """
     groups = pareto.groups(points)
-    rivals, found = groups.get(RIVAL, []), []
+    even = groups.get(EVEN, [])
+    rivals = [*even, *groups.get(ADAPTIVE, [])]
+    found = []
     for budget in budgets:
         own = pareto.best_within(groups.get(OURS, []), budget * unit)
         if own is None or not rivals:
@@ -47,7 +51,7 @@ def entries(
                 "rival_seconds": needed,
                 "gain": None if needed is None else needed / seconds,
                 "samples": samples(own),
-                "rival_samples": least(rivals, own["psnr"], samples),
+                "rival_samples": least(even, own["psnr"], samples),
             }
         )
     return found
