@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 from shots import CARD, PIXEL, WALL, View, World, camera, project, vector, view
 
+from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Stored, store
 from xrds_core.temporal.motion import Places, grid, pair, places
 from xrds_core.temporal.moving import Movement
@@ -127,6 +129,28 @@ def test_one_movement_serves_a_whole_shot() -> None:
             assert np.array_equal(old.pixels, new.pixels)
             assert np.array_equal(old.x, new.x, equal_nan=True)
             assert np.array_equal(old.moving, new.moving)
+
+
+def test_a_pane_that_moves_lends_little() -> None:
+    """Its guides are what lies behind it, or it: chance in every sample of a frame."""
+    rng = np.random.default_rng(3)
+    shown = views(0.0)
+    card = shown[2].name == CARD
+
+    def samples(stored: list[Stored]) -> Any:
+        return accumulate(stored[2], stored[:2] + stored[3:]).samples[card].mean()
+
+    for each in shown:
+        assert each.frame.radiance is not None
+        each.frame.radiance[...] = 1.0
+    cards = samples(by_vectors(shown))
+    for each in shown:
+        chance = rng.random(each.name.shape) < 0.5
+        each.frame.albedo[(each.name == CARD) & chance] = 1.0
+        each.frame.albedo[(each.name == CARD) & ~chance] = 0.0
+    panes = samples(by_vectors(shown))
+    assert cards > 3.0
+    assert panes < 1.2
 
 
 def test_stereo_views_of_one_moment_need_no_vectors() -> None:

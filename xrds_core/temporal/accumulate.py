@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import PictureError
-from .agreement import REACH, agreement, brightness
+from .agreement import REACH, agreement, brightness, likeness
 from .motion import grid, pair, places, surroundings
 from .moving import Movement
 from .survey import spread, survey
@@ -168,16 +168,17 @@ class _Lender:
         if other.spoilt is not None:
             found.seen[...] &= ~other.spoilt.take(found.pixel)
         picked = _floats(other.picture.take(found.pixel, axis=0))
+        if self._turn is not None:
+            normal = slice(6, 9) if other.has_light else slice(3, 6)
+            picked[:, normal] = picked[:, normal] @ self._turn.T
         weight = self._agreement(block, picked, found.seen)
         weight *= found.seen[inner]
+        self._doubt_moving(weight, block, picked, found.seen)
         weight *= spread(self._tiles, self._pair.here.shape, block.rows).ravel()
         weight *= np.float32(other.samples)
         taken = float(weight.sum(dtype=np.float64))
         weight *= np.exp(found.apart[inner] * self._fall)
         picked = picked[inner]
-        if self._turn is not None:
-            normal = slice(6, 9) if other.has_light else slice(3, 6)
-            picked[:, normal] = picked[:, normal] @ self._turn.T
         picked *= weight[:, None]
         block.sums += picked
         block.weights += weight
@@ -192,8 +193,30 @@ class _Lender:
         alike = target.samples == self._pair.there.samples
         difference = brightness(picked[:, :3], alike) - block.brightness[alike]
         difference *= known
-        rows = difference.reshape(-1, target.shape[1])
-        return agreement(np.pad(rows, (block.outside, (0, 0)))).ravel()
+        return agreement(self._rows(block, difference)).ravel()
+
+    def _doubt_moving(
+        self, weight: Array, block: _Block, picked: Array, seen: Mask
+    ) -> None:
+        """Lower the weights (n,) of inner pixels that show what moves by itself."""
+        detour = self._pair.detour
+        if detour is None:
+            return
+        pixels = block.pixels
+        part = slice(*detour.pixels.searchsorted((pixels.start, pixels.stop)))
+        moving = detour.pixels[part] - pixels.start
+        if not moving.size:
+            return
+        target = self._pair.here
+        guides = slice(3, 9) if target.has_light else slice(0, 6)
+        difference = picked[:, guides] - target.picture[block.wide.pixels, guides]
+        rows = self._rows(block, difference), self._rows(block, seen)
+        weight[moving] *= likeness(*rows).ravel()[moving]
+
+    def _rows(self, block: _Block, x: NDArray[Any]) -> NDArray[Any]:
+        """A block's wide rows (n, ...) as (H, W, ...), 0 beyond the picture."""
+        rows = x.reshape(-1, self._pair.here.shape[1], *x.shape[1:])
+        return np.pad(rows, (block.outside, *[(0, 0)] * x.ndim))
 
 
 def _means(target: Stored, block: _Block) -> tuple[Array, Array]:
