@@ -17,6 +17,7 @@ from xrds_lab.demo import __main__ as demo
 from xrds_lab.demo import comparison, contest, results, scene
 from xrds_lab.demo.countdown import Countdown
 from xrds_lab.demo.scene import MIDDLE, PIVOT, SHOT, TURN, build, orbit
+from xrds_lab.shots import film
 
 TOP = comparison.HEADING + comparison.LABEL
 
@@ -130,6 +131,16 @@ def test_film_moves_both_shots(tmp_path: Path) -> None:
             levels.append(pixels[:, :40].mean())
             assert pixels[:, -40:].mean() < 10
     assert levels[0] + 30 < levels[1] < levels[2] - 30
+
+
+def test_films_stay_small_where_that_costs_quality(tmp_path: Path) -> None:
+    random = np.random.default_rng(1)
+    noise = [random.integers(0, 255, (80, 80, 3), np.uint8) for _ in range(3)]
+    frames = [Image.fromarray(picture) for picture in noise]
+    fine, small = tmp_path / "fine.webp", tmp_path / "small.webp"
+    film.save(fine, frames)
+    film.save(small, frames, fine.stat().st_size - 1)
+    assert small.stat().st_size < fine.stat().st_size
 
 
 def test_samples_fit_into_the_seconds_that_are_left() -> None:

@@ -27,7 +27,6 @@ ZOOM = 3
 GAP = 6
 HEADING, LABEL = 30, 46  # pixels in height
 FILM = (0.33, 0.71, 0.14, 0.68)  # of the frame: left, right, top, bottom
-FILM_QUALITY = 45  # of WebP: some hundred kilobytes
 PAPER, INK = (24, 24, 26), (235, 235, 230)
 
 
@@ -73,7 +72,7 @@ def move(shots: Sequence[Sequence[Array]], labels: Sequence[str], path: Path) ->
             _write(ImageDraw.Draw(sheet), place, label)
         sheet.paste(picture, (0, LABEL))
         frames.append(sheet)
-    film.save(path, frames, FILM_QUALITY)
+    film.save(path, frames)
 
 
 def _write(draw: ImageDraw.ImageDraw, place: tuple[int, int], text: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +25,8 @@ if TYPE_CHECKING:
     Point = dict[str, Any]
 
 FRAME_MILLISECONDS = 83  # 12 frames a second
-QUALITY = 60
+QUALITIES = (60, 45, 30, 20)
+LARGEST = 600_000  # bytes: pages show several
 _GAP = 4  # white pixels between both
 
 
@@ -54,11 +56,15 @@ def write(path: Path, clip: Clip) -> None:
     save(path, frames)
 
 
-def save(path: Path, frames: Sequence[Image.Image], quality: int = QUALITY) -> None:
-    """Write pictures as an animated WebP that runs there and back without end."""
-    with replacing(path) as part, part.open("wb") as file:
+def save(path: Path, frames: Sequence[Image.Image], largest: int = LARGEST) -> None:
+    """Write pictures as an animated WebP that runs there and back without end.
+
+    In the best of QUALITIES that takes no more than `largest` bytes, or in the last.
+    """
+    for quality in QUALITIES:
+        film = io.BytesIO()
         frames[0].save(
-            file,
+            film,
             "WEBP",
             save_all=True,
             append_images=[*frames[1:], *frames[-2:0:-1]],
@@ -66,6 +72,10 @@ def save(path: Path, frames: Sequence[Image.Image], quality: int = QUALITY) -> N
             loop=0,
             quality=quality,
         )
+        if film.tell() <= largest:
+            break
+    with replacing(path) as part:
+        part.write_bytes(film.getvalue())
 
 
 def beside(left: Array, right: Array) -> Image.Image:
