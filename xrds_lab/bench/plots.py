@@ -72,7 +72,10 @@ def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
     title = "the same PSNR: Cycles' best mode, as a multiple of XRDS"
     figure, panels = _figure(title, "budget, of 1 spp + OIDN (Blender's default)")
     keys = (("seconds", "seconds"), ("samples", "samples per pixel"))
+    budgets = sorted({e["budget"] for e in entries})
     for panel, (key, label) in zip(panels, keys, strict=True):
+        panel.set_xticks(budgets, [f"{budget:g}" for budget in budgets])
+        panel.set_xticks([], minor=True)
         panel.set_yscale("log", base=2)
         panel.yaxis.set_major_formatter("{x:g}")
         panel.set_ylabel(f"times the {label}")
