@@ -32,6 +32,7 @@ COPIED = (
 )
 # Left out: what starts a Python of its own.
 MODULES = (
+    "allotted",
     "borrowed",
     "cover",
     "engine",

@@ -415,6 +415,7 @@ bpy.context.window_manager.addon_search = 'XRDS'
 bpy.ops.preferences.addon_expand(module='bl_ext.user_default.xrds')
 """
 AS_BEFORE = """
+bpy.ops.preferences.addon_expand(module='bl_ext.user_default.xrds')  # folds it again
 area = max(window.screen.areas, key=lambda a: a.width * a.height)
 area.type = 'VIEW_3D'
 view = bpy.context.preferences.view

@@ -15,22 +15,29 @@ from xrds_blender.cycles import allotted, session
 from xrds_blender.cycles.pass_names import NOISY
 from xrds_blender.cycles.samples import sample_layer
 from xrds_blender.cycles.settings import has_subsets
+from xrds_blender.frame import allotting
 from xrds_blender.frame.rendering import call_engine
 from xrds_core.allocation import Rectangle
 from xrds_core.errors import Cancelled
 
 
 @pytest.fixture
-def steady(life: Any) -> Any:
+def fixed(life: Any) -> Any:
     """A fixed count of samples, of nothing but the picture."""
-    if not has_subsets(life):
-        pytest.skip("this Blender continues no sequence")
     life.cycles.use_adaptive_sampling = False
     life.cycles.samples = 8
     life.view_layers[0].use_pass_z = False
     for item in life.objects:
         item.is_shadow_catcher = False
     return life
+
+
+@pytest.fixture
+def steady(fixed: Any) -> Any:
+    """The same, where Cycles can take its samples in parts."""
+    if not has_subsets(fixed):
+        pytest.skip("this Blender continues no sequence")
+    return fixed
 
 
 def both(scene: Any, samples: int) -> tuple[Any, Any]:
@@ -89,6 +96,14 @@ def test_what_decides(steady: Any) -> None:
     steady.cycles.use_adaptive_sampling = True
     assert taken(steady).startswith("even")
     assert taken(steady, samples=8).startswith("where they pay")
+
+
+def test_samples_stay_even_where_they_cannot_be_parted(
+    fixed: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As before Blender 4.4."""
+    monkeypatch.setattr(allotting, "has_subsets", lambda _: False)
+    assert taken(fixed) == "even: this Blender continues no sequence"
 
 
 def test_the_noisy_image_holds_all_samples(steady: Any) -> None:

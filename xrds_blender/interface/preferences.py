@@ -13,6 +13,7 @@ from xrds_core.errors import UsageError
 
 from ..frame import torch_folder
 from . import get_torch, machine
+from .paragraph import translated
 from .self_test import XRDS_OT_self_test
 
 # Numbers stay with their devices: a preference holds the number.
@@ -150,8 +151,9 @@ def torch_status(folder: Path | None = None) -> list[tuple[str, str]]:
         torch = torch_folder.available()
     except UsageError as error:
         return [*lines, ("INFO", str(error))]
+    used = {"version": torch.version, "build": torch.build, "folder": torch.folder}
     lines.append(
-        ("INFO", f"PyTorch {torch.version} ({torch.build}) from {torch.folder}")
+        ("INFO", translated("PyTorch {version} ({build}) from {folder}", **used))
     )
     loaded = torch_folder.loaded()
     if folder is not None and loaded is not None and loaded != folder:
