@@ -83,16 +83,22 @@ def test_installs_and_enables_without_a_word(bare: Program) -> None:
 
 def test_start_is_quiet_and_quick_and_loads_no_torch(bare: Program) -> None:
     code = f"""
-import sys, time, addon_utils
+import argparse, sys, time, addon_utils
+from pathlib import Path
 print("torch=%d" % ("torch" in sys.modules))
 import bpy
 assert {ENGINE}
 addon_utils.disable({MODULE!r})
+source = Path(argparse.__file__).read_text()
 start = time.process_time()
+compile(source, "yardstick", "exec")
+middle = time.process_time()
 addon_utils.enable({MODULE!r})
-print("milliseconds=%.1f" % (1e3 * (time.process_time() - start)))
+end = time.process_time()
+print("milliseconds=%.1f" % (1e3 * (end - middle)))
+print("yardsticks=%.2f" % ((end - middle) / (middle - start)))
 """
-    times = []
+    times, yardsticks = [], []
     for _ in range(5):
         text = python(bare, code)
         assert told(text, "torch") == "0"
@@ -100,8 +106,9 @@ print("milliseconds=%.1f" % (1e3 * (time.process_time() - start)))
             w for w in NOISE if w in text.replace("WARNING Could not get a", "")
         ]
         times.append(float(told(text, "milliseconds")))
-    print("start-up in milliseconds:", times)
-    assert min(times) < 20.0
+        yardsticks.append(float(told(text, "yardsticks")))
+    print("start-up in milliseconds:", times, "in yardsticks:", yardsticks)
+    assert min(yardsticks) < 3.0  # a busy machine makes both longer
 
 
 def test_survives_reloads_and_factory_settings(bare: Program) -> None:
