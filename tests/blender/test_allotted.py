@@ -16,8 +16,6 @@ from xrds_blender.cycles.pass_names import NOISY
 from xrds_blender.cycles.samples import sample_layer
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame import allotting
-from xrds_blender.frame.denoisers import load_denoiser
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
 from xrds_core.allocation import Rectangle
 from xrds_core.errors import Cancelled
@@ -36,14 +34,9 @@ def fixed(life: Any) -> Any:
 
 @pytest.fixture
 def steady(fixed: Any) -> Any:
-    """The same, where Cycles can take its samples in parts.
-
-    The denoiser is opened first, as a render opens it: while Cycles renders, Debian's
-    Blender 5.2 lets Open Image Denoise find no processor.
-    """
+    """The same, where Cycles can take its samples in parts."""
     if not has_subsets(fixed):
         pytest.skip("this Blender continues no sequence")
-    load_denoiser(RenderJob(scale=1))
     return fixed
 
 

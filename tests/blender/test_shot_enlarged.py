@@ -16,6 +16,7 @@ torch = pytest.importorskip("torch")
 from xrds_blender import run_job
 from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.passes import CyclesPasses
+from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import enlarged_finishing
 from xrds_core.errors import XRDSError
@@ -101,6 +102,8 @@ def test_the_light_of_a_pixel_lies_where_it_is_seen(moving: Path) -> None:
 def test_guides_of_what_stands_still_are_rendered_a_few_times(
     lit: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    if not has_subsets(bpy.context.scene):
+        pytest.skip("this Blender continues no sequence")
     rendered = []
     samples = []
     guides = CyclesPasses.guides_by_view
