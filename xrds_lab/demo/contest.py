@@ -27,6 +27,8 @@ RADIUS = 4
 PAIR = (MIDDLE, MIDDLE + 1)
 """Frames that have a reference: their difference tells what flickers."""
 REFERENCE_SAMPLES = (64, 512)  # at least and at most
+FRAMES = 30
+"""What all ways take beside the reference, in frames of Cycles + OIDN, about."""
 _SEED = 77  # of references: no method shares their noise
 
 
@@ -104,6 +106,10 @@ class Contest:
 
     def plain_shot(self, samples: int, way: Way = CYCLES) -> Entry:
         """Every frame by itself, by Cycles and OIDN."""
+        fixed, each = self._line(way)
+        reference = fixed + REFERENCE_SAMPLES[0] * each
+        frame = fixed + samples * each
+        self._countdown.needs(FRAMES * frame + len(PAIR) * reference)
         return self._separately(way, samples, SHOT)
 
     def pair(self, way: Way, seconds: float) -> Entry:

@@ -67,5 +67,5 @@ class Countdown:
 
     def _line(self) -> str:
         minutes, seconds = divmod(round(self.left), 60)
-        rest = f"{minutes}:{seconds:02} left" if self.left else "almost done"
+        rest = f"{minutes}:{seconds:02} left" if self.left else "longer than foreseen"
         return f"demo: {rest}: {self._task}"
