@@ -236,7 +236,9 @@ def test_an_animation_is_the_shot_of_the_command(animation: Any, blend: Path) ->
         np.testing.assert_allclose(ours, theirs, atol=2e-3)
 
 
-@pytest.mark.parametrize("stage", ["Samples of frame 3", "Denoising"])
+@pytest.mark.parametrize(
+    "stage", ["Samples of frame 1", "Samples of frame 3", "Denoising"]
+)
 def test_a_stopped_frame_shows_itself(
     animation: Any, blend: Path, monkeypatch: pytest.MonkeyPatch, stage: str
 ) -> None:

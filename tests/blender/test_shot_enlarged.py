@@ -15,8 +15,10 @@ torch = pytest.importorskip("torch")
 
 from xrds_blender import run_job
 from xrds_blender.command.render_file import render_file
+from xrds_blender.cycles import session
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.cycles.settings import has_subsets
+from xrds_blender.frame import progress
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import enlarged_finishing
 from xrds_core.errors import XRDSError
@@ -226,6 +228,32 @@ def test_an_enlarged_animation_is_the_shot_of_the_command(
             name = "DiffDir" if bpy.app.version < (5,) else "Diffuse Direct"
             light = layer(path, name)
             assert 0.2 < light[24:, 33:].mean() / light[24:, :33].mean() < 5.0
+
+
+@pytest.mark.parametrize(
+    "stage",
+    ["Low resolution of frame 1", "Guides of frame 1", "Guides of frame 3", "Network"],
+)
+def test_a_stopped_frame_shows_its_own_light(
+    animation: Any, moving: Path, monkeypatch: pytest.MonkeyPatch, stage: str
+) -> None:
+    """Enlarged without the network. Blender knows of no stop, so it saves the frame."""
+    for frame in (1, 5):
+        animation.camera.location.x = 0.5 * (frame - 3)
+        animation.camera.keyframe_insert("location", frame=frame)
+    animation.frame_end = 3
+    with monkeypatch.context() as patch:
+        patch.setattr(
+            session, "is_stopped", lambda _: stage in (progress.current() or "")
+        )
+        bpy.ops.render.render(animation=True)
+    kept = layer(moving.parent / "f12" / "1.exr", "Combined")
+    errors = []
+    for number in (1, 3):
+        animation.frame_set(number)
+        true = run_job(animation, lambda p: p.beauty(1, 64, denoise=False)).radiance
+        errors.append(np.abs(kept - true).mean())
+    assert errors[0] < 0.6 * errors[1]
 
 
 def test_what_was_rendered_is_kept_where_the_network_fails(
