@@ -26,7 +26,7 @@ SPOTS: tuple[Spot, ...] = ((364, 96), (30, 345), (745, 205), (310, 200))
 ZOOM = 3
 GAP = 6
 HEADING, LABEL = 30, 46  # pixels in height
-FILM = (0.33, 0.71, 0.14, 0.68)  # of the frame: left, right, top, bottom
+FILM = (0.33, 0.71, 0.1, 0.64)  # of the frame: left, right, top, bottom
 PAPER, INK = (24, 24, 26), (235, 235, 230)
 
 
