@@ -32,7 +32,6 @@ COPIED = (
 )
 # Left out: what starts a Python of its own.
 MODULES = (
-    "allotted",
     "borrowed",
     "cover",
     "engine",

@@ -14,7 +14,6 @@ from typing import Any, NoReturn
 from xrds_core import atomic
 from xrds_core.errors import Cancelled, UsageError, XRDSError, printable
 from xrds_core.notices import warn
-from xrds_core.stdout import flush_all
 
 from . import streams
 
@@ -157,5 +156,5 @@ def finished(status: int) -> int:
 def leave(status: int) -> NoReturn:
     """End the process; the bpy module can hang when the interpreter ends."""
     status = finished(status)
-    flush_all()
+    streams.flush_all()
     os._exit(status)

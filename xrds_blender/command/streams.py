@@ -5,6 +5,7 @@ Cycles prints from C, so file descriptors are moved and not Python's streams alo
 
 from __future__ import annotations
 
+import ctypes
 import io
 import os
 import sys
@@ -12,8 +13,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
-
-from xrds_core.stdout import flush_all, moved
 
 _aside: int | None = None  # where stdout really leads, while it is moved
 
@@ -62,11 +61,20 @@ def fault() -> OSError | None:
     return raw.fault if isinstance(raw, _Stream) else None
 
 
+def flush_all() -> None:
+    """Flush what Python and the C library still hold of stdout and stderr."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):  # full, closed, None
+            stream.flush()
+    if os.name != "nt":  # Windows' C libraries keep one buffer each
+        ctypes.CDLL(None).fflush(None)
+
+
 @contextmanager
 def stdout_to_stderr() -> Iterator[None]:
     """Let all that is printed on stdout go to stderr, so that a result has it alone."""
     global _aside
-    with moved() as _aside:
+    with _moved() as _aside:
         os.dup2(2, 1)
         yield
     _aside = None
@@ -75,7 +83,7 @@ def stdout_to_stderr() -> Iterator[None]:
 @contextmanager
 def stdout_to(path: Path) -> Iterator[None]:
     """Append what is printed on stdout to a file."""
-    with moved(), path.open("ab") as file:
+    with _moved(), path.open("ab") as file:
         os.dup2(file.fileno(), 1)
         yield
 
@@ -89,3 +97,16 @@ def write_at_once(text: str, result: str) -> None:
         if number is not None:
             with suppress(OSError):  # the terminal may have gone
                 os.write(number, each.encode())
+
+
+@contextmanager
+def _moved() -> Iterator[int]:
+    """Yield a copy of stdout's descriptor, which is put back at the end."""
+    flush_all()
+    kept = os.dup(1)
+    try:
+        yield kept
+    finally:
+        flush_all()
+        os.dup2(kept, 1)
+        os.close(kept)

@@ -9,8 +9,6 @@ from xrds_core.temporal.samples import Portion
 from ..planning.denoiser import Denoiser
 from .borrowed import Borrowed
 
-LARGEST_SEED = 2**31 - 1
-
 
 def set_sampling(
     borrowed: Borrowed, scene: Any, samples: int | None, seed: int | None
@@ -59,22 +57,17 @@ def set_samples(
         return
     set_sampling(borrowed, scene, portion.whole, portion.seed)
     if portion.length != portion.whole:
-        set_subset(borrowed, scene, portion.offset, portion.length)
+        borrowed.set(
+            scene.cycles,
+            use_sample_subset=True,
+            sample_offset=portion.offset,
+            sample_subset_length=portion.length,
+        )
 
 
 def has_subsets(scene: Any) -> bool:
     """Whether this Blender's Cycles can take a part of a sequence; from 4.4 on."""
     return hasattr(scene.cycles, "use_sample_subset")
-
-
-def set_subset(borrowed: Borrowed, scene: Any, offset: int, length: int) -> None:
-    """Take only a part of the samples that are set."""
-    borrowed.set(
-        scene.cycles,
-        use_sample_subset=True,
-        sample_offset=offset,
-        sample_subset_length=length,
-    )
 
 
 def set_denoising(

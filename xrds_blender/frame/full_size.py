@@ -10,9 +10,9 @@ import numpy as np
 from xrds_core.errors import Cancelled
 
 from ..cycles import session
+from ..cycles.samples import sample_layer
 from ..planning.plan import Decision
 from . import progress
-from .allotting import sample
 from .denoisers import load_denoiser
 from .job import Picture, RenderJob
 from .memory import peak_memory
@@ -32,7 +32,9 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     progress.begin(engine, progress.SAMPLES, 1, 2)
     try:
-        noisy, seconds, how = sample(engine, depsgraph, job)
+        noisy, clock = sample_layer(
+            engine, depsgraph, samples=job.samples, seed=job.seed
+        )
         progress.begin(engine, progress.DENOISE, 2, 2)
         started = time.perf_counter()
         report = progress.reporter(engine)
@@ -47,7 +49,8 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
     pictures = {view: each.radiance for view, each in denoised.items()}
     session.write_combined(engine, layer_name, pictures)
     stages = {
-        **seconds,
+        "sync": clock.sync,
+        "beauty": clock.render,
         "denoise": finished - started,
         "write": time.perf_counter() - finished,
     }
@@ -59,7 +62,7 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
         albedo=noisy[first].albedo,
         normal=noisy[first].normal,
         seconds=dict.fromkeys(progress.STAGES, 0.0) | stages,
-        plan=(*job.plan().decisions, how, prefilter(denoised[first])),
+        plan=(*job.plan().decisions, prefilter(denoised[first])),
         peak_memory=peak_memory(),
         device=denoiser.device,
     )

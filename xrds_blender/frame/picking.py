@@ -112,8 +112,6 @@ def _job(job: RenderJob, picked: Picked) -> RenderJob:
     if choice.scale == 1 and choice.denoiser.is_ours:
         quality = choice.denoiser.quality
         chosen |= {"plain": False, "scale": 1, "denoiser": None, "denoise": quality}
-        # The seconds are those of even samples; where they pay they are dearer.
-        chosen |= {"savings": tuple(s for s in job.savings if s != "samples")}
     elif choice.scale == 1:
         chosen |= {"plain": True}
     else:

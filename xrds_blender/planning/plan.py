@@ -34,7 +34,6 @@ GUIDE_BOUNCES = 4
 GUIDE_CACHE = "guide cache"
 # What may be left out where a scene does not need it, by the names of the decisions.
 SAVINGS = (
-    "samples",
     "denoise",
     "guides",
     "guide samples",

@@ -13,7 +13,7 @@ from xrds_core.temporal.frame import Camera, Frame, store
 from xrds_core.temporal.samples import Portion, continued
 
 from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
-from ..cycles.settings import LARGEST_SEED, has_subsets
+from ..cycles.settings import has_subsets
 from ..cycles.view import cameras_of, can_track
 from ..frame import progress
 from ..frame.job import RenderJob
@@ -22,6 +22,7 @@ from ..scene.facts import scene_facts, shapes_move, stands_still
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
+LARGEST_SEED = 2**31 - 1
 
 
 Keep = Callable[[Mapping[str, Frame]], object]
