@@ -113,6 +113,38 @@ def one_thread() -> Iterator[None]:
     torch.set_num_threads(threads)
 
 
+@pytest.fixture(scope="module")
+def upscaler() -> Any:
+    """A network that has learnt nothing, but whose every kernel counts."""
+    import torch
+
+    from xrds_core.network import XRDS, preset_config
+    from xrds_core.upscaler import Upscaler
+
+    torch.manual_seed(3)
+    network = XRDS(preset_config("fast", 2))
+    torch.nn.init.normal_(network.tail.predict.weight, std=0.1)
+    return Upscaler("fast", 2, device="cpu", weights=network)
+
+
+@pytest.fixture
+def stopped_in(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Renders the animation as by Ctrl-F12, stopped as soon as a stage begins."""
+    import bpy
+
+    from xrds_blender.cycles import session
+    from xrds_blender.frame import progress
+
+    def render(stage: str) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(
+                session, "is_stopped", lambda _: stage in (progress.current() or "")
+            )
+            bpy.ops.render.render(animation=True)
+
+    return render
+
+
 @pytest.fixture
 def empty_scene() -> Callable[..., Any]:
     """A camera in a grey world: (width, height, samples) -> scene."""

@@ -161,7 +161,7 @@ def test_the_plan_told_is_the_one_rendered(
     assert told["facts"]["scale"] == picture.job.scale
     # What is left is what only a render can know.
     rest = {decision for decision, _ in decided[len(before) :]}
-    assert rest <= {"guide cache", "sessions", "samples", "guide prefilter"}
+    assert rest <= {"guide cache", "sessions", "guide prefilter"}
 
 
 def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(

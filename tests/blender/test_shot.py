@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +16,7 @@ pytest.importorskip("mitsuba_oidn")
 from xrds_blender import run_job
 from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
-from xrds_blender.cycles import session
 from xrds_blender.cycles.settings import has_subsets
-from xrds_blender.frame import progress
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.shot import shot
@@ -240,7 +239,7 @@ def test_an_animation_is_the_shot_of_the_command(animation: Any, blend: Path) ->
     "stage", ["Samples of frame 1", "Samples of frame 3", "Denoising"]
 )
 def test_a_stopped_frame_shows_itself(
-    animation: Any, blend: Path, monkeypatch: pytest.MonkeyPatch, stage: str
+    animation: Any, blend: Path, stopped_in: Callable[[str], None], stage: str
 ) -> None:
     """Denoised, whatever frame ahead was being sampled.
 
@@ -250,11 +249,7 @@ def test_a_stopped_frame_shows_itself(
         animation.camera.location.x = 0.4 * frame
         animation.camera.keyframe_insert("location", frame=frame)
     animation.frame_end = 3
-    with monkeypatch.context() as patch:
-        patch.setattr(
-            session, "is_stopped", lambda _: stage in (progress.current() or "")
-        )
-        bpy.ops.render.render(animation=True)
+    stopped_in(stage)
     path = blend.parent / "f12" / "1.exr"
     true = {}
     for number in (1, 3):

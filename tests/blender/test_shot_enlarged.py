@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,8 @@ torch = pytest.importorskip("torch")
 
 from xrds_blender import run_job
 from xrds_blender.command.render_file import render_file
-from xrds_blender.cycles import session
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.cycles.settings import has_subsets
-from xrds_blender.frame import progress
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import enlarged_finishing
 from xrds_core.errors import XRDSError
@@ -235,18 +234,14 @@ def test_an_enlarged_animation_is_the_shot_of_the_command(
     ["Low resolution of frame 1", "Guides of frame 1", "Guides of frame 3", "Network"],
 )
 def test_a_stopped_frame_shows_its_own_light(
-    animation: Any, moving: Path, monkeypatch: pytest.MonkeyPatch, stage: str
+    animation: Any, moving: Path, stopped_in: Callable[[str], None], stage: str
 ) -> None:
     """Enlarged without the network. Blender knows of no stop, so it saves the frame."""
     for frame in (1, 5):
         animation.camera.location.x = 0.5 * (frame - 3)
         animation.camera.keyframe_insert("location", frame=frame)
     animation.frame_end = 3
-    with monkeypatch.context() as patch:
-        patch.setattr(
-            session, "is_stopped", lambda _: stage in (progress.current() or "")
-        )
-        bpy.ops.render.render(animation=True)
+    stopped_in(stage)
     kept = layer(moving.parent / "f12" / "1.exr", "Combined")
     errors = []
     for number in (1, 3):

@@ -13,7 +13,6 @@ from xrds_core import guide_filter, guide_noise, weights
 from xrds_core.errors import UsageError, WeightsError
 from xrds_core.exr_upscale import upscale_file
 from xrds_core.guide_filter import FEW_SAMPLES, STRENGTH, GuideFilter, filter_guides
-from xrds_core.network import XRDS, preset_config
 from xrds_core.upscaler import Upscaler
 from xrds_core.weights import guide_filter_record, load_guide_filter, save_guide_filter
 
@@ -21,14 +20,6 @@ from xrds_core.weights import guide_filter_record, load_guide_filter, save_guide
 @pytest.fixture(scope="module")
 def shipped() -> GuideFilter:
     return load_guide_filter()
-
-
-@pytest.fixture(scope="module")
-def upscaler() -> Upscaler:
-    torch.manual_seed(3)
-    network = XRDS(preset_config("fast", 2))
-    torch.nn.init.normal_(network.tail.predict.weight, std=0.1)
-    return Upscaler("fast", 2, device="cpu", weights=network)
 
 
 def random_guides(height: int, width: int, seed: int = 0) -> torch.Tensor:

@@ -4,27 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-import torch
 
 from xrds_core import guide_noise
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import Cancelled, UsageError
 from xrds_core.guide_filter import FEW_SAMPLES
 from xrds_core.guide_noise import NOISY_SAMPLES, remover
-from xrds_core.network import XRDS, preset_config
 from xrds_core.upscaler import Upscaler
 
 pytest.importorskip("mitsuba_oidn")
 SIDE = 96
 Guides = tuple[np.ndarray, np.ndarray]
-
-
-@pytest.fixture(scope="module")
-def upscaler() -> Upscaler:
-    torch.manual_seed(3)
-    network = XRDS(preset_config("fast", 2))
-    torch.nn.init.normal_(network.tail.predict.weight, std=0.1)
-    return Upscaler("fast", 2, device="cpu", weights=network)
 
 
 def guides(noise: float) -> Guides:

@@ -6,7 +6,7 @@ from typing import Any
 
 from xrds_core.version import package_version
 
-from ..planning.plan import Decision
+from ..planning.plan import GUIDE_CACHE, Decision
 from .job import Picture, RenderJob
 
 PREFIX = "xrds"
@@ -89,7 +89,7 @@ def _decided(plan: tuple[Decision, ...], name: str) -> str | None:
 
 def _left_out(plan: tuple[Decision, ...]) -> list[str]:
     found = [_LEFT_OUT.get((each.decision, each.value)) for each in plan]
-    kept = _decided(plan, "guide cache") or ""
+    kept = _decided(plan, GUIDE_CACHE) or ""
     if kept.startswith("used"):
         found.append("guides, kept from before")
     return [words for words in found if words]

@@ -24,7 +24,7 @@ from ..frame.guide_cache import GuideName
 from ..frame.guides import GuideSource
 from ..frame.job import RenderJob
 from ..frame.stopping import keep_low_samples
-from ..planning.plan import Decision, Facts, Plan
+from ..planning.plan import GUIDE_CACHE, Decision, Facts, Plan
 from ..scene.facts import shapes_move
 from .sampling import Sampled, Sampling, light_of, sampling_of
 
@@ -32,7 +32,7 @@ _OF_OTHERS = Decision(
     "guides", "of the frames beside", "only the camera moves: they show the same"
 )
 _NOT_KEPT = Decision(
-    "guide cache", "off", "the camera moves: no frame has the guides of another"
+    GUIDE_CACHE, "off", "the camera moves: no frame has the guides of another"
 )
 
 

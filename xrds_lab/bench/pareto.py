@@ -78,10 +78,19 @@ def better(a: Point, b: Point, measure: str = "psnr") -> bool:
     return bool(a[measure] < b[measure])
 
 
-def frontier(points: Iterable[Point], measure: str = "psnr") -> list[Point]:
-    """Points that no other beats in both seconds and error, by rising seconds."""
+def seconds_of(point: Point) -> float:
+    """Seconds of a whole frame."""
+    return float(point["seconds"]["total"])
+
+
+def frontier(
+    points: Iterable[Point],
+    measure: str = "psnr",
+    price: Callable[[Point], float] = seconds_of,
+) -> list[Point]:
+    """Points that no other beats in both price and error, by rising price."""
     line: list[Point] = []
-    for point in sorted(points, key=lambda p: (p["seconds"]["total"], -p["psnr"])):
+    for point in sorted(points, key=lambda p: (price(p), -p["psnr"])):
         if not line or better(point, line[-1], measure):
             line.append(point)
     return line

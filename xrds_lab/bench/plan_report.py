@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_blender.planning.plan import SAVINGS
+from xrds_blender.planning.plan import GUIDE_CACHE, SAVINGS
 from xrds_core import metrics
 from xrds_core.atomic import read_json, replacing, write_json
 from xrds_core.children import run_python
@@ -248,7 +248,7 @@ def _decided(record: dict[str, Any]) -> dict[str, str]:
 
 def _by_decision(records: Sequence[dict[str, Any]]) -> list[str]:
     """What each way of rendering guides saved of their seconds."""
-    names = ("guide samples", "guide bounces", "guide lights", "guide cache")
+    names = ("guide samples", "guide bounces", "guide lights", GUIDE_CACHE)
     groups: dict[tuple[str, ...], list[dict[str, Any]]] = {}
     for record in records:
         decisions = _decided(record)

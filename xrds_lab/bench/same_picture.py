@@ -40,7 +40,8 @@ def entries(
         own = pareto.best_within(groups.get(OURS, []), budget * unit)
         if own is None or not rivals:
             continue
-        seconds, needed = _seconds(own), least(rivals, own["psnr"], _seconds)
+        seconds = pareto.seconds_of(own)
+        needed = least(rivals, own["psnr"], pareto.seconds_of)
         found.append(
             {
                 "scene": scene,
@@ -64,10 +65,7 @@ def least(
 
     Between points PSNR is linear in the logarithm of the price, as in `pareto.at`.
     """
-    line: list[Point] = []
-    for point in sorted(points, key=lambda p: (price(p), -p["psnr"])):
-        if not line or point["psnr"] > line[-1]["psnr"]:
-            line.append(point)
+    line = pareto.frontier(points, price=price)
     if line and line[0]["psnr"] >= psnr:
         return price(line[0])
     for low, high in pairwise(line):
@@ -87,7 +85,3 @@ def samples(point: Point) -> float:
 def in_order(found: Sequence[Entry]) -> list[Entry]:
     """Where XRDS loses most first; what Cycles never reaches last."""
     return sorted(found, key=lambda e: math.inf if e["gain"] is None else e["gain"])
-
-
-def _seconds(point: Point) -> float:
-    return float(point["seconds"]["total"])

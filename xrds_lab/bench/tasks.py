@@ -9,7 +9,7 @@ import numpy as np
 
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
-from xrds_blender.planning.plan import savings_but
+from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
 
 from .inputs import Request, open_scene, sample_adaptively
 from .rivals import ENLARGEMENTS
@@ -94,7 +94,7 @@ def frame(
     if not job.is_picked and job.is_enlarged:
         load_upscaler(job)
     pictures: list[Picture] = []
-    choices = vars(job) | {"savings": savings_but("guide cache")}
+    choices = vars(job) | {"savings": savings_but(GUIDE_CACHE)}
     run = clocked(lambda: pictures.append(render(scene, **choices)))
     stages = {k: s for k, s in pictures[0].seconds.items() if k != "total"}
     other = run["seconds"] - sum(stages.values())

@@ -11,7 +11,7 @@ import numpy as np
 from xrds_blender import render
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
-from xrds_blender.planning.plan import savings_but
+from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
 from xrds_blender.shot.shot import render_shot
 
 from .scene import MIDDLE, SHOT
@@ -58,7 +58,7 @@ ENLARGED = Way(
     "xrds_x2",
     "XRDS, super-resolution x2",
     # every picture is to pay for its own guides
-    RenderJob(scale=2, guide_samples=1, savings=savings_but("guide cache")),
+    RenderJob(scale=2, guide_samples=1, savings=savings_but(GUIDE_CACHE)),
     trials=(4, 16),
     where=" at half size",
 )

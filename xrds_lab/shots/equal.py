@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
+from ..bench.same_picture import in_order
 from ..bench.sweep import Config
 from .figures import DEFAULT, REACH, XRDS
 
@@ -95,7 +96,7 @@ def with_seconds(
         gain = needed / seconds if needed and seconds else None
         timed = {"seconds": seconds, "cycles_seconds": needed, "gain": gain}
         found.append(dict(entry) | timed)
-    return sorted(found, key=lambda e: math.inf if e["gain"] is None else e["gain"])
+    return in_order(found)
 
 
 def seconds_for(samples: float | None, known: Mapping[int, float]) -> float | None:
