@@ -6,7 +6,10 @@ from math import tan
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 from shots import (
+    CARD,
     FOCUS,
     HEIGHT,
     PIXEL,
@@ -20,7 +23,15 @@ from shots import (
 )
 
 from xrds_core.temporal.frame import store
-from xrds_core.temporal.motion import Places, carry, grid, pair, passage, places
+from xrds_core.temporal.motion import (
+    Places,
+    carry,
+    grid,
+    pair,
+    passage,
+    places,
+    still_places,
+)
 
 CAMERAS = [
     camera(x=0.37),
@@ -98,6 +109,36 @@ def test_edges_keep_both_sides_that_move_alike() -> None:
     result = found(here, there)
     other = there.name.ravel()[result.pixel] != here.name.ravel()
     assert (other & result.seen).sum() > 5
+
+
+@pytest.mark.parametrize(
+    ("eye", "card_z", "more"),
+    [
+        (camera(x=6 * 5 * PIXEL), -5.0, 0.3),  # the card moves 6 pixels, the wall 3
+        (camera(x=3 * 10 * PIXEL), -9.9, 0.0),  # both 3: their mixture moves with them
+        (camera(yaw=0.1), -5.0, 0.0),  # a turning camera moves all alike
+    ],
+)
+def test_pixels_beside_a_nearer_thing_that_moves_otherwise_count_as_farther(
+    eye: Camera, card_z: float, more: float
+) -> None:
+    world = World(card=(0.0, 0.0), card_z=card_z)
+    here, there = view(0, camera(), world), view(1, eye, world)
+    two = pair(store(here.frame), store(there.frame))
+    own = grid(two.here.shape)
+    result, (plain, _) = places(two, own), still_places(two, own)
+    mixed = beside_card(here).ravel() | beside_card(there).ravel()[result.pixel]
+    mixed &= result.seen
+    assert mixed.sum() > 40
+    added = result.apart - plain.apart
+    assert added[mixed] == pytest.approx(more, abs=0.01)
+    assert not added[~mixed].any()
+
+
+def beside_card(seen: View) -> NDArray[np.bool_]:
+    """Pixels that show no card but have it among the eight around them."""
+    card = np.pad(seen.name == CARD, 1)
+    return sliding_window_view(card, (3, 3)).any((2, 3)) & ~card[1:-1, 1:-1]
 
 
 def test_sky_turns_with_the_camera_alone() -> None:

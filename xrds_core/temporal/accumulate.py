@@ -37,7 +37,9 @@ if TYPE_CHECKING:
 # per pixel; it falls with their cube root. Noise asks for a wide one, texture for a
 # narrow one: 0.7 and 0.6 were best at 1 and 2 samples, 0.2 to 0.3 at 16.
 _SOFTNESS = 0.7
-_ROWS = 48  # at a time: their arrays stay in a processor's cache
+_ROWS = 64  # at a time: their arrays stay in a processor's cache
+# Every half float, by its bits.
+_HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -276,6 +278,9 @@ def _axes(camera: Camera) -> Matrix:
 
 
 def _floats(x: NDArray[Any]) -> Array:
+    """Return `x` in float32; half floats from a table, in half of NumPy's time."""
+    if x.dtype == np.float16:
+        return np.asarray(_HALVES.take(np.ascontiguousarray(x).view(np.uint16)))
     return x.astype(np.float32, copy=False)
 
 

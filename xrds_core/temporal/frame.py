@@ -9,11 +9,13 @@ lies at (0.5, 0.5); y grows downwards.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import PictureError
+from .neighbours import extreme
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,6 +29,8 @@ if TYPE_CHECKING:
 # Blender writes 1e10 where no ray hits anything.
 SKY_DEPTH = 1e9
 LARGEST_HALF = 65504.0
+# Share of itself by which nearness differs between neighbours on one surface.
+_SURFACE = 0.02
 _PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
 _OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "index": ()}
 
@@ -177,6 +181,19 @@ class Stored:
     def has_light(self) -> bool:
         """Whether there is radiance before albedo and normal."""
         return self.picture.shape[1] >= 9
+
+    @property
+    def nearer(self) -> np.ufunc:
+        """Which of two values of `nearness` is that of the nearer surface."""
+        return np.fmin if self.camera.orthographic else np.fmax
+
+    @cached_property
+    def rims(self) -> NDArray[np.bool_]:
+        """(H W): pixels beside something nearer, whose light they hold, too."""
+        nearest = extreme(self.nearness.reshape(self.shape), self.nearer).ravel()
+        with np.errstate(invalid="ignore"):  # infinite where a depth is denormal
+            apart = np.abs(nearest - self.nearness)
+        return apart > _SURFACE * np.abs(self.nearness)
 
     @property
     def is_empty(self) -> bool:

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .frame import Camera, Stored
-from .motion import carry, extreme, grid, nearest, passage
+from .motion import carry, grid, nearest, passage
+from .neighbours import extreme
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

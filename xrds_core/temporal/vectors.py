@@ -17,12 +17,12 @@ from .motion import (
     Detour,
     carry,
     centres,
-    extreme,
     grid,
     known,
     nearest,
     passage,
 )
+from .neighbours import extreme
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
