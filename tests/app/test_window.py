@@ -49,6 +49,17 @@ def finished(window: Window, patience: float = 600.0) -> list[str]:
     return window.ask("[e[0] for e in EVENTS]")
 
 
+def leave_picture(window: Window) -> None:
+    """Turn the editor that showed a render into the 3D viewport it was."""
+    window.ask(
+        """
+for area in window.screen.areas:
+    if area.type == 'IMAGE_EDITOR':
+        area.type = 'VIEW_3D'
+"""
+    )
+
+
 def picture_of(path: Path) -> np.ndarray:
     """An image file, (height, width, 3), from 0 to 255."""
     image = pytest.importorskip("PIL.Image")
@@ -115,13 +126,7 @@ render.resolution_x, render.resolution_y = 320, 180
     window.move(400, 620)  # Blender draws what the pointer goes over
     window.settle()
     window.shot("05_picture")
-    window.ask(
-        """
-for area in window.screen.areas:
-    if area.type == 'IMAGE_EDITOR':
-        area.type = 'VIEW_3D'
-"""
-    )
+    leave_picture(window)
     picture = result(window, "first.png")
     assert picture.shape == (180, 320, 3)
     parts = [half for row in np.split(picture, 2) for half in np.split(row, 2, axis=1)]
@@ -215,14 +220,8 @@ bpy.data.scenes[0].cycles.use_adaptive_sampling = False
     window.move(400, 600)
     window.settle()
     kept = brightness(window.shot(f"10_kept_{way}"))
-    window.ask(
-        """
-for area in window.screen.areas:
-    if area.type == 'IMAGE_EDITOR':
-        area.type = 'VIEW_3D'
-bpy.data.scenes[0].xrds.way = 'full_size'
-"""
-    )
+    leave_picture(window)
+    window.ask("bpy.data.scenes[0].xrds.way = 'full_size'")
     for picture in (seen, kept):  # the cube's sides differ, and fill the middle
         assert picture.std() > 10.0
         assert picture.max() > 100.0
@@ -297,13 +296,7 @@ progress and 'frame 2' in (progress.current() or '')
     window.move(400, 600)
     window.settle()
     window.shot("10_stopped_animation")
-    window.ask(
-        """
-for area in window.screen.areas:
-    if area.type == 'IMAGE_EDITOR':
-        area.type = 'VIEW_3D'
-"""
-    )
+    leave_picture(window)
 
 
 def test_the_compositors_result_is_saved(window: Window) -> None:

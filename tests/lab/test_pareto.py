@@ -212,6 +212,15 @@ def test_adaptive_sampling_costs_what_its_own_frames_took(tmp_path: Path) -> Non
     assert (cost.cpu_seconds, cost.peak_memory) == (15.0, 70)
 
 
+def test_a_coarse_sweep_leaves_out_super_resolution_alone() -> None:
+    networks = tuple(Network("fast", scale, "fast") for scale in (2, 4, 8))
+    whole = Sweep(networks)
+    every, kept = (set(x.configurations()) for x in (whole, whole.coarser()))
+    assert kept < every
+    assert len(kept) < len(every) / 2
+    assert {c.scale for c in every - kept} == {c.scale for c in kept} - {1}
+
+
 def test_adaptive_sampling_is_a_rival_of_its_own() -> None:
     found = Sweep((NETWORK,), noise_thresholds=(0.1, 0.3)).configurations()
     rivals = [c for c in found if c.method == "oidn_adaptive"]

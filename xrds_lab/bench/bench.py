@@ -50,6 +50,7 @@ def bench(
     picker: bool = True,
     growth: Sequence[tuple[int, int]] = (),
     noise_thresholds: Sequence[float] = NOISE_THRESHOLDS,
+    coarse: bool = False,
     model: Path | None = None,
     weights: Path | None = None,
     device: str = "auto",
@@ -63,8 +64,9 @@ def bench(
     mean of two renders of `reference_samples` each. `resolution` replaces the
     files' own. `presets` None takes all whose weights are there. Without `timing`
     only errors are measured. `growth` are frame sizes at which the first scene is
-    timed beside. `noise_thresholds` are of Cycles' adaptive sampling. `model` is where
-    to write the picker's model.
+    timed beside. `noise_thresholds` are of Cycles' adaptive sampling. `coarse` leaves
+    out what full size beats on every scene. `model` is where to write the picker's
+    model. `sweep` replaces what `presets`, `noise_thresholds` and `coarse` ask for.
     Raises UsageError for missing files and unknown names, before anything is rendered.
     """
     out.mkdir(parents=True, exist_ok=True)
@@ -72,8 +74,7 @@ def bench(
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal.json", report_line)
     chosen = Settings(
-        sweep
-        or Sweep(_chosen(networks, presets), noise_thresholds=tuple(noise_thresholds)),
+        sweep or _sweep(_chosen(networks, presets), noise_thresholds, coarse),
         folder,
         networks,
         journal,
@@ -116,6 +117,13 @@ def _measured(
     finally:
         meter.close()
     return results
+
+
+def _sweep(
+    networks: tuple[Network, ...], noise_thresholds: Sequence[float], coarse: bool
+) -> Sweep:
+    whole = Sweep(networks, noise_thresholds=tuple(noise_thresholds))
+    return whole.coarser() if coarse else whole
 
 
 def _chosen(networks: Networks, presets: Sequence[str] | None) -> tuple[Network, ...]:

@@ -165,6 +165,7 @@ class SceneBench:
             self._stopwatch.measure(
                 rounds, lambda n: meter.done(seconds[n], f"{self.name}: {n}")
             )
+            del self._stopwatch  # the denoisers that it timed hold gigabytes
         self._render(self.configs, meter)
         self._compare(meter)
         if self.settings.timing:

@@ -20,10 +20,11 @@ from .inputs import OFF, Mode, Request
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-PLAIN_SAMPLES = (1, 2, 4, 8, 16, 32, 64)
+# Fine steps: what is quicker takes more samples, and a budget must show it.
+PLAIN_SAMPLES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 # Every mode of the denoiser is tried on few samples; on many only those that can
 # still win: there the denoiser's own seconds count for little.
-FEW_SAMPLES = 4
+FEW_SAMPLES = 8
 DENOISERS = CYCLES_DENOISERS
 MANY_DENOISERS = (Denoiser.HIGH_ACCURATE, Denoiser.HIGH_FAST)
 LOW_SAMPLES = {
@@ -31,6 +32,9 @@ LOW_SAMPLES = {
     4: (4, 8, 16, 32, 64, 128),
     8: (16, 32, 64, 128, 256),
 }
+# Enough where super-resolution wins: with more of either, full size does.
+COARSE_LOW_SAMPLES = {2: (2, 4, 8), 4: (8, 16), 8: (32,)}
+COARSE_GUIDE_SAMPLES = (1, 2)
 NOISE_THRESHOLDS = (0.01, 0.03, 0.1, 0.3)
 MOST_ADAPTIVE_SAMPLES = 64
 GUIDE_SAMPLES = (1, 2, 4, 8, 16)
@@ -137,6 +141,15 @@ class Sweep:
     full_samples: tuple[int, ...] = FULL_SAMPLES
     noise_thresholds: tuple[float, ...] = ()
     """Of Cycles' adaptive sampling; each is timed as whole frames of its own."""
+
+    def coarser(self) -> Sweep:
+        """Return the sweep with few samples for super-resolution alone."""
+        return replace(
+            self,
+            low_samples=COARSE_LOW_SAMPLES,
+            guide_samples=COARSE_GUIDE_SAMPLES,
+            full_samples=FULL_SAMPLES[:1],
+        )
 
     @property
     def scales(self) -> list[int]:

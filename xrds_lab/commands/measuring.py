@@ -207,6 +207,11 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         action="store_true",
         help="leave out Cycles' adaptive sampling, whose frames take long to time",
     )
+    add(
+        "--coarse",
+        action="store_true",
+        help="few samples for super-resolution: a third of the time",
+    )
     add("--model", type=Path, help="where to write what --time-budget goes by")
     add("--device", default="auto", help=DEVICE_HELP)
     add("--weights", type=Path, help="folder of weights files")
@@ -268,6 +273,7 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         picker=not options.errors_only,
         growth=options.growth,
         noise_thresholds=() if options.no_adaptive else NOISE_THRESHOLDS,
+        coarse=options.coarse,
         model=options.model,
         weights=options.weights,
         device=options.device,
