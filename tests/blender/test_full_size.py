@@ -46,6 +46,19 @@ def test_the_picture_is_cycles_samples_denoised(life: Any) -> None:
     assert [d.value for d in picture.plan[:2]] == ["full size", "high"]
 
 
+@pytest.mark.skipif(bpy.app.version < (4, 3), reason="Cycles has no blue noise")
+@pytest.mark.parametrize("choices", [{"scale": 1}, {"scale": 2}, {"plain": True}])
+def test_files_with_the_classic_pattern_get_blue_noise_unless_plain(
+    life: Any, choices: dict[str, Any]
+) -> None:
+    made = []
+    for pattern in ("AUTOMATIC", "TABULATED_SOBOL"):
+        life.cycles.sampling_pattern = pattern
+        made.append(render(life, seed=3, **choices).radiance)
+        assert life.cycles.sampling_pattern == pattern
+    assert np.array_equal(*made) is ("plain" not in choices)
+
+
 @pytest.mark.parametrize("quality", ["best", "balanced", "fast"])
 def test_qualities_differ(life: Any, quality: str) -> None:
     high = render(life, 1, seed=3).radiance

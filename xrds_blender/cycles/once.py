@@ -11,7 +11,7 @@ from . import live, session, spare_passes
 from .borrowed import Borrowed
 from .clock import StageClock
 from .pass_names import GUIDE_PASSES
-from .settings import set_denoising, set_samples
+from .settings import set_blue_noise, set_denoising, set_samples
 
 
 def render_once(
@@ -27,7 +27,8 @@ def render_once(
     """Render into the engine's result, exactly as Cycles' own engine would.
 
     `samples`, `seed` and `denoiser` None leave the scene's own. `noisy` switches
-    Cycles' denoiser off and adds the passes that guide another one. `portion` is of a
+    Cycles' denoiser off, adds the passes that guide another one, and takes samples by
+    the pattern that suits it. `portion` is of a
     longer sequence, in the place of samples and seed. Raises Cancelled when the user
     stops it.
     """
@@ -39,6 +40,7 @@ def render_once(
     with Borrowed() as borrowed:
         set_samples(borrowed, scene, samples, seed, portion)
         if noisy:
+            set_blue_noise(borrowed, scene)
             set_denoising(borrowed, scene, layer, False)
         elif denoiser is not None and session.has_denoiser():
             set_denoising(borrowed, scene, layer, True, denoiser)

@@ -24,7 +24,13 @@ from .low_samples import LowPlace, LowSamples
 from .pass_names import ALBEDO, DEPTH, NOISY, NORMAL
 from .rendered import Beauty, Guides, InProcess, Probe
 from .samples import read_samples
-from .settings import set_denoising, set_repeatable, set_samples, set_sampling
+from .settings import (
+    set_blue_noise,
+    set_denoising,
+    set_repeatable,
+    set_samples,
+    set_sampling,
+)
 
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
@@ -82,6 +88,8 @@ class CyclesPasses(LayerSession):
         grid = self._grid(scale)
         with Borrowed() as borrowed:
             set_sampling(borrowed, self._scene, samples, seed)
+            if scale > 1:
+                set_blue_noise(borrowed, self._scene)
             set_denoising(borrowed, self._scene, self._layer_eval, denoise, denoiser)
             live.samples(scale)
             clock = self._run_low(borrowed, grid)
@@ -106,6 +114,7 @@ class CyclesPasses(LayerSession):
         grid = self._grid(scale)
         with Borrowed() as borrowed:
             set_samples(borrowed, self._scene, samples, seed, portion)
+            set_blue_noise(borrowed, self._scene)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             live.samples(scale)
             clock = self._run_low(borrowed, grid)
@@ -175,6 +184,7 @@ class CyclesPasses(LayerSession):
         settings = nullcontext() if full else guide_settings(self._depsgraph, how)
         with Borrowed() as borrowed, settings:
             set_samples(borrowed, self._scene, samples, seed, portion)
+            set_blue_noise(borrowed, self._scene)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             live.guides()
             clock = self._run((self.width, self.height), self.region, exact=full)

@@ -70,6 +70,18 @@ def has_subsets(scene: Any) -> bool:
     return hasattr(scene.cycles, "use_sample_subset")
 
 
+def set_blue_noise(borrowed: Borrowed, scene: Any) -> None:
+    """Spread the noise so that a denoiser leaves least of it, where Cycles can.
+
+    Blender does so by default from 4.3 on, but leaves files of older versions with the
+    classic pattern, which costs 0.1 to 1 dB after denoising at 8 samples or less.
+    """
+    import bpy
+
+    if bpy.app.version >= (4, 3):
+        borrowed.set(scene.cycles, sampling_pattern="AUTOMATIC")
+
+
 def set_denoising(
     borrowed: Borrowed,
     scene: Any,

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 Arrays = dict[str, Array]
 # Counts up whenever the pass code changes what it renders: old files are then left.
-GENERATION = 2
+GENERATION = 3
 OFF: Literal["OFF"] = "OFF"
 """In place of a denoiser's mode: the picture as rendered."""
 Mode = Denoiser | Literal["OFF"]

@@ -18,7 +18,7 @@ from xrds_core.atomic import replacing
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError
 
-from .inputs import Folder, Request, open_scene, sample_adaptively
+from .inputs import GENERATION, Folder, Request, open_scene, sample_adaptively
 from .journal import Strict
 from .rivals import ENLARGEMENTS
 
@@ -197,9 +197,10 @@ class Pictures:
         return self._key(config) in self._errors
 
     def _key(self, config: Config) -> str:
+        key = f"{config.key}-v{GENERATION}"
         if config.method != "xrds":
-            return config.key
-        key = f"{config.key}-{self.networks.digest(config.network)}"
+            return key
+        key += f"-{self.networks.digest(config.network)}"
         if config.has_noisy_guides:
             key += f"-{self.networks.filter_digest}"
         if config.denoises_guides:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..bench.journal import Journal
     from ..bench.windows import Shot
 
-GENERATION = 1  # counts up whenever the same request is rendered otherwise
+GENERATION = 2  # counts up whenever the same request is rendered otherwise
 MIDDLE = 9
 """The number of the frame that shows the file's own view."""
 REACH = 4
