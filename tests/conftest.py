@@ -72,6 +72,8 @@ def new_scene(width: int, height: int, samples: int) -> Any:
     scene.cycles.samples = samples
     scene.cycles.use_denoising = False
     scene.cycles.device = "CPU"
+    if bpy.app.version >= (4, 3):  # 5.0's startup file holds the classic pattern
+        scene.cycles.sampling_pattern = "AUTOMATIC"  # as XRDS samples
     scene.world = bpy.data.worlds.new("World")
     if not scene.world.node_tree:
         scene.world.use_nodes = True
