@@ -75,8 +75,8 @@ _DENOISE = [
     (
         "best",
         "Best",
-        "Two pictures like High are made and mixed. A little less noise where there "
-        "are one or two samples; takes as long as Blender's own denoiser",
+        "Two pictures like High are made and mixed, with finer texture. The least "
+        "noise; takes a little longer than Blender's own denoiser",
     ),
     (
         "high",
