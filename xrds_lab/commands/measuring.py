@@ -208,6 +208,11 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         help="leave out Cycles' adaptive sampling, whose frames take long to time",
     )
     add(
+        "--no-picker",
+        action="store_true",
+        help="leave out whole frames by --time-budget, one for each budget",
+    )
+    add(
         "--coarse",
         action="store_true",
         help="few samples for super-resolution: a third of the time",
@@ -270,7 +275,7 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         presets=options.preset,
         rounds=options.rounds,
         timing=not options.errors_only,
-        picker=not options.errors_only,
+        picker=not (options.errors_only or options.no_picker),
         growth=options.growth,
         noise_thresholds=() if options.no_adaptive else NOISE_THRESHOLDS,
         coarse=options.coarse,
