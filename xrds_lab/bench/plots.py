@@ -160,6 +160,8 @@ def _draw(panel: Any, name: str, line: Line, marks: bool = False) -> None:
 
 
 def _svg(figure: Any, panels: Any, outside: bool = False) -> bytes:
+    from matplotlib import rc_context
+
     if outside:
         handles, labels = panels[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=7,
@@ -167,5 +169,6 @@ def _svg(figure: Any, panels: Any, outside: bool = False) -> bytes:
     else:
         panels[0].legend(fontsize=7, frameon=False)
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None})
+    with rc_context({"svg.hashsalt": "xrds"}):  # the same file for the same figures
+        figure.savefig(buffer, format="svg", metadata={"Date": None})
     return buffer.getvalue()
