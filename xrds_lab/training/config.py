@@ -19,6 +19,7 @@ from xrds_core.network import NetworkConfig, preset_config
 
 from .data import Variation
 from .losses import LOSSES
+from .rivals import RIVALS
 
 _LEAST = {
     "scale": 1,
@@ -29,6 +30,7 @@ _LEAST = {
     "warmup": 0,
     "validate_every": 1,
     "validation_windows": 1,
+    "workers": 1,
 }
 
 
@@ -43,6 +45,8 @@ class TrainingConfig:
     guides: str = "fast"
     network: dict[str, Any] = field(default_factory=dict)
     """Changes to the preset's `NetworkConfig`."""
+    rival: str = ""
+    """One of `rivals.RIVALS`, trained in the preset's place for comparison."""
     start: str = ""
     """Weights file to start from: tensors of the same name and shape are taken."""
     seed: int = 0
@@ -68,6 +72,8 @@ class TrainingConfig:
     """Of the layers: `fp32`, `bf16`, or `auto`, bf16 where a GPU is fast with it."""
     validate_every: int = 1000
     validation_windows: int = 24
+    workers: int = 1
+    """Processes that draw crops: 1 keeps up with a CPU, 8 with a fast GPU."""
     cache_gigabytes: float = 8.0
     """Memory for windows; those beyond it are read from disk each time."""
     variation: Variation = field(default_factory=Variation)
@@ -76,6 +82,8 @@ class TrainingConfig:
         unknown = set(self.loss) - set(LOSSES)
         if unknown:
             raise UsageError(f"loss {sorted(unknown)} is none of {sorted(LOSSES)}")
+        if self.rival and self.rival not in RIVALS:
+            raise UsageError(f"rival {self.rival!r} is none of {sorted(RIVALS)}")
         for name, least in _LEAST.items():
             if getattr(self, name) < least:
                 raise UsageError(f"{name} is {getattr(self, name)}, less than {least}")

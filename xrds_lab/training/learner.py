@@ -18,8 +18,27 @@ from .config import TrainingConfig
 from .crop import Batch
 from .losses import weighted
 from .processes import Processes
+from .rivals import build_rival
 
 AVERAGE_WARMUP = 10  # steps: a young average follows the weights closely
+
+
+def build_network(config: TrainingConfig) -> torch.nn.Module:
+    """The network that a configuration trains, untrained."""
+    if config.rival:
+        return build_rival(config.rival, config.scale)
+    return XRDS(config.network_config)
+
+
+class Recorded(torch.nn.Module):
+    """What is replayed; the network itself stays free for pictures of other sizes."""
+
+    def __init__(self, network: torch.nn.Module) -> None:
+        super().__init__()
+        self.network = network
+
+    def forward(self, *inputs: Tensor) -> Tensor:
+        return self.network(*inputs)
 
 
 class Learner:
@@ -29,9 +48,13 @@ class Learner:
         self.config, self.device = config, processes.device
         self.precision = choose_precision(config.precision, self.device)
         torch.manual_seed(config.seed)
-        self.network = XRDS(config.network_config).to(self.device)
+        network = build_network(config).to(self.device)
+        if self.device.type == "cuda":  # tensor cores take channels last
+            network = network.to(memory_format=torch.channels_last)
+        self.network = network
         self.average = self._copy()
         self.shared = processes.wrap(self.network)
+        self.recorded: torch.nn.Module | None = None
         self.optimizer = torch.optim.Adam(
             self.network.parameters(), config.learning_rate, config.betas
         )
@@ -48,7 +71,7 @@ class Learner:
         """Take one step, the `step`-th from 0; returns the loss before it."""
         for group in self.optimizer.param_groups:
             group["lr"] = self.config.learning_rate_at(step)
-        output = self.forward(batch, self.shared)
+        output = self.forward(batch, self._learning(batch))
         reference = batch.reference.to(self.device)
         loss = weighted(self.config.loss, output, reference)
         self.optimizer.zero_grad(set_to_none=True)
@@ -59,13 +82,37 @@ class Learner:
         self._follow(step + 1)
         return loss.item()
 
+    def _learning(self, batch: Batch) -> torch.nn.Module:
+        """The network as it learns from such a batch.
+
+        On a GPU the passes over whole crops are recorded once and then replayed: to
+        launch their thousands of small kernels takes three times as long as to run
+        them.
+        """
+        whole = batch.reference.shape[-1] == self.config.crop
+        if self.device.type != "cuda" or self.shared is not self.network or not whole:
+            return self.shared
+        if self.recorded is None:
+            like = batch.to(self.device)
+            inputs = like.radiance, like.guides, like.noisy
+            mixed = self.precision != torch.float32
+            # a cache of converted weights would be recorded, and never follow them
+            with torch.autocast("cuda", self.precision, mixed, cache_enabled=False):
+                recorded = torch.cuda.make_graphed_callables(
+                    Recorded(self.network), inputs
+                )
+            self.recorded = recorded
+        return self.recorded
+
     def _copy(self) -> dict[str, Tensor]:
         return {k: v.clone() for k, v in self.network.state_dict().items()}
 
     def _follow(self, steps: int) -> None:
         decay = min(self.config.average, steps / (steps + AVERAGE_WARMUP))
-        for name, value in self.network.state_dict().items():
-            self.average[name].lerp_(value, 1 - decay)
+        state = self.network.state_dict()
+        own = {name: x for name, x in state.items() if x.is_floating_point()}
+        average = [self.average[name] for name in own]
+        torch._foreach_lerp_(average, list(own.values()), 1 - decay)
 
     @contextmanager
     def averaged(self) -> Iterator[None]:
@@ -79,7 +126,9 @@ class Learner:
 
     def save_average(self, path: Path, record: dict[str, str]) -> None:
         """Write the averaged weights in half precision."""
-        network = XRDS(self.network.config)
+        if self.config.rival:
+            return  # a figure in a table, never a preset
+        network = XRDS(self.config.network_config)
         network.load_state_dict({k: v.cpu() for k, v in self.average.items()})
         weights.save(network, path, record)
 

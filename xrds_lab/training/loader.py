@@ -1,35 +1,76 @@
-"""The crops of a step, drawn by threads while the step before is computed."""
+"""The crops of the next steps, drawn by other processes while one is computed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+import itertools
+import signal
+from collections.abc import Callable, Iterable, Iterator
+
+import torch
+from torch.utils.data import DataLoader, Dataset
+
+from xrds_core.errors import XRDSError
 
 from .crop import Batch
 
-THREADS = 8  # drawing is NumPy, which mostly lets go of the interpreter
+STEPS_AHEAD = 2  # that each process draws
 
 
-class CropLoader:
-    """Draws `crop(step, place)` for every place of a batch, one step ahead."""
+class Steps(Dataset[Batch | XRDSError]):
+    """The batch of every step: `crop(step, place)` of all `places`."""
 
     def __init__(
         self, crop: Callable[[int, int], Batch], places: Iterable[int]
     ) -> None:
-        self._crop = crop
-        self._places = list(places)
-        self._pool = ThreadPoolExecutor(min(THREADS, len(self._places)))
-        self._ahead: tuple[int, list[Future[Batch]]] = (-1, [])
+        self._crop, self._places = crop, list(places)
+
+    def __getitem__(self, step: int) -> Batch | XRDSError:
+        try:
+            return Batch.stack([self._crop(step, place) for place in self._places])
+        except XRDSError as error:
+            return error  # the loader would bury it in a traceback of its process
+
+
+class CropLoader:
+    """Draws the batches of the steps that follow one another, in `workers` processes.
+
+    `crop` is pickled where processes do not begin as copies of this one.
+    """
+
+    def __init__(
+        self, crop: Callable[[int, int], Batch], places: Iterable[int], workers: int = 1
+    ) -> None:
+        self._steps, self._workers = Steps(crop, places), workers
+        self._next = -1
+        self._batches: Iterator[Batch | XRDSError] = iter(())
 
     def batch(self, step: int) -> Batch:
-        """The crops of this step; those of the next one are begun."""
-        drawn = self._begin(step) if self._ahead[0] != step else self._ahead[1]
-        self._ahead = (step + 1, self._begin(step + 1))
-        return Batch.stack([crop.result() for crop in drawn])
+        """The crops of this step; those of the next ones are begun."""
+        if step != self._next:
+            self._batches = self._begin(step)
+        self._next = step + 1
+        drawn = next(self._batches)
+        if isinstance(drawn, XRDSError):
+            raise drawn
+        return drawn
 
-    def _begin(self, step: int) -> list[Future[Batch]]:
-        return [self._pool.submit(self._crop, step, place) for place in self._places]
+    def _begin(self, step: int) -> Iterator[Batch | XRDSError]:
+        loader = DataLoader(
+            self._steps,
+            batch_size=None,  # a step is a batch already
+            sampler=itertools.count(step),
+            num_workers=self._workers,
+            prefetch_factor=STEPS_AHEAD,
+            worker_init_fn=_leave_interrupts,
+            generator=torch.Generator(),
+        )
+        return iter(loader)
 
     def close(self) -> None:
-        """Drop what was drawn ahead."""
-        self._pool.shutdown(cancel_futures=True)
+        """End the processes; what was drawn ahead is lost."""
+        self._batches, self._next = iter(()), -1
+
+
+def _leave_interrupts(_: int) -> None:
+    """Ctrl-C is for the process that trains."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)

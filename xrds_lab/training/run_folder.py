@@ -29,6 +29,7 @@ FREE = {
     "steps",
     "validate_every",
     "validation_windows",
+    "workers",
     "cache_gigabytes",
 }
 
@@ -84,7 +85,7 @@ class RunFolder:
         files = read_json(self.files)
         folders = [Path(folder) for folder in config.data]
         what = config.scale, config.guides
-        memory = config.cache_gigabytes * 1e9
+        memory = config.cache_gigabytes * 1e9 / (config.workers + 1)
         return {
             split: WindowSet(paths_of(folders, split, files[split]), *what, memory)
             for split in SPLITS

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -31,8 +31,25 @@ from .loader import CropLoader
 from .processes import Processes
 from .run_folder import RunFolder
 from .validation import Validation, in_order, summary
+from .windows import WindowSet
 
 MOST_PADDED = 0.25  # of a crop's side
+
+
+@dataclass(frozen=True)
+class Crops:
+    """Draws the crops of a run: each follows from the seed, the step and its place."""
+
+    config: TrainingConfig
+    windows: WindowSet
+
+    def __call__(self, step: int, place: int) -> Batch:
+        """One crop of a batch."""
+        c = self.config
+        random = np.random.default_rng((c.seed, step, place))
+        window = self.windows[int(random.integers(len(self.windows)))]
+        size = crop_size(c, step)
+        return draw(window, c.scale, c.guides, c.variation, random, size)
 
 
 class Run:
@@ -50,7 +67,8 @@ class Run:
             self.folder.begin(config)
         self.processes.gather(None)  # the others wait for the files
         self.windows = self.folder.open_windows(config)
-        self.loader = CropLoader(self.crop, places)
+        crops = Crops(config, self.windows["train"])
+        self.loader = CropLoader(crops, places, config.workers)
         shown = config.validation_windows, config.scale, config.guides
         self.validation = Validation(self.windows["validation"], *shown)
         self.step, self.validated = 0, -1
@@ -63,14 +81,6 @@ class Run:
                 self.resume(state)
 
     # --- steps ------------------------------------------------------------------------
-
-    def crop(self, step: int, place: int) -> Batch:
-        """One crop of a batch."""
-        c, windows = self.config, self.windows["train"]
-        random = np.random.default_rng((c.seed, step, place))
-        window = windows[int(random.integers(len(windows)))]
-        size = crop_size(c, step)
-        return draw(window, c.scale, c.guides, c.variation, random, size)
 
     def train_step(self, stop: Interruption | None = None) -> bool:
         """Learn from one batch; returns whether any process wishes to stop."""
