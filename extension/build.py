@@ -2,9 +2,9 @@
 
 Each holds a manifest, a root module and wheels. `light` zips render at full size: they
 hold the project's own wheel, Open Image Denoise and OpenEXR. `full` zips hold PyTorch's
-CPU build and safetensors beside these. The `bare` zip, one for all, holds the project's
-own wheel alone, for pipelines that bring the libraries. Blender's own `extension build`
-makes and checks them; it comes with the bpy module.
+CPU build and safetensors beside these, and the large network's weights. The `bare` zip,
+one for all, holds the own wheel alone, for pipelines that bring the libraries.
+Blender's own `extension build` makes and checks them; it comes with the bpy module.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ SIZE_LIMIT = 300_000_000  # bytes; what the extension platform means to take
 # Python inside Blender, and the Blenders that have it: from, to (not included).
 PYTHONS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
 LIGHT = ("mitsuba-oidn", "OpenEXR")
+LARGE = "paper_*.safetensors"  # 29 MB of weights, in `full` zips alone
 
 
 def build(
@@ -50,14 +51,17 @@ def build(
     return path
 
 
-def own_wheel(folder: Path) -> Path:
-    """Build a wheel of what renders, from a copy without the rest."""
+def own_wheel(folder: Path, *left_out: str) -> Path:
+    """Build a wheel of what renders, from a copy without the rest.
+
+    `left_out` are patterns of names.
+    """
     source = folder / "source"
-    source.mkdir()
+    source.mkdir(parents=True)
     for name in PROJECT_FILES:
         shutil.copy(ROOT / name, source)
     for name in PACKAGES:
-        ignored = shutil.ignore_patterns("__pycache__")
+        ignored = shutil.ignore_patterns("__pycache__", *left_out)
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
     options = ["--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]
     _run("-P", "-m", "pip", "wheel", *options, str(folder), str(source))
@@ -146,8 +150,9 @@ def main() -> None:
     if not options.any_blender and set(options.python) - set(PYTHONS):
         parser.error(f"Blenders have Python {', '.join(PYTHONS)}; see --any-blender")
     with tempfile.TemporaryDirectory() as folder:
-        own = own_wheel(Path(folder))
         for kind in options.kind:
+            left_out = () if kind == "full" else (LARGE,)
+            own = own_wheel(Path(folder) / kind, *left_out)
             if kind == "bare":
                 _print_size(build(options.out, kind, [own]))
             else:

@@ -171,7 +171,9 @@ def test_each_way_shows_its_own_settings(way: str, named: set[str]) -> None:
     told = set(drawn())
     assert named <= told
     assert "use_time_budget" not in told
-    assert not {"preset", "guides", "balanced", "paper", "full"} & told
+    presets = {"fast", "balanced", "paper"} if way == "x2" else set()
+    assert {"preset", "balanced", "paper"} & told == presets - {"fast"}
+    assert not {"guides", "full"} & told  # no weights
 
 
 def test_other_networks_are_offered_where_their_weights_are(
