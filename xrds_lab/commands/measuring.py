@@ -217,6 +217,11 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         action="store_true",
         help="few samples for super-resolution: a third of the time",
     )
+    add(
+        "--low-budgets",
+        action="store_true",
+        help="only a table of budgets below a sample per pixel, with one preset",
+    )
     add("--model", type=Path, help="where to write what --time-budget goes by")
     add("--device", default="auto", help=DEVICE_HELP)
     add("--weights", type=Path, help="folder of weights files")
@@ -260,6 +265,8 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("bench")
     if options.shots:
         return _bench_shots(options)
+    if options.low_budgets:
+        return _low_budgets(options)
     from ..bench.bench import bench
     from ..bench.sweep import NOISE_THRESHOLDS
 
@@ -280,6 +287,24 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         noise_thresholds=() if options.no_adaptive else NOISE_THRESHOLDS,
         coarse=options.coarse,
         model=options.model,
+        weights=options.weights,
+        device=options.device,
+    )
+
+
+def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
+    from ..bench.low_budgets import low_budgets
+
+    return low_budgets(
+        options.scenes,
+        options.out,
+        windows=options.windows,
+        references=options.references,
+        resolution=options.resolution,
+        cache=options.cache,
+        preset=(options.preset or ("fast",))[0],
+        rounds=options.rounds,
+        reference_samples=options.reference_samples,
         weights=options.weights,
         device=options.device,
     )
