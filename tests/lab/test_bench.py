@@ -15,11 +15,21 @@ import numpy as np
 import pytest
 
 from xrds_blender import run_job
+from xrds_blender.command import main
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import UsageError
-from xrds_lab.bench import growth, inputs, machine, measure, pictures, sweep, tasks
+from xrds_lab.bench import (
+    growth,
+    inputs,
+    low_budgets,
+    machine,
+    measure,
+    pictures,
+    sweep,
+    tasks,
+)
 from xrds_lab.bench.bench import bench
 from xrds_lab.bench.crops import SHOWN
 from xrds_lab.bench.stages import PLAIN_FRAME, STAGES
@@ -193,6 +203,41 @@ def test_one_bad_configuration_is_left_out_and_told(
     assert list(report["failures"].values()) == ["ValueError: no such picture"]
     assert {p["method"] for p in report["points"]} >= {"oidn", "xrds"}
     assert (world.folder / "out" / "report.html").is_file()
+
+
+@pytest.mark.timeout(300)
+def test_another_denoiser_is_measured_anew(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world.run(timing=False)
+    judged: list[float] = []
+    measured = pictures.measured
+    monkeypatch.setattr(
+        pictures, "measured", lambda *given: judged.append(1) or measured(*given)
+    )
+    world.run(timing=False)
+    assert not judged
+    monkeypatch.setattr(pictures, "_denoisers_code", lambda: "another")
+    report = world.run(timing=False)
+    ours = [p for p in report["points"] if p["method"] == "full_size"]
+    assert len(judged) == len(ours) > 0
+
+
+@pytest.mark.timeout(300)
+def test_budgets_below_a_sample_per_pixel(
+    world: World, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(low_budgets, "LOWERED", {4: (1, 4)})
+    monkeypatch.setattr(low_budgets, "ENLARGED", {2: (1,), 4: (1, 2), 8: (4,)})
+    out = world.folder / "low"
+    words = ["bench", str(world.scene), "--low-budgets", "--resolution", "64x48"]
+    words += ["--reference-samples", "2", "--rounds", "1", "--out", str(out)]
+    assert main.main(words) == 0
+    result = json.loads((out / "low_budgets.json").read_text())
+    assert result["failures"] == {}
+    assert {row["guides"] for row in result["rows"]} == {"rendered", "kept"}
+    lines = (out / "low_budgets.md").read_text().splitlines()
+    assert len(lines) == 2 + len(result["rows"])
 
 
 @pytest.mark.timeout(300)

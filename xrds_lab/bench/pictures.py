@@ -13,11 +13,12 @@ import numpy as np
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_blender.planning.denoiser import Denoiser as Mode
-from xrds_core import exr, front_end, metrics
+from xrds_core import denoising, exr, front_end, metrics
 from xrds_core.atomic import replacing
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError
 
+from ..checksum import checksum
 from .inputs import GENERATION, Folder, Request, open_scene, sample_adaptively
 from .journal import Strict
 from .rivals import ENLARGEMENTS
@@ -198,6 +199,8 @@ class Pictures:
 
     def _key(self, config: Config) -> str:
         key = f"{config.key}-v{GENERATION}"
+        if config.method == "full_size":
+            return f"{key}-{_denoisers_code()}"
         if config.method != "xrds":
             return key
         key += f"-{self.networks.digest(config.network)}"
@@ -253,6 +256,11 @@ def measured(picture: Array, reference: Array, stops: float) -> dict[str, float]
     if has_lpips():
         errors["lpips"] = metrics.lpips(picture, reference, stops)
     return errors
+
+
+@lru_cache(maxsize=1)
+def _denoisers_code() -> str:
+    return checksum(Path(denoising.__file__).parent.glob("*.py"))
 
 
 @lru_cache(maxsize=1)

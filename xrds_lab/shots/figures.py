@@ -5,7 +5,6 @@ Figures are kept in a file and hold as long as the code that they judge is the s
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from functools import lru_cache
@@ -24,6 +23,7 @@ from xrds_core.temporal.frame import Stored, store
 from xrds_core.temporal.moving import Movement
 from xrds_core.temporal.window import Shot
 
+from ..checksum import checksum
 from . import rivals
 from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
 from .motions import MOTIONS
@@ -236,10 +236,7 @@ def _code(is_ours: bool) -> str:
         parts = ("temporal", "denoising", "sequence")
         sources = [path for part in parts for path in package.glob(f"{part}/*.py")]
         sources.append(Path(finishing.__file__))
-    whole = hashlib.sha256(bytes([GENERATION]))
-    for path in sorted(sources):
-        whole.update(path.read_bytes())
-    return whole.hexdigest()[:12]
+    return checksum(sources, GENERATION)
 
 
 def _stored(path: Path) -> dict[str, Figures]:
