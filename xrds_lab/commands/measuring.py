@@ -192,7 +192,8 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     add(
         "--preset",
         type=arguments.names(PRESETS),
-        help="as fast,balanced; all with weights",
+        default=("fast",),
+        help="networks, as fast,balanced; fast",
     )
     add("--rounds", type=arguments.positive, default=3, help="runs of each timed stage")
     add("--errors-only", action="store_true", help="time nothing")
@@ -302,7 +303,7 @@ def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
         references=options.references,
         resolution=options.resolution,
         cache=options.cache,
-        preset=(options.preset or ("fast",))[0],
+        preset=options.preset[0],
         rounds=options.rounds,
         reference_samples=options.reference_samples,
         weights=options.weights,

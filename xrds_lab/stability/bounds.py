@@ -207,7 +207,7 @@ EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
         Exemption("balanced * bf16", 160, _SPOILT_FEATURES),
     ),
     "firefly.far_change": (
-        Exemption("fast *", 2.5e-2, _FAR_FEATURES),
+        Exemption("fast *", 3e-2, _FAR_FEATURES),
         Exemption("balanced *", 3e-2, _FAR_FEATURES),
     ),
     "firefly.light_beyond_two_pixels": (
