@@ -77,7 +77,7 @@ def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
     """Growth over a shot; only in fp32, for its network is the same for Blender."""
     if subject.precision != "fp32":
         return
-    from xrds_blender.command.console import stdout_to
+    from xrds_blender.command.streams import stdout_to
 
     from .stiff_scenes import build
 
