@@ -189,7 +189,7 @@ _PAPER = {
     "grey.chroma": 1.01,
     "colour.permutation": 3e-2,
     "firefly.far_change": 6e-2,
-    "firefly.light_beyond_two_pixels": 8e-2,
+    "firefly.light_beyond_two_pixels": 0.15,
     "invalid.reach": 1e5,
     "invalid.distance": 200,
     "guides.ring": 0.8,
