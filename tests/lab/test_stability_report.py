@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from xrds_core import weights
 from xrds_core.errors import UsageError
 from xrds_lab.stability import report, suite
 from xrds_lab.stability.measured import Measured
@@ -25,8 +27,13 @@ def uneven(subject: Subject) -> Iterator[Measured]:
 
 
 def measure(monkeypatch: pytest.MonkeyPatch, out: Path, *works: suite.Work) -> dict:
+    """Judge the small networks alone: every one of them is loaded each time."""
     monkeypatch.setattr(suite, "GROUPS", {"some": works})
-    return suite.stability(out, parts=["arrays"], device="cpu")
+    small = out / "small"
+    small.mkdir(exist_ok=True)
+    for path in weights.DIRECTORY.glob("fast_x*.safetensors"):
+        shutil.copy(path, small)
+    return suite.stability(out, parts=["arrays"], device="cpu", weights=small)
 
 
 def test_failures_come_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
