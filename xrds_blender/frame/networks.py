@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from xrds_core.errors import XRDSError
+from xrds_core.weights_header import headers
 
 from ..planning.budget import Network
 from . import torch_folder
@@ -36,16 +37,17 @@ def _load(
 
 
 def known_networks(job: RenderJob) -> list[Network]:
-    """Those whose weights are there; none for plain renders or without PyTorch."""
+    """Those whose weights are there; none for plain renders or without PyTorch.
+
+    By the files' headers alone: a budget has no seconds for the rest of them.
+    """
     if job.plain:
         return []
     try:
-        weights = torch_folder.load("weights")
+        torch_folder.load("weights")
     except XRDSError:
         return []
-    if job.weights is not None and not Path(job.weights).is_dir():
+    folder = None if job.weights is None else Path(job.weights)
+    if folder is not None and not folder.is_dir():
         return [Network(job.preset, job.scale, job.guides)]
-    return [
-        Network(record["preset"], record["scale"], record["guides"])
-        for record in weights.available(job.weights)
-    ]
+    return [Network(h.preset, h.scale, h.guides) for h in headers(folder)]
