@@ -3,8 +3,9 @@
 Each holds a manifest, a root module and wheels. `light` zips render at full size: they
 hold the project's own wheel, Open Image Denoise and OpenEXR. `full` zips hold PyTorch's
 CPU build and safetensors beside these, and the large network's weights. The `bare` zip,
-one for all, holds the own wheel alone, for pipelines that bring the libraries.
-Blender's own `extension build` makes and checks them; it comes with the bpy module.
+one for all, holds the project's own wheel alone, for pipelines that bring the
+libraries. Blender's own `extension build` makes and checks them; it comes with the bpy
+module.
 """
 
 from __future__ import annotations
@@ -150,9 +151,13 @@ def main() -> None:
     if not options.any_blender and set(options.python) - set(PYTHONS):
         parser.error(f"Blenders have Python {', '.join(PYTHONS)}; see --any-blender")
     with tempfile.TemporaryDirectory() as folder:
+        built: dict[bool, Path] = {}  # the own wheel, by whether it holds all weights
         for kind in options.kind:
-            left_out = () if kind == "full" else (LARGE,)
-            own = own_wheel(Path(folder) / kind, *left_out)
+            whole = kind == "full"
+            if whole not in built:
+                left_out = () if whole else (LARGE,)
+                built[whole] = own_wheel(Path(folder) / kind, *left_out)
+            own = built[whole]
             if kind == "bare":
                 _print_size(build(options.out, kind, [own]))
             else:

@@ -18,11 +18,14 @@ def means(weights: str | Path | None = None) -> Means:
         denoiser=denoisers.is_there(),
         cycles_denoiser=session.has_denoiser(),
         torch=torch_folder.is_there(),
-        networks=frozenset(
-            Network(each.preset, each.scale, each.guides)
-            for each in weights_headers(weights)
-        ),
+        networks=frozenset(networks_at_hand(weights)),
     )
+
+
+def networks_at_hand(weights: str | Path | None = None) -> list[Network]:
+    """Those whose weights are there."""
+    found = weights_headers(weights)
+    return [Network(each.preset, each.scale, each.guides) for each in found]
 
 
 def weights_headers(weights: str | Path | None = None) -> list[WeightsHeader]:

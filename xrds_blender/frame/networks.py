@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from xrds_core.errors import XRDSError
-from xrds_core.weights_header import headers
 
 from ..planning.budget import Network
 from . import torch_folder
 from .job import RenderJob
+from .means import networks_at_hand
 
 if TYPE_CHECKING:
     from xrds_core import Upscaler
@@ -47,7 +47,6 @@ def known_networks(job: RenderJob) -> list[Network]:
         torch_folder.load("weights")
     except XRDSError:
         return []
-    folder = None if job.weights is None else Path(job.weights)
-    if folder is not None and not folder.is_dir():
+    if job.weights is not None and not Path(job.weights).is_dir():
         return [Network(job.preset, job.scale, job.guides)]
-    return [Network(h.preset, h.scale, h.guides) for h in headers(folder)]
+    return networks_at_hand(job.weights)

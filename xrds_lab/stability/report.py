@@ -106,7 +106,7 @@ def _plots(folder: Path, curves: list[dict[str, Any]]) -> list[str]:
         drawn = [c for c in curves if c["name"] == name]
         if not drawn:
             continue
-        figure = Figure(figsize=(5, 3), layout="constrained")
+        figure = Figure(figsize=(8, 4), layout="constrained")
         axes = figure.subplots()
         for curve in drawn:
             points = curve["points"]
@@ -116,7 +116,7 @@ def _plots(folder: Path, curves: list[dict[str, Any]]) -> list[str]:
             axes.set_xscale("log")
         if "y" in logarithmic:
             axes.set_yscale("log")
-        axes.legend(fontsize="small")
+        figure.legend(fontsize="small", loc="outside right upper")
         names.append(f"{name.replace('.', '_')}.png")
         figure.savefig(folder / names[-1], dpi=80)
     return names

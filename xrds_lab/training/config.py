@@ -75,7 +75,7 @@ class TrainingConfig:
     workers: int = 1
     """Processes that draw crops: 1 keeps up with a CPU, 8 with a fast GPU."""
     cache_gigabytes: float = 8.0
-    """Memory for windows; those beyond it are read from disk each time."""
+    """Memory for windows, of all processes; others are read from disk each time."""
     variation: Variation = field(default_factory=Variation)
 
     def __post_init__(self) -> None:

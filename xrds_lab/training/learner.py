@@ -9,6 +9,7 @@ from typing import Any
 
 import torch
 from torch import Tensor
+from torch.optim.swa_utils import get_ema_multi_avg_fn
 
 from xrds_core import weights
 from xrds_core.devices import choose_precision
@@ -61,19 +62,16 @@ class Learner:
 
     def forward(self, batch: Batch, network: torch.nn.Module | None = None) -> Tensor:
         """The network's output, float32, layers in the run's precision."""
-        batch = batch.to(self.device)
-        mixed = self.precision != torch.float32
-        with torch.autocast(self.device.type, self.precision, enabled=mixed):
-            inputs = batch.radiance, batch.guides, batch.noisy
-            return (network or self.network)(*inputs).float()
+        with self._mixed():
+            return (network or self.network)(*self._inputs(batch)).float()
 
     def learn(self, batch: Batch, step: int) -> float:
         """Take one step, the `step`-th from 0; returns the loss before it."""
         for group in self.optimizer.param_groups:
             group["lr"] = self.config.learning_rate_at(step)
+        batch = batch.to(self.device)
         output = self.forward(batch, self._learning(batch))
-        reference = batch.reference.to(self.device)
-        loss = weighted(self.config.loss, output, reference)
+        loss = weighted(self.config.loss, output, batch.reference)
         self.optimizer.zero_grad(set_to_none=True)
         loss.backward()
         if largest := self.config.clip_gradient:
@@ -86,23 +84,29 @@ class Learner:
         """The network as it learns from such a batch.
 
         On a GPU the passes over whole crops are recorded once and then replayed: to
-        launch their thousands of small kernels takes three times as long as to run
-        them.
+        launch their thousands of small kernels takes longer than to run them.
         """
         whole = batch.reference.shape[-1] == self.config.crop
         if self.device.type != "cuda" or self.shared is not self.network or not whole:
             return self.shared
         if self.recorded is None:
-            like = batch.to(self.device)
-            inputs = like.radiance, like.guides, like.noisy
-            mixed = self.precision != torch.float32
             # a cache of converted weights would be recorded, and never follow them
-            with torch.autocast("cuda", self.precision, mixed, cache_enabled=False):
-                recorded = torch.cuda.make_graphed_callables(
-                    Recorded(self.network), inputs
+            with self._mixed(cache=False):
+                self.recorded = torch.cuda.make_graphed_callables(
+                    Recorded(self.network), self._inputs(batch)
                 )
-            self.recorded = recorded
         return self.recorded
+
+    def _mixed(self, cache: bool = True) -> torch.autocast:
+        """Layers in the run's precision, inside `with`."""
+        mixed = self.precision != torch.float32
+        kind = self.device.type
+        return torch.autocast(kind, self.precision, mixed, cache_enabled=cache)
+
+    def _inputs(self, batch: Batch) -> tuple[Tensor, ...]:
+        """What the network takes of a batch."""
+        batch = batch.to(self.device)
+        return batch.radiance, batch.guides, batch.noisy
 
     def _copy(self) -> dict[str, Tensor]:
         return {k: v.clone() for k, v in self.network.state_dict().items()}
@@ -112,7 +116,7 @@ class Learner:
         state = self.network.state_dict()
         own = {name: x for name, x in state.items() if x.is_floating_point()}
         average = [self.average[name] for name in own]
-        torch._foreach_lerp_(average, list(own.values()), 1 - decay)
+        get_ema_multi_avg_fn(decay)(average, list(own.values()), None)
 
     @contextmanager
     def averaged(self) -> Iterator[None]:
@@ -125,7 +129,7 @@ class Learner:
             self.network.load_state_dict(learnt)
 
     def save_average(self, path: Path, record: dict[str, str]) -> None:
-        """Write the averaged weights in half precision."""
+        """Write the averaged weights; nothing of a rival."""
         if self.config.rival:
             return  # a figure in a table, never a preset
         network = XRDS(self.config.network_config)
