@@ -74,7 +74,7 @@ def bench(
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal.json", report_line)
     chosen = Settings(
-        sweep or _sweep(_chosen(networks, presets), noise_thresholds, coarse),
+        sweep or _sweep(of_presets(networks, presets), noise_thresholds, coarse),
         folder,
         networks,
         journal,
@@ -126,7 +126,10 @@ def _sweep(
     return whole.coarser() if coarse else whole
 
 
-def _chosen(networks: Networks, presets: Sequence[str] | None) -> tuple[Network, ...]:
+def of_presets(
+    networks: Networks, presets: Sequence[str] | None
+) -> tuple[Network, ...]:
+    """Those of some presets; of all where None."""
     return tuple(n for n in networks.records if presets is None or n.preset in presets)
 
 

@@ -8,6 +8,7 @@ the other way makes in the same seconds of whole frames, with however many sampl
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from xrds_core.atomic import replacing, write_json
 
 from ..progress import report_line
 from . import machine, workload
+from .bench import of_presets
 from .inputs import Folder
 from .journal import Journal
 from .measure import SceneBench, Settings
@@ -37,7 +39,7 @@ ENLARGED = {2: (1, 2), 4: (1, 2, 4, 8), 8: (4, 8, 16, 32)}
 FRESH, CACHED = 1, 4  # samples of guides rendered now, and of those kept from before
 QUICKEST, QUICK = Denoiser.FAST_FAST, Denoiser.HIGH_FAST
 FULL_SIZE = Config("oidn", 1, QUICKEST)
-NO_LIMIT = (1e6,)  # units: whatever its seconds, every configuration is measured
+NO_LIMIT = (math.inf,)  # whatever its seconds, every configuration is measured
 
 
 @dataclass(frozen=True)
@@ -68,7 +70,7 @@ def low_budgets(
     references: Path | None,
     resolution: tuple[int, int] | None,
     cache: Path | None,
-    preset: str,
+    presets: Sequence[str],
     rounds: int,
     reference_samples: int,
     weights: Path | None,
@@ -83,11 +85,8 @@ def low_budgets(
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal.json", report_line)
     networks = Networks(weights, device)
-    chosen = tuple(
-        n for n in networks.records if (n.preset, n.guides) == (preset, "fast")
-    )
     settings = Settings(
-        LowSweep(chosen),
+        LowSweep(of_presets(networks, presets)),
         folder,
         networks,
         journal,
@@ -110,7 +109,7 @@ def low_budgets(
     result = {
         "machine": machine.describe(device),
         "rounds": rounds,
-        "preset": preset,
+        "presets": list(presets),
         "rows": rows(points),
         "points": points,
         "failures": journal.failures,

@@ -221,7 +221,7 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     add(
         "--low-budgets",
         action="store_true",
-        help="only a table of budgets below a sample per pixel, with one preset",
+        help="only a table of budgets below a sample per pixel",
     )
     add("--model", type=Path, help="where to write what --time-budget goes by")
     add("--device", default="auto", help=DEVICE_HELP)
@@ -275,11 +275,7 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         options.scenes,
         options.out,
         budgets=options.budgets,
-        resolution=options.resolution,
-        reference_samples=options.reference_samples,
-        windows=options.windows,
-        references=options.references,
-        cache=options.cache,
+        **_inputs(options),
         presets=options.preset,
         rounds=options.rounds,
         timing=not options.errors_only,
@@ -299,13 +295,9 @@ def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
     return low_budgets(
         options.scenes,
         options.out,
-        windows=options.windows,
-        references=options.references,
-        resolution=options.resolution,
-        cache=options.cache,
-        preset=options.preset[0],
+        **_inputs(options),
+        presets=options.preset,
         rounds=options.rounds,
-        reference_samples=options.reference_samples,
         weights=options.weights,
         device=options.device,
     )
@@ -327,12 +319,14 @@ def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
             films=options.films,
             rounds=options.rounds,
         ),
-        windows=options.windows,
-        references=options.references,
-        resolution=options.resolution,
-        cache=options.cache,
-        reference_samples=options.reference_samples,
+        **_inputs(options),
     )
+
+
+def _inputs(options: argparse.Namespace) -> dict[str, Any]:
+    """What every kind of bench measures on."""
+    names = ("windows", "references", "resolution", "cache", "reference_samples")
+    return {name: getattr(options, name) for name in names}
 
 
 def _bench_lines(result: dict[str, Any]) -> list[str]:

@@ -99,6 +99,7 @@ def _cell(check: Check | None) -> str:
 
 def _plots(folder: Path, curves: list[dict[str, Any]]) -> list[str]:
     """Draw the curves that were measured; return the names of the pictures."""
+    from matplotlib import colormaps
     from matplotlib.figure import Figure
 
     names = []
@@ -108,6 +109,7 @@ def _plots(folder: Path, curves: list[dict[str, Any]]) -> list[str]:
             continue
         figure = Figure(figsize=(8, 4), layout="constrained")
         axes = figure.subplots()
+        axes.set_prop_cycle(color=colormaps["tab20"].colors)  # every subject its own
         for curve in drawn:
             points = curve["points"]
             axes.plot(*zip(*points, strict=True), marker="o", label=curve["subject"])
