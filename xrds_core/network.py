@@ -149,8 +149,43 @@ def preset_config(preset: str, scale: int, guides: str = "fast") -> NetworkConfi
 
 
 def conv3(inputs: int, outputs: int) -> nn.Conv2d:
-    """The only convolution here: 3x3, stride 1, padded, bias."""
+    """3x3, stride 1, padded, bias."""
     return nn.Conv2d(inputs, outputs, 3, padding=1)
+
+
+# --- strips ---------------------------------------------------------------------------
+
+# Cells that are computed at once: what comes between two layers then stays in the
+# processor's caches, and its memory is used again.
+STRIP_CELLS = 8192
+
+
+def strips(x: Tensor, multiple: int = 1) -> list[slice]:
+    """Rows of (B, C, h, w) in strips of whole multiples, of about `STRIP_CELLS`."""
+    batch, _, height, width = x.shape
+    rows = max(STRIP_CELLS // (batch * width * multiple), 1) * multiple
+    return [slice(top, min(top + rows, height)) for top in range(0, height, rows)]
+
+
+class JoinedConv(nn.Conv2d):
+    """A convolution of features joined along their channels, strip by strip."""
+
+    def __init__(self, inputs: int, outputs: int, size: int) -> None:
+        super().__init__(inputs, outputs, size, padding=size // 2)
+
+    def forward(self, *features: Tensor) -> Tensor:
+        """(B, ., h, w) each; the result (B, outputs, h, w)."""
+        height = features[0].shape[-2]
+        mode = "constant" if self.padding_mode == "zeros" else self.padding_mode
+        reach = self.kernel_size[0] // 2
+        parts = []
+        for rows in strips(features[0]):
+            top, bottom = max(rows.start - reach, 0), min(rows.stop + reach, height)
+            x = torch.cat([y[..., top:bottom, :] for y in features], dim=1)
+            above, below = reach - rows.start + top, reach - bottom + rows.stop
+            x = F.pad(x, (reach, reach, above, below), mode) if reach else x
+            parts.append(F.conv2d(x, self.weight, self.bias))
+        return torch.cat(parts, dim=2)
 
 
 # --- attention in windows -------------------------------------------------------------
@@ -170,14 +205,19 @@ def from_windows(windows: Tensor, size: int, h: int, w: int) -> Tensor:
     return x.reshape(-1, h, w, c)
 
 
-def shift_mask(h: int, w: int, size: int, shift: int, like: Tensor) -> Tensor:
-    """(windows, 1, N, N): -100 between tokens that only the cyclic shift made meet."""
+def shift_zones(h: int, w: int, size: int, shift: int, like: Tensor) -> Tensor:
+    """(1, h, w, 1): cells of one number were neighbours before the cyclic shift."""
     zone = torch.zeros(1, h, w, 1, device=like.device, dtype=like.dtype)
     for i, rows in enumerate((slice(-size), slice(-size, -shift), slice(-shift, None))):
         zone[:, rows] += 3 * i
         zone[:, :, rows] += i
-    tokens = to_windows(zone, size).squeeze(-1)  # (windows, N)
-    return (tokens[:, None, :, None] != tokens[:, None, None, :]).to(like) * -100.0
+    return zone
+
+
+def zone_mask(zones: Tensor, size: int) -> Tensor:
+    """(windows, 1, N, N): -100 between tokens of different zones (1, h, w, 1)."""
+    tokens = to_windows(zones, size).squeeze(-1)  # (windows, N)
+    return (tokens[:, None, :, None] != tokens[:, None, None, :]).to(zones) * -100.0
 
 
 def attend(q: Tensor, k: Tensor, v: Tensor, heads: int, bias: Tensor | None) -> Tensor:
@@ -256,14 +296,17 @@ class SwinLayer(nn.Module):
         h, w = x.shape[-2:]
         size, shift = self.window_size, self.shift
         z = x.permute(0, 2, 3, 1)
-        mask = None
         if shift:
             z = z.roll((-shift, -shift), (1, 2))
-            mask = shift_mask(h, w, size, shift, x)
-        tokens = to_windows(z, size)
-        tokens = tokens + self.attention(self.norm1(tokens), mask)
-        tokens = tokens + self.mlp(self.norm2(tokens))
-        z = from_windows(tokens, size, h, w)
+            zones = shift_zones(h, w, size, shift, x)
+        parts = []
+        for rows in strips(x, size):
+            tokens = to_windows(z[:, rows], size)
+            mask = zone_mask(zones[:, rows], size) if shift else None
+            tokens = tokens + self.attention(self.norm1(tokens), mask)
+            tokens = tokens + self.mlp(self.norm2(tokens))
+            parts.append(from_windows(tokens, size, rows.stop - rows.start, w))
+        z = torch.cat(parts, dim=1)
         if shift:
             z = z.roll((shift, shift), (1, 2))
         return z.permute(0, 3, 1, 2)
@@ -278,9 +321,9 @@ class RDST(nn.Module):
     def __init__(self, config: NetworkConfig) -> None:
         super().__init__()
         c, layers = config.channels, config.dense_layers
-        self.convs = nn.ModuleList(conv3(c * (k + 1), c) for k in range(layers))
+        self.convs = nn.ModuleList(JoinedConv(c * (k + 1), c, 3) for k in range(layers))
         self.layers = nn.ModuleList(self.layer(config, k) for k in range(layers))
-        self.fuse = nn.Conv2d(c * (layers + 1), c, 1)
+        self.fuse = JoinedConv(c * (layers + 1), c, 1)
 
     def layer(self, config: NetworkConfig, index: int) -> nn.Module:
         return SwinLayer(config, shifted=index % 2 == 1)
@@ -288,8 +331,8 @@ class RDST(nn.Module):
     def forward(self, x: Tensor) -> Tensor:
         features = [x]
         for conv, layer in zip(self.convs, self.layers, strict=True):
-            features.append(layer(conv(torch.cat(features, dim=1))))
-        return x + self.fuse(torch.cat(features, dim=1))
+            features.append(layer(conv(*features)))
+        return x + self.fuse(*features)
 
 
 class RDB(RDST):
@@ -329,15 +372,18 @@ class CrossModality(nn.Module):
         self.mlp = MLP(c, ratio=4)
 
     def forward(self, features: Tensor, guides: Tensor) -> Tensor:  # both (B, C, h, w)
-        h, w = features.shape[-2:]
-        x, context = (
-            to_windows(y.permute(0, 2, 3, 1), self.window_size)
-            for y in (features, guides)
-        )
-        x = x + self.self_attention(self.norm1(x))
-        x = x + self.cross_attention(self.norm2(x), self.norm_guides(context))
-        x = x + self.mlp(self.norm3(x))
-        return from_windows(x, self.window_size, h, w).permute(0, 3, 1, 2)
+        size, width = self.window_size, features.shape[-1]
+        parts = []
+        for rows in strips(features, size):
+            x, context = (
+                to_windows(y[..., rows, :].permute(0, 2, 3, 1), size)
+                for y in (features, guides)
+            )
+            x = x + self.self_attention(self.norm1(x))
+            x = x + self.cross_attention(self.norm2(x), self.norm_guides(context))
+            x = x + self.mlp(self.norm3(x))
+            parts.append(from_windows(x, size, rows.stop - rows.start, width))
+        return torch.cat(parts, dim=1).permute(0, 3, 1, 2)
 
 
 class XDG(nn.Module):
@@ -436,7 +482,7 @@ class XRDS(nn.Module):
             self.tail: nn.Module = KernelTail(*sizes, *counts)
             # the paper pads with zeros, which darkens or tints the rim
             for layer in self.modules():
-                if isinstance(layer, nn.Conv2d):
+                if isinstance(layer, nn.Conv2d) and layer.padding != (0, 0):
                     layer.padding_mode = "replicate"
         else:
             self.tail = PixelTail(config)

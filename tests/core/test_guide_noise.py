@@ -94,3 +94,31 @@ def test_without_the_library_there_is_nothing_to_take_it_out(
         assert remover(4, "cpu") is None
     finally:
         guide_noise._denoiser.cache_clear()
+
+
+@pytest.fixture(autouse=True)
+def nothing_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test finds what another one has denoised."""
+    monkeypatch.setattr(guide_noise, "_KEPT", guide_noise._Kept())
+
+
+def test_the_same_guides_are_denoised_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    noisy, quiet = guides(0.1), remover(FEW_SAMPLES, "cpu")
+    assert quiet is not None
+    first = quiet(*noisy)
+    monkeypatch.setattr(Denoiser, "guides", lambda *_, **__: pytest.fail("again"))
+    again = quiet(*(guide.copy() for guide in noisy))
+    np.testing.assert_array_equal(again[0], first[0])
+    np.testing.assert_array_equal(again[1], first[1])
+    with pytest.raises(pytest.fail.Exception, match="again"):
+        quiet(noisy[0], noisy[1] + np.float32(1e-6))
+
+
+def test_large_guides_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guide_noise, "KEPT_BYTES", 1)
+    noisy, quiet = guides(0.1), remover(FEW_SAMPLES, "cpu")
+    assert quiet is not None
+    quiet(*noisy)
+    monkeypatch.setattr(Denoiser, "guides", lambda *_, **__: pytest.fail("again"))
+    with pytest.raises(pytest.fail.Exception, match="again"):
+        quiet(*noisy)

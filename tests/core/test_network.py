@@ -127,3 +127,20 @@ def test_areas_are_of_no_matter_to_the_picture(scale: int, guides: str) -> None:
         network.tail.area_side = 3
         parts = network(radiance, stack)
     torch.testing.assert_close(parts, whole, rtol=0.0, atol=2e-6)
+
+
+@pytest.mark.parametrize("preset", ["fast", "paper"])
+def test_strips_are_of_no_matter_to_the_picture(
+    preset: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    torch.manual_seed(3)
+    shape = replace(preset_config(preset, 2), groups=1, blocks=1)
+    network = XRDS(shape).eval()
+    for parameter in network.parameters():
+        torch.nn.init.normal_(parameter, std=0.1)
+    radiance, guides = torch.rand(1, 3, 64, 64), torch.rand(1, 6, 128, 128)
+    with torch.inference_mode():
+        whole = network(radiance, guides)
+        monkeypatch.setattr("xrds_core.network.STRIP_CELLS", 1)
+        parts = network(radiance, guides)
+    assert (parts - whole).abs().max() < 1e-5 * whole.abs().max()

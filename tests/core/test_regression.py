@@ -152,3 +152,14 @@ def test_solver_agrees_with_lapack() -> None:
     }
     ours = torch.stack([x[:, 0] for x in solve(planes, 4)], dim=-1)
     torch.testing.assert_close(ours, torch.linalg.solve(matrix, right))
+
+
+@pytest.mark.parametrize("scale", [1, 2, 4])
+def test_bands_are_of_no_matter(scale: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    torch.manual_seed(6)
+    low, noisy = torch.rand(2, 1, 3, 50, 10)
+    guides = torch.rand(1, 6, 50 * scale, 10 * scale)
+    whole = explain(low, noisy, guides, scale)
+    monkeypatch.setattr("xrds_core.regression.BAND", 7)
+    for part, expected in zip(explain(low, noisy, guides, scale), whole, strict=True):
+        torch.testing.assert_close(part, expected)

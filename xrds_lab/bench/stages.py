@@ -137,8 +137,8 @@ class StageTimes:
             stages["network"] = self.median(in_process_name(config), key)
         if config.has_noisy_guides:
             stages["network"] += self.median(GUIDE_FILTER, key)
-        if config.denoises_guides:
-            stages["network"] += self.median(GUIDE_DENOISER, key)
+        if config.denoises_guides:  # they are kept as they are then
+            stages["guides"] += self.median(GUIDE_DENOISER, key)
         return stages
 
     def line(
