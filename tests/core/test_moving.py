@@ -153,6 +153,28 @@ def test_a_pane_that_moves_lends_little() -> None:
     assert panes < 1.2
 
 
+@pytest.mark.parametrize("count", [1, 4, 16])
+def test_the_more_samples_the_less_a_moving_thing_is_lent(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = views(0.0)
+    card = shown[2].name == CARD
+    for each in shown:
+        assert each.frame.radiance is not None
+        each.frame.radiance[...] = 1.0
+    stored = [replace(x, samples=count) for x in by_vectors(shown)]
+
+    def lent() -> Any:
+        return accumulate(stored[2], stored[:2] + stored[3:]).samples - count
+
+    some = lent()
+    monkeypatch.setattr("xrds_core.temporal.accumulate._MOVING_HALF", np.inf)
+    full = lent()
+    np.testing.assert_allclose(some[card], full[card] / (1 + count / 8), rtol=1e-3)
+    np.testing.assert_array_equal(some[~card], full[~card])
+    assert full[card].mean() > count
+
+
 def test_stereo_views_of_one_moment_need_no_vectors() -> None:
     world = worlds()[2]
     left, right = view(2, camera(), world), view(2, camera(x=0.3), world)

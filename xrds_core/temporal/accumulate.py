@@ -37,6 +37,10 @@ if TYPE_CHECKING:
 # per pixel; it falls with their cube root. Noise asks for a wide one, texture for a
 # narrow one: 0.7 and 0.6 were best at 1 and 2 samples, 0.2 to 0.3 at 16.
 _SOFTNESS = 0.7
+# Samples per pixel at which what moves by itself lends half of what else would. It may
+# differ by what neither light nor guides tell, as lamps under a moving pane do; that
+# stays, however many samples there are, while what lending gains falls with them.
+_MOVING_HALF = 8.0
 _ROWS = 64  # at a time: their arrays stay in a processor's cache
 # Every half float, by its bits.
 _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
@@ -213,7 +217,8 @@ class _Lender:
         guides = slice(3, 9) if target.has_light else slice(0, 6)
         difference = picked[:, guides] - target.picture[block.wide.pixels, guides]
         rows = self._rows(block, difference), self._rows(block, seen)
-        weight[moving] *= likeness(*rows).ravel()[moving]
+        share = np.float32(1.0 / (1.0 + target.samples / _MOVING_HALF))
+        weight[moving] *= share * likeness(*rows).ravel()[moving]
 
     def _rows(self, block: _Block, x: NDArray[Any]) -> NDArray[Any]:
         """A block's wide rows (n, ...) as (H, W, ...), 0 beyond the picture."""
