@@ -28,7 +28,7 @@ MATCHING_STEPS, MATCHING_LIMIT, MATCHING_EPSILON = 4, 3.0, 0.02
 # Logit of how far a step goes, untrained.
 TRUST = 3.0
 # Pixels along the sides of what is enlarged at once.
-AREA_SIDE = 192
+AREA_SIDE = 384
 
 
 class Source(NamedTuple):

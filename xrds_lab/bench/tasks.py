@@ -176,7 +176,7 @@ def _guide_denoiser(networks: Networks, network: Network, window: Window) -> Tas
         quiet = remover(FEW_SAMPLES, upscaler.device.type)
         if quiet is None:
             raise LookupError("Open Image Denoise is missing: install mitsuba-oidn")
-        quiet(full, full)
+        quiet(full, 1 - full)  # the same guides again would be kept
         return clocked(lambda: quiet(full, full))
 
     return task

@@ -87,7 +87,9 @@ class Learner:
         launch their thousands of small kernels takes longer than to run them.
         """
         whole = batch.reference.shape[-1] == self.config.crop
-        if self.device.type != "cuda" or self.shared is not self.network or not whole:
+        alone = self.shared is self.network
+        # rivals are other people's code, some of which no recording bears
+        if self.device.type != "cuda" or not alone or not whole or self.config.rival:
             return self.shared
         if self.recorded is None:
             # a cache of converted weights would be recorded, and never follow them
