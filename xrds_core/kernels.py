@@ -27,8 +27,8 @@ GAIN_LIMIT = 4.0
 MATCHING_STEPS, MATCHING_LIMIT, MATCHING_EPSILON = 4, 3.0, 0.02
 # Logit of how far a step goes, untrained.
 TRUST = 3.0
-# Pixels along the sides of what is enlarged at once.
-AREA_SIDE = 384
+# Cells along the sides of what is enlarged at once.
+AREA_SIDE = 48
 
 
 class Source(NamedTuple):
@@ -197,7 +197,7 @@ class KernelTail(nn.Module):
     ) -> None:
         super().__init__()
         self.scale, self.cell = scale, cell
-        self.area_side = max(AREA_SIDE // cell, 1)
+        self.area_side = AREA_SIDE
         # unbounded features make every softmax a hard choice, which no longer learns
         self.norm = nn.LayerNorm(channels)
         # what these two are given has a rim

@@ -374,7 +374,7 @@ def test_a_memory_limit_is_kept() -> None:
         done = subprocess.run(command, capture_output=True, check=True, text=True)
         return int(done.stdout)
 
-    limit = 110 << 20
+    limit = 100 << 20
     assert peak(limit) < limit < peak(limit * 100)
 
 

@@ -13,10 +13,10 @@ from xrds_core.temporal.window import bytes_needed
 NETWORK_BYTES = {
     ("fast", 2): 268,
     ("fast", 4): 238,
-    ("fast", 8): 162,
+    ("fast", 8): 142,
     ("balanced", 2): 356,
     ("balanced", 4): 326,
-    ("balanced", 8): 185,
+    ("balanced", 8): 144,
     ("paper", 2): 1438,
     ("paper", 4): 553,
     ("paper", 8): 540,
