@@ -199,13 +199,6 @@ _PAPER = {
 
 EXEMPTIONS: dict[str, tuple[Exemption, ...]] = {
     "accumulation.water.below_single": (Exemption("full_size *", 1.6, _ONLY_GUIDES),),
-    "accumulation.fog.below_single": (
-        Exemption(
-            "full_size *",
-            0.5,
-            "light in the air does not move along with the surface behind it",
-        ),
-    ),
     "accumulation.glass_ball.excess": (Exemption("full_size *", 0.5, _ONLY_GUIDES),),
     "accumulation.blinds.excess": (
         Exemption(
