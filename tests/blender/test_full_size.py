@@ -59,7 +59,7 @@ def test_files_with_the_classic_pattern_get_blue_noise_unless_plain(
     assert np.array_equal(*made) is ("plain" not in choices)
 
 
-@pytest.mark.parametrize("quality", ["best", "balanced", "fast"])
+@pytest.mark.parametrize("quality", ["best", "medium", "balanced", "fast"])
 def test_qualities_differ(life: Any, quality: str) -> None:
     high = render(life, 1, seed=3).radiance
     other = render(life, 1, seed=3, denoise=quality).radiance

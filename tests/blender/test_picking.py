@@ -49,6 +49,7 @@ def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         monkeypatch.setattr(budget, "shipped", lambda: model)
         monkeypatch.setattr(picking, "_denoisers", lambda: tuple(Denoiser))
         monkeypatch.setattr(picking, "probe", lambda *_: COSTS)
+        monkeypatch.setattr(picking, "with_guides", lambda costs, _: costs)
         monkeypatch.setattr(picking, "network_seconds_per_pixel", lambda *_: 1e-6)
 
     return leave
@@ -58,14 +59,38 @@ def test_probes_measure_the_scene(still_life: Callable[..., Any]) -> None:
     networks = [XRDS.network]
     start = time.perf_counter()
 
-    def probe(passes: Any) -> budget.Costs:
-        return picking.probe(passes, budget.shipped(), networks, start)
+    def probe(passes: Any) -> tuple[budget.Costs, budget.Costs]:
+        costs = picking.probe(passes, budget.shipped(), networks, start)
+        return costs, picking.with_guides(costs, passes)
 
-    costs = run_job(still_life(400, 300), probe)
-    assert min(costs.fixed, costs.beauty, costs.guide) > 0
-    assert costs.fixed < time.perf_counter() - start + 1
+    costs, true = run_job(still_life(400, 300), probe)
+    assert min(costs.fixed, costs.beauty, true.guide) > 0
+    assert costs.guide < costs.beauty
+    assert costs.fixed < true.fixed < time.perf_counter() - start + 1
     assert set(costs.denoise) == set(Denoiser)
+    assert min(costs.denoise.values()) > 0
     assert set(costs.network) == set(networks)
+
+
+def test_guides_are_timed_only_where_super_resolution_may_win(
+    still_life: Callable[..., Any],
+    only: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    timed: list[budget.Costs] = []
+
+    def with_guides(costs: budget.Costs, _: Any) -> budget.Costs:
+        timed.append(costs)
+        return replace(costs, guide=500.0)
+
+    only(xrds=20.0, plain=40.0)
+    monkeypatch.setattr(picking, "with_guides", with_guides)
+    assert render(still_life(64, 48), time_budget=500.0).job.plain
+    assert not timed
+    only(xrds=40.0, plain=20.0)
+    monkeypatch.setattr(picking, "with_guides", with_guides)
+    assert render(still_life(64, 48), time_budget=500.0).job.plain  # too dear in truth
+    assert len(timed) == 1
 
 
 def test_plan_tells_what_was_chosen_and_why(

@@ -532,7 +532,7 @@ def one_line(info: pytest.ExceptionInfo[BaseException]) -> str:
 @pytest.mark.parametrize(
     ("options", "told"),
     [
-        ({"quality": "good"}, "'good' is not among best, high, balanced, fast"),
+        ({"quality": "good"}, "'good' is not among best, high, medium, balanced, fast"),
         ({"device": "tpu"}, "'tpu' is not among auto, cpu"),
         ({"threads": -1}, "threads is -1"),
         ({"memory_limit": -1}, "memory_limit is -1"),

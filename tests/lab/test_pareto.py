@@ -169,12 +169,12 @@ def test_seconds_are_sums_of_the_stages_medians(tmp_path: Path) -> None:
     assert plain.seconds == pytest.approx(
         {
             "sync": 0.5,
-            "beauty": 32.1,
-            "denoise": 5.0,
+            "beauty": 40.1,  # with guides, as at scale 1
+            "denoise": 4.5,
             "guides": 0.0,
             "network": 0.0,
             "other": 0.25,
-            "total": 37.85,
+            "total": 45.35,
         }
     )
     assert plain.peak_memory == 100
@@ -188,6 +188,14 @@ def test_seconds_are_sums_of_the_stages_medians(tmp_path: Path) -> None:
     cpu = 0.5 + 0.25 + 2 * (4.1 + 0.25 + 4.1) + 8 + 5
     assert own.cpu_seconds == pytest.approx(cpu)
     assert own.peak_memory == 300
+
+
+def test_the_denoised_and_scale_1_take_the_same_samples(tmp_path: Path) -> None:
+    times = timed(tmp_path)
+    rival = times.cost(Config("oidn", 4, Denoiser.HIGH_FAST)).seconds
+    assert rival["beauty"] == times.cost(FULL_SIZE).seconds["beauty"]
+    bare = times.cost(Config("cycles", 4)).seconds
+    assert bare["beauty"] == pytest.approx(8.1)  # without guides
 
 
 def test_full_size_pays_for_its_guides_and_for_our_denoiser(tmp_path: Path) -> None:

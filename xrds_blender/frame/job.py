@@ -19,7 +19,7 @@ ENGINE = "XRDS"
 SCALES = (1, 2, 4, 8)
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
-QUALITIES = ("best", "high", "balanced", "fast")
+QUALITIES = ("best", "high", "medium", "balanced", "fast")
 _SAMPLES = 1 << 24  # the most that Cycles takes
 _RANGES = {
     "samples": (1, _SAMPLES),

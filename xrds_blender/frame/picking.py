@@ -15,7 +15,6 @@ from typing import Any
 from xrds_core.errors import XRDSError
 
 from ..cycles.passes import CyclesPasses
-from ..cycles.rendered import InProcess
 from ..cycles.session import has_denoiser
 from ..planning import budget
 from ..planning.budget import Costs, Network, Picked
@@ -27,11 +26,13 @@ from ..planning.denoiser import (
 )
 from ..planning.plan import Decision
 from . import denoisers, history
-from .denoisers import in_process
+from .denoisers import load_denoiser
 from .job import RenderJob
 from .networks import known_networks, load_upscaler
 
 PROBE_PIXELS = 130_000  # of the largest probe
+LEAST_GUIDE = 0.4  # of a sample's seconds; 0.43 to 0.84 in the scenes that were timed
+DENOISER_RUNS = 3
 NETWORK_SIDE = 256  # of the output that a network is tried on, in pixels
 
 
@@ -46,11 +47,13 @@ def pick(
     model = budget.shipped()
     model = replace(model, errors=model.errors.limited(_denoisers()))
     networks = [n for n in known_networks(job) if n in model.network_speed]
-    costs = probe(passes, model, networks, start, in_process(job))
+    costs = probe(passes, model, networks, start, job)
     picked = _choose(job, costs, model, networks)
-    if picked.choice.scale > 1:
-        # The network's speed was a guess so far; others are slower by as much.
-        costs = _with_network(costs, picked.choice.network, job, passes, start)
+    if picked.choice.scale > 1:  # guides and network were guesses so far
+        costs = with_guides(costs, passes)
+        picked = _choose(job, costs, model, networks)
+    if picked.choice.scale > 1:  # the other networks are slower by as much
+        costs = _with_network(costs, picked.choice.network, job, passes)
         picked = _choose(job, costs, model, networks)
     goal = job.time_budget or job.quality
     assert goal is not None
@@ -130,54 +133,82 @@ def probe(
     model: budget.Model,
     networks: Sequence[Network],
     start: float,
-    ours: InProcess | None = None,
+    job: RenderJob | None = None,
 ) -> Costs:
-    """Costs of the scene's frame; those of the networks are guessed from OIDN's.
+    """Costs of the scene's frame; guides are guessed low, networks from the denoiser's.
 
-    `ours` denoises where this Blender cannot.
-
-    What a render costs whatever its size (5 ms) is lost in the largest probe, what the
-    denoiser does (0.1 s) is not: its seconds are the slope between two sizes.
+    So what is chosen by them without super-resolution, is chosen by the true ones, too:
+    `with_guides` is for the rest.
     """
     pixels = passes.region.width * passes.region.height
-    scale = max(1, round(math.sqrt(pixels / PROBE_PIXELS)))
-    slope = _slope(passes, scale, None if has_denoiser() else ours)
-    whole = scale**2
-    beauty = passes.beauty(scale, 1, denoise=False).seconds["beauty"] * whole
-    guide = passes.time_guides(scale, 1)["guides"] * whole
-    denoise = 0.0
-    if has_denoiser():
-        denoise = max(slope * whole - beauty, 0.0)
-    elif ours is not None:
-        speed = model.denoiser_speed[Denoiser.XRDS_HIGH]
-        denoise = max(slope * whole - beauty, 0.0) / speed
-    megapixels = pixels / 1e6
+    scale = _probe_scale(pixels)
+    passes.beauty(scale, 1, denoise=False)  # the first pays for more
+    beauty = passes.beauty(scale, 1, denoise=False).seconds["beauty"] * scale**2
+    denoise = _default_denoiser(passes, scale, job or RenderJob(), model)
+    denoise *= scale**2
     return budget.Costs(
-        fixed=time.perf_counter() - start + model.other_per_megapixel * megapixels,
+        fixed=time.perf_counter() - start + model.other_per_megapixel * pixels / 1e6,
         beauty=beauty,
-        guide=guide,
+        guide=LEAST_GUIDE * beauty,
         denoise={mode: denoise * x for mode, x in model.denoiser_speed.items()},
         network={n: denoise * model.network_speed[n] for n in networks},
     )
 
 
-def _slope(passes: CyclesPasses, scale: int, ours: InProcess | None) -> float:
-    """Seconds of sampling and denoising a picture of 1/scale of the size.
+def with_guides(costs: Costs, passes: CyclesPasses) -> Costs:
+    """The costs with what a sample of guides takes in truth."""
+    begun = time.perf_counter()
+    scale = _probe_scale(passes.region.width * passes.region.height)
+    guide = passes.time_guides(scale, 1)["guides"] * scale**2
+    return replace(costs, fixed=costs.fixed + time.perf_counter() - begun, guide=guide)
 
-    By Blender's default denoiser, or by `ours` where it is given.
+
+def _probe_scale(pixels: int) -> int:
+    return max(1, round(math.sqrt(pixels / PROBE_PIXELS)))
+
+
+def _default_denoiser(
+    passes: CyclesPasses, scale: int, job: RenderJob, model: budget.Model
+) -> float:
+    """Seconds of Blender's default denoiser on a picture of 1/`scale` of the size.
+
+    By our quickest one, where it is there: it needs no render.
+    """
+    try:
+        ours = load_denoiser(replace(job, denoise="fast"))
+    except XRDSError:
+        return _slope(passes, scale) if has_denoiser() else 0.0
+    import numpy as np
+
+    shape = passes.region.height // scale, passes.region.width // scale, 3
+    noise = np.random.default_rng(0).random(shape, np.float32)
+    seconds = []
+    for _ in range(DENOISER_RUNS):
+        begun = time.perf_counter()
+        ours(noise, noise, noise)
+        seconds.append(time.perf_counter() - begun)
+    return min(seconds) / model.denoiser_speed[Denoiser.XRDS_FAST]
+
+
+def _slope(passes: CyclesPasses, scale: int) -> float:
+    """Seconds that Cycles' denoiser adds to a render of 1/`scale` of the size.
+
+    What it costs whatever the size (0.1 s) would be lost in the whole frame: so they
+    are the slope between two sizes.
     """
 
     def seconds(size: int) -> float:
-        spent = passes.beauty(size, 1, denoiser=DEFAULT_DENOISER, in_process=ours)
-        return spent.seconds["beauty"] + spent.seconds["denoise"]
+        noisy = passes.beauty(size, 1, denoise=False).seconds["beauty"]
+        denoised = passes.beauty(size, 1, denoiser=DEFAULT_DENOISER).seconds["beauty"]
+        return max(denoised - noisy, 0.0)
 
     seconds(8 * scale)  # the first pays for more, and is thrown away
     tiny, small = seconds(8 * scale), seconds(2 * scale)
-    return (small - tiny) / (1 / 2**2 - 1 / 8**2)
+    return max(small - tiny, 0.0) / (1 / 2**2 - 1 / 8**2)
 
 
 def _with_network(
-    costs: Costs, network: Network, job: RenderJob, passes: CyclesPasses, start: float
+    costs: Costs, network: Network, job: RenderJob, passes: CyclesPasses
 ) -> Costs:
     """The costs with the network's measured speed; its loading is behind us then."""
     begun = time.perf_counter()

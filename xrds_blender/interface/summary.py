@@ -32,7 +32,13 @@ _STAGES = {
     "write": "Writing",
     "total": "Total",
 }
-_QUALITIES = {"best": "Best", "high": "High", "balanced": "Balanced", "fast": "Fast"}
+_QUALITIES = {
+    "best": "Best",
+    "high": "High",
+    "medium": "Medium",
+    "balanced": "Balanced",
+    "fast": "Fast",
+}
 
 
 @lru_cache(maxsize=1)

@@ -156,8 +156,6 @@ def _curve(way: Way, asked: Asked, means: Means, model: Model) -> Curve | None:
     wanted = choice_of(way, replace(asked, samples=0))
     if wanted is None:
         return None
-    if wanted.denoiser is Denoiser.XRDS_BEST:  # not measured, but at least as good
-        wanted = replace(wanted, denoiser=Denoiser.XRDS_HIGH)
     if not way.is_enlarged:
         return model.errors.curves.get(wanted)
     alike = {

@@ -29,13 +29,20 @@ if TYPE_CHECKING:
 
     Image = NDArray[np.floating[Any]]
 
-QUALITIES = {"best": "High", "high": "High", "balanced": "Balanced", "fast": "Fast"}
+QUALITIES = {
+    "best": "High",
+    "high": "High",
+    "medium": "Balanced",
+    "balanced": "Balanced",
+    "fast": "Fast",
+}
 """What we call a quality, and which of OIDN's makes the picture.
 
 `high` is the large network on guides that a smaller one has denoised first; `best`
 takes a large one for albedo, too, which keeps its texture, and the mean of two such
 pictures, one made upside down, in 1.8 of the seconds;
-`balanced` and `fast` are smaller networks on the guides as they are.
+`medium` is a smaller network on such guides; `balanced` and `fast` are smaller ones
+on the guides as they are.
 """
 
 # Of OIDN's networks for guides those of High alone are others. They take twice the
@@ -49,7 +56,7 @@ _RANGE = {"albedo": (0.0, 1.0), "normal": (-1.0, 1.0)}  # beyond which OIDN sees
 
 # Of each stage; only their ratios count.
 _SECONDS = {_SMALL: 0.4, _LARGE: 0.8, "picture": 1.0, "second picture": 1.0}
-_WITH_PREFILTER = ("best", "high")
+_WITH_PREFILTER = ("best", "high", "medium")
 _NO_ALBEDO = 0.5  # what Cycles gives with a normal alone: OIDN wants both
 _MOST_MEBIBYTES = 2**31 - 1  # the library counts them in 32 bits
 _MEBIBYTE = 1 << 20
@@ -83,7 +90,7 @@ class Denoiser:
     threads run one after the other.
 
     Args:
-        quality: `best`, `high`, `balanced` or `fast`; see `QUALITIES`.
+        quality: `best`, `high`, `medium`, `balanced` or `fast`; see `QUALITIES`.
         device: `auto` (the fastest there is), `cpu`, `cuda` or `metal`.
         threads: of the CPU; 0 for one per core.
         memory_limit: bytes that a call may take beside the arrays given and returned;
@@ -146,8 +153,8 @@ class Denoiser:
             normal: (H, W, 3), means of unit vectors of any space, 0 where nothing is.
             hdr: False for values in [0, 1] that are shown as they are.
             guides_are_clean: True if the picture may take over all that they show,
-                False if not, None to judge each by its own noise, as `best` and
-                `high` do: the others then take them for noisy.
+                False if not, None to judge each by its own noise, as `best`, `high`
+                and `medium` do: the others then take them for noisy.
             progress: takes a fraction in [0, 1] that never falls; False as its result
                 cancels.
 

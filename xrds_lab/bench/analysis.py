@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     Point = dict[str, Any]
     Report = dict[str, Any]
 
+# A picker keeps its promise between these shares of the seconds asked for.
+EARLIEST, LATEST = 0.8, 1.05
+ALIKE = 0.1  # dB that nobody sees
 OURS, CACHED, RIVAL = "XRDS", pareto.CACHED, "OIDN, best mode"
 
 
@@ -141,6 +144,7 @@ def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
     if not made:
         return None
     ratios = [e["picker"]["seconds"]["total"] / e["seconds"] for e in made]
+    gaps = [gap for e in made if (gap := _gap(e, None)) is not None]
     behind = [
         {
             "budget": multiple,
@@ -151,9 +155,11 @@ def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
     ]
     return {
         "runs": len(made),
-        "within": sum(0.6 <= ratio <= 1.1 for ratio in ratios) / len(ratios),
+        "within": sum(EARLIEST <= ratio <= LATEST for ratio in ratios) / len(ratios),
         "latest": max(ratios),
         "ratios": ratios,
+        "alike": sum(gap <= ALIKE for gap in gaps) / len(gaps) if gaps else None,
+        "farthest_behind": max(gaps, default=None),
         "budgets": behind,
     }
 
@@ -162,16 +168,19 @@ def _behind(
     entries: Sequence[dict[str, Any]], multiple: float, group: str | None
 ) -> float | None:
     """Mean dB by which the picker is below a group's best, or the best of all."""
-    gaps = []
-    for entry in (e for e in entries if e["budget"] == multiple):
-        best = [
-            point["psnr"]
-            for name, point in entry["best"].items()
-            if point is not None and name != CACHED and group in {None, name}
-        ]
-        if best:
-            gaps.append(max(best) - entry["picker"]["psnr"])
-    return statistics.fmean(gaps) if gaps else None
+    gaps = [_gap(e, group) for e in entries if e["budget"] == multiple]
+    known = [gap for gap in gaps if gap is not None]
+    return statistics.fmean(known) if known else None
+
+
+def _gap(entry: dict[str, Any], group: str | None) -> float | None:
+    """Decibels of one frame below a group's best; None where none of it fits."""
+    best = [
+        point["psnr"]
+        for name, point in entry["best"].items()
+        if point is not None and name != CACHED and group in {None, name}
+    ]
+    return max(best) - entry["picker"]["psnr"] if best else None
 
 
 # --- the picker's model ---------------------------------------------------------------

@@ -78,8 +78,8 @@ def _crop(scene: SceneBench, report: Report, label: str, place: Box) -> str | No
 
 
 def _exposure(scene: SceneBench) -> float:
-    known = [c for c in scene.configs if scene.pictures.knows(c)]
-    return scene.pictures.exposure(known[0])
+    there = next(c for c in scene.configs if not scene.pictures.missing([c]))
+    return scene.pictures.exposure(there)
 
 
 def _place(reference: Array) -> Box:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.frame.picking import probe
+from xrds_blender.frame.picking import probe, with_guides
 from xrds_blender.planning import budget
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 from xrds_core.atomic import read_json, write_json
@@ -75,6 +75,10 @@ class SceneBench:
         limit = MOST_OVER_BUDGET * max(self.settings.budgets) * self.unit()
         return [c for c in self._configs if self._predicted(c) <= limit]
 
+    def _unknown(self) -> list[Config]:
+        """Those whose errors are still to be measured."""
+        return [c for c in self.configs if not self.pictures.knows(c)]
+
     def _predicted(self, config: Config) -> float:
         """Seconds of its frame: as timed, or from the probes where nothing is timed."""
         try:
@@ -96,19 +100,22 @@ class SceneBench:
         model = replace(model, network_speed=speeds)
         scene = open_scene(self.shot.path, self.shot.window.whole)
         start = time.perf_counter()
-        return run_job(scene, lambda passes: probe(passes, model, known, start))
+
+        def probed(passes: Any) -> budget.Costs:
+            return with_guides(probe(passes, model, known, start), passes)
+
+        return run_job(scene, probed)
 
     def estimate(self) -> float:
         """Predicted seconds of the work that is left."""
         part, window = workload.share(self.shot.window), self.shot.window
         seconds = [
             workload.render_seconds(request, self.costs, part)
-            for request in self.pictures.missing(self.configs)
+            for request in self.pictures.missing(self._unknown())
         ]
         seconds += [
             workload.picture_seconds(config, self.costs, window)
-            for config in self.configs
-            if not self.pictures.knows(config)
+            for config in self._unknown()
         ]
         if self.settings.timing:
             left = self._stopwatch.left(self.settings.rounds)
@@ -166,7 +173,7 @@ class SceneBench:
                 rounds, lambda n: meter.done(seconds[n], f"{self.name}: {n}")
             )
             del self._stopwatch  # the denoisers that it timed hold gigabytes
-        self._render(self.configs, meter)
+        self._render(self._unknown(), meter)
         self._compare(meter)
         if self.settings.timing:
             for multiple in self._budgets_left():
@@ -191,9 +198,7 @@ class SceneBench:
 
     def _compare(self, meter: Meter) -> None:
         saved = time.perf_counter()
-        for config in self.configs:
-            if self.pictures.knows(config):
-                continue
+        for config in self._unknown():
             what = f"{self.name}: {config.label}"
             with self.settings.journal.attempt(what):
                 self.pictures.errors(config)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.atomic import replacing
 
-from . import plots
+from . import analysis, plots
 from .crops import viewer
 
 if TYPE_CHECKING:
@@ -202,9 +202,14 @@ def _picker(report: Report) -> str:
         return ""
     line = (
         f"Time budgets: {picker['within']:.0%} of {picker['runs']} whole frames took "
-        f"between -40 % and +10 % of the seconds asked for; the latest took "
-        f"{picker['latest']:.2f} of them."
+        f"{analysis.EARLIEST} to {analysis.LATEST} of the seconds asked for, the "
+        f"latest {picker['latest']:.2f}."
     )
+    if picker["alike"] is not None:
+        line += (
+            f" {picker['alike']:.0%} were within {analysis.ALIKE} dB of the best way "
+            f"of the sweep, the worst {picker['farthest_behind']:.2f} dB below it."
+        )
     rows = [
         [f"{row['budget']:g}", _gap(row["behind_best"]), _gap(row["behind_oidn"])]
         for row in picker["budgets"]

@@ -155,12 +155,24 @@ class StageTimes:
     ) -> float:
         """Seconds of the denoiser on a frame of 1/scale of the size."""
         kind = "plain" if scale == 1 else "low"
-        on, off = (task_name(anchor(kind, scale, mode)) for mode in (denoiser, OFF))
-        return max(self.paired(on, off, key), 0.0)
+        on, off = (anchor(kind, scale, mode) for mode in (denoiser, OFF))
+        if scale == 1:
+            off = anchor(self._sampled_as(on))
+        return max(self.paired(task_name(on), task_name(off), key), 0.0)
 
     def _line(self, request: Request, key: str) -> float:
-        fixed, slope = self.line(request.kind, request.scale, key)
+        fixed, slope = self.line(self._sampled_as(request), request.scale, key)
         return fixed + slope * request.samples
+
+    def _sampled_as(self, request: Request) -> str:
+        """The kind of render whose samples are the same.
+
+        Where Cycles denoises at full size it takes the guides that our denoiser asks
+        for, so both have one line: two would differ by the noise of timing alone.
+        """
+        denoised = request.kind == "plain" and request.denoiser != OFF
+        both = self.count(task_name(anchor("full", more=True)))
+        return "full" if denoised and both else request.kind
 
 
 def task_name(request: Request) -> str:
