@@ -101,7 +101,14 @@ def test_guides_between_two_counts_promise_the_lower() -> None:
     assert five == looks(ASKED)[Way.X2]
 
 
-FULL = {"sync": 1.0, "beauty": 32.0, "denoise": 6.167, "write": 0.5, "total": 40.0}
+DENOISE = 10.0 * MODEL.denoiser_speed[Denoiser.XRDS_HIGH]
+FULL = {
+    "sync": 1.0,
+    "beauty": 32.0,
+    "denoise": DENOISE,
+    "write": 0.5,
+    "total": 33.5 + DENOISE,
+}
 
 
 def test_nothing_is_known_before_the_first_render() -> None:
@@ -117,15 +124,15 @@ def test_a_render_at_full_size_tells_of_all_ways() -> None:
     def seconds(way: Way, asked: Asked = ASKED, pixels: int = PIXELS) -> float:
         return known.seconds(way, asked, pixels, MODEL)
 
-    assert seconds(Way.FULL_SIZE) == pytest.approx(39.667)
+    assert seconds(Way.FULL_SIZE) == pytest.approx(33.5 + DENOISE)
     assert seconds(Way.PLAIN) == pytest.approx(1.5 + 32 + 10, rel=0.01)
     more = seconds(Way.FULL_SIZE, replace(ASKED, samples=32))
-    assert more == pytest.approx(39.667 + 32, rel=0.01)
+    assert more == pytest.approx(65.5 + DENOISE, rel=0.01)
     guides = 4 * GUIDE_SHARE * 2.0
     assert seconds(Way.X2) > 1.5 + 8 + guides
     assert seconds(Way.X8) < seconds(Way.X4) < seconds(Way.X2) < seconds(Way.PLAIN)
     quarter = seconds(Way.FULL_SIZE, pixels=PIXELS // 4)
-    assert quarter == pytest.approx(39.667 / 4, rel=0.01)
+    assert quarter == pytest.approx((33.5 + DENOISE) / 4, rel=0.01)
 
 
 def test_a_small_render_tells_nothing_of_a_large_one() -> None:
@@ -175,7 +182,7 @@ def test_layers_of_a_scene_add_up() -> None:
     scene = SimpleNamespace(name="Scene", view_layers=layers, render=render)
     asked = history.asked_of(job, 16, None)
     one = history.seconds(scene, Way.FULL_SIZE, asked)
-    assert one == pytest.approx(2 * 39.667)
+    assert one == pytest.approx(2 * (33.5 + DENOISE))
     assert history.last(scene).seconds["beauty"] == 64.0
     assert history.costs(scene) is None
     layers[1].use = False

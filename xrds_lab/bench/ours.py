@@ -115,8 +115,9 @@ def joined(model: Model, measured: dict[str, dict[str, Row]]) -> Model:
 def _difference(
     measured: dict[str, dict[str, Row]], mode: Denoiser, count: int
 ) -> float:
+    """Median over the scenes: one whose reference is poor would sway a mean."""
     rows = [scene[str(count)] for scene in measured.values()]
-    return statistics.mean(row[mode] - row[DEFAULT_DENOISER] for row in rows)
+    return statistics.median(row[mode] - row[DEFAULT_DENOISER] for row in rows)
 
 
 def _speeds() -> dict[Denoiser, float]:
