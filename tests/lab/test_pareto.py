@@ -208,7 +208,7 @@ def test_full_size_pays_for_its_guides_and_for_our_denoiser(tmp_path: Path) -> N
 
 def test_adaptive_sampling_costs_what_its_own_frames_took(tmp_path: Path) -> None:
     times = timed(tmp_path)
-    config = adaptive(0.1, Denoiser.HIGH_FAST)
+    config = adaptive(0.1, Denoiser.HIGH_ACCURATE)
     with pytest.raises(KeyError, match=r"adaptive 0\.1"):
         times.cost(config)
     for seconds in (7.0, 9.0, 8.0):
@@ -218,6 +218,9 @@ def test_adaptive_sampling_costs_what_its_own_frames_took(tmp_path: Path) -> Non
     assert cost.total == pytest.approx(8.0)
     assert cost.seconds["beauty"] == pytest.approx(6.0)
     assert (cost.cpu_seconds, cost.peak_memory) == (15.0, 70)
+    quick = times.cost(adaptive(0.1, Denoiser.HIGH_FAST))
+    assert quick.total == pytest.approx(8.0 - 4.0)  # its denoiser is 4 s quicker
+    assert quick.cpu_seconds == pytest.approx(15.0 - 8.0)
 
 
 def test_a_coarse_sweep_leaves_out_super_resolution_alone() -> None:

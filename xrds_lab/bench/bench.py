@@ -30,7 +30,7 @@ from .windows import find_shots
 if TYPE_CHECKING:
     Report = dict[str, Any]
 
-BUDGETS = (0.5, 1.0, 2.0, 4.0, 8.0)
+BUDGETS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 REFERENCE_SAMPLES = 128
 
 

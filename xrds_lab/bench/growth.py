@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 # Cores that no machine at hand has; each stage's line in 1/cores is drawn on to them.
 MORE_CORES = (8, 32)
+# Larger frames are timed on all cores alone: what cores bring, smaller ones tell.
+MOST_PIXELS_OF_FEW_CORES = 1920 * 1080
 MEMORY_LIMIT = 1 << 30
 QUICK_DENOISER = Denoiser.HIGH_FAST
 NOTE = (
@@ -57,14 +59,15 @@ def growth(
     settings: Settings,
     done: Callable[[float, str], object],
 ) -> dict[str, Any]:
-    """Measure one scene at every size with 1 to all cores; the report's `growth`.
+    """Measure one scene at every size with 1 and all cores; the report's `growth`.
 
     `done` gets the megapixels of each run and its name.
     """
     counts = _core_counts()
     rows: list[Row] = []
     for size in sizes:
-        for cores in counts:
+        few = size[0] * size[1] <= MOST_PIXELS_OF_FEW_CORES
+        for cores in counts if few else counts[-1:]:
             rows += _measured(_resized(shot, size), cores, counts, settings, done)
     return {
         "scene": shot.name,

@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import statistics
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_core.atomic import read_json, write_json
 
 from . import machine
@@ -98,7 +99,7 @@ class StageTimes:
         Raises KeyError when a stage of it could not be timed.
         """
         if config.noise_threshold is not None:
-            return self._whole(config.label)
+            return self._whole(config)
         wall, cpu = (self._stages(config, key) for key in ("seconds", "cpu"))
         beauty, *guide = config.requests()
         names = [task_name(anchor(beauty.kind, beauty.scale, beauty.denoiser))]
@@ -107,15 +108,28 @@ class StageTimes:
         total = sum(wall.values())
         return Cost(wall | {"total": total}, sum(cpu.values()), self.peak(*names))
 
-    def _whole(self, name: str) -> Cost:
-        """The cost of frames that were timed whole: `beauty` holds their denoising."""
-        total, other, sync = (
-            self.median(name, k) for k in ("seconds", "other", "sync")
+    def _whole(self, config: Config) -> Cost:
+        """The cost of frames that were timed whole: `beauty` holds their denoising.
+
+        They are timed with Blender's default denoiser; another one costs what it costs
+        more or less than that.
+        """
+        name = replace(config, denoiser=DEFAULT_DENOISER).label
+        total, other, sync, cpu = (
+            self.median(name, k) for k in ("seconds", "other", "sync", "cpu")
         )
+        if config.denoiser != DEFAULT_DENOISER:
+            total += self._apart(config.denoiser, "seconds")
+            cpu += self._apart(config.denoiser, "cpu")
         stages = dict.fromkeys(STAGES, 0.0) | {"sync": sync, "other": other}
         stages["beauty"] = max(total - sync - other, 0.0)
         stages["total"] = sum(stages.values())
-        return Cost(stages, self.median(name, "cpu"), self.peak(name))
+        return Cost(stages, cpu, self.peak(name))
+
+    def _apart(self, denoiser: Mode | None, key: str) -> float:
+        """Seconds of a denoiser less those of Blender's default, at full size."""
+        default = self.denoising(DEFAULT_DENOISER, key=key)
+        return self.denoising(denoiser, key=key) - default
 
     def _stages(self, config: Config, key: str) -> dict[str, float]:
         plain = config.scale == 1

@@ -46,7 +46,8 @@ def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str
     noisy = cache(lambda: _noisy_frame(shot))
     for config in configs:
         if config.noise_threshold is not None:
-            timed[config.label] = _adaptive_frame(shot, config)
+            if config.denoiser == DEFAULT_DENOISER:  # the others follow from it
+                timed[config.label] = _adaptive_frame(shot, config)
             continue
         name = in_process_name(config)
         if config.method in CYCLES or name in timed:

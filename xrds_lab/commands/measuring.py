@@ -174,7 +174,7 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     add(
         "--budgets",
         type=arguments.factors,
-        default=(0.5, 1.0, 2.0, 4.0, 8.0),
+        default=(0.25, 0.5, 1.0, 2.0, 4.0, 8.0),
         help="multiples of each scene's 1 spp + OIDN, as 0.5,1,2",
     )
     add(
@@ -204,10 +204,13 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         help="frames, as 512x512,1920x1080",
     )
     add(
-        "--no-adaptive",
-        action="store_true",
-        help="leave out Cycles' adaptive sampling, whose frames take long to time",
+        "--noise-thresholds",
+        type=arguments.factors,
+        default=(0.01, 0.03, 0.1, 0.3),
+        help="of Cycles' adaptive sampling, whose frames take long to time; "
+        "0.01,0.03,0.1,0.3",
     )
+    add("--no-adaptive", action="store_true", help="leave out adaptive sampling")
     add(
         "--no-picker",
         action="store_true",
@@ -269,7 +272,6 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
     if options.low_budgets:
         return _low_budgets(options)
     from ..bench.bench import bench
-    from ..bench.sweep import NOISE_THRESHOLDS
 
     return bench(
         options.scenes,
@@ -281,7 +283,7 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         timing=not options.errors_only,
         picker=not (options.errors_only or options.no_picker),
         growth=options.growth,
-        noise_thresholds=() if options.no_adaptive else NOISE_THRESHOLDS,
+        noise_thresholds=() if options.no_adaptive else options.noise_thresholds,
         coarse=options.coarse,
         model=options.model,
         weights=options.weights,
