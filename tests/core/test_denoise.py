@@ -81,6 +81,7 @@ def test_better_qualities_are_better_and_guides_help() -> None:
 PREFILTERS = {
     "best": {"albedo": "High", "normal": "Fast"},
     "high": {"albedo": "Fast", "normal": "Fast"},
+    "medium": {"albedo": "Fast", "normal": "Fast"},
 }
 
 
@@ -447,7 +448,7 @@ def test_noise_of_one_spot_is_found(
 
 def test_the_caller_knows_best(denoiser: Denoiser) -> None:
     given = render(32, 32)[1:]
-    both = ("albedo", "normal") if denoiser.quality in {"best", "high"} else ()
+    both = ("albedo", "normal") if denoiser.quality in PREFILTERS else ()
     assert denoiser(*given, guides_are_clean=False).prefiltered == both
     assert denoiser(*given, guides_are_clean=True).prefiltered == ()
 
