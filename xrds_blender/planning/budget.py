@@ -11,7 +11,7 @@ import json
 import math
 from bisect import bisect_right
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -254,12 +254,18 @@ def choose(
 ) -> Picked:
     """The least error expected within `budget` seconds; where none fits the fastest.
 
-    More seconds never give more expected error.
+    Where super-resolution alone fits, but full size nearly does, the latter: it is
+    decibels better. More seconds never give more expected error.
     """
     fitting = list(_fitting(budget * AIM, costs, errors, networks))
     if not fitting:
         return _fastest(costs, errors, networks)
     best = max(fitting, key=_merit)
+    if best.choice.scale > 1:
+        full_size = [p for p in _few(costs, errors, []) if p.seconds <= budget * ALIKE]
+        late = max(full_size, key=_merit, default=best)
+        if late.psnr > best.psnr:
+            return replace(late, fits=False)
     rivals = [p for p in fitting if _kind(p.choice) != _kind(best.choice)]
     rival = max(rivals, key=_merit, default=None)
     return Picked(best.choice, best.seconds, best.psnr, rival)
@@ -293,13 +299,18 @@ def _fitting(
 
 
 def _fastest(costs: Costs, errors: ErrorModel, networks: Sequence[Network]) -> Picked:
-    picks = [
-        _picked(family, curve.samples[0], costs, curve)
-        for family, curve in errors.families(networks)
-    ]
+    picks = _few(costs, errors, networks)
     least = min(p.seconds for p in picks)
     best = max((p for p in picks if p.seconds <= least * ALIKE), key=_merit)
     return Picked(best.choice, best.seconds, best.psnr, None, fits=False)
+
+
+def _few(costs: Costs, errors: ErrorModel, networks: Sequence[Network]) -> list[Picked]:
+    """Every family with the fewest samples that were measured."""
+    return [
+        _picked(family, curve.samples[0], costs, curve)
+        for family, curve in errors.families(networks)
+    ]
 
 
 def _least_samples(curve: Curve, psnr: float) -> int:
