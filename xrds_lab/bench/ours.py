@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from xrds_blender.command import console
 from xrds_blender.planning.budget import Choice, Curve, ErrorModel, Model
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 from xrds_core import metrics
@@ -166,3 +167,4 @@ def _seconds(work: Callable[[], object]) -> float:
 
 if __name__ == "__main__":
     main()
+    console.leave(console.DONE)
