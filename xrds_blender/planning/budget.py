@@ -255,7 +255,7 @@ def choose(
     """The least error expected within `budget` seconds; where none fits the fastest.
 
     Where super-resolution alone fits, but full size nearly does, the latter: it is
-    decibels better. More seconds never give more expected error.
+    decibels better. Of what is in time more seconds never give more expected error.
     """
     fitting = list(_fitting(budget * AIM, costs, errors, networks))
     if not fitting:

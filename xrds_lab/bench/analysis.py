@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Curve
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
+from xrds_blender.planning.ways import ALIKE
 
 from . import pareto, same_picture
 from .stages import PLAIN_FRAME, XRDS_FRAME, in_process_name
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
 # A picker keeps its promise between these shares of the seconds asked for.
 EARLIEST, LATEST = 0.8, 1.05
-ALIKE = 0.1  # dB that nobody sees
 OURS, CACHED, RIVAL = "XRDS", pareto.CACHED, "OIDN, best mode"
 
 

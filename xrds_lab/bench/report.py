@@ -7,6 +7,7 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+from xrds_blender.planning.ways import ALIKE
 from xrds_core.atomic import replacing
 
 from . import analysis, plots
@@ -207,7 +208,7 @@ def _picker(report: Report) -> str:
     )
     if picker["alike"] is not None:
         line += (
-            f" {picker['alike']:.0%} were within {analysis.ALIKE} dB of the best way "
+            f" {picker['alike']:.0%} were within {ALIKE} dB of the best way "
             f"of the sweep, the worst {picker['farthest_behind']:.2f} dB below it."
         )
     rows = [

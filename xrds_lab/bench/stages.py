@@ -169,9 +169,8 @@ class StageTimes:
     ) -> float:
         """Seconds of the denoiser on a frame of 1/scale of the size."""
         kind = "plain" if scale == 1 else "low"
-        on, off = (anchor(kind, scale, mode) for mode in (denoiser, OFF))
-        if scale == 1:
-            off = anchor(self._sampled_as(on))
+        on = anchor(kind, scale, denoiser)
+        off = anchor(self._sampled_as(on), scale)
         return max(self.paired(task_name(on), task_name(off), key), 0.0)
 
     def _line(self, request: Request, key: str) -> float:

@@ -206,7 +206,6 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     add(
         "--noise-thresholds",
         type=arguments.factors,
-        default=(0.01, 0.03, 0.1, 0.3),
         help="of Cycles' adaptive sampling, whose frames take long to time; "
         "0.01,0.03,0.1,0.3",
     )
@@ -272,7 +271,9 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
     if options.low_budgets:
         return _low_budgets(options)
     from ..bench.bench import bench
+    from ..bench.sweep import NOISE_THRESHOLDS
 
+    thresholds = options.noise_thresholds or NOISE_THRESHOLDS
     return bench(
         options.scenes,
         options.out,
@@ -283,7 +284,7 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         timing=not options.errors_only,
         picker=not (options.errors_only or options.no_picker),
         growth=options.growth,
-        noise_thresholds=() if options.no_adaptive else options.noise_thresholds,
+        noise_thresholds=() if options.no_adaptive else thresholds,
         coarse=options.coarse,
         model=options.model,
         weights=options.weights,
