@@ -28,7 +28,13 @@ QUALITY = 92  # of the pictures in the page; they are to be looked at, not measu
 
 
 def viewer(report: Report, scene: SceneBench) -> str:
-    """HTML of a scene's crops; the page's script zooms and moves them together."""
+    """HTML of a scene's crops; the page's script zooms and moves them together.
+
+    Empty where all inputs are gone from the cache.
+    """
+    exposure = _exposure(scene)
+    if exposure is None:
+        return ""
     reference = scene.pictures.reference()
     place = _place(reference)
     shown: dict[str, str] = {}
@@ -49,7 +55,6 @@ def viewer(report: Report, scene: SceneBench) -> str:
             columns.append({"label": key, "name": name, "figures": figures})
         title = f"{entry['budget']:g} x = {entry['seconds']:.1f} s"
         budgets.append({"title": title, "columns": columns})
-    exposure = _exposure(scene)
     data = {
         "reference": _encoded(reference[place], exposure),
         "pictures": shown,
@@ -77,9 +82,11 @@ def _crop(scene: SceneBench, report: Report, label: str, place: Box) -> str | No
     return scene.crops[label]
 
 
-def _exposure(scene: SceneBench) -> float:
-    there = next(c for c in scene.configs if not scene.pictures.missing([c]))
-    return scene.pictures.exposure(there)
+def _exposure(scene: SceneBench) -> float | None:
+    """Stops of the scene's view, which every rendered input holds."""
+    there = (c for c in scene.configs if not scene.pictures.missing([c]))
+    config = next(there, None)
+    return None if config is None else scene.pictures.exposure(config)
 
 
 def _place(reference: Array) -> Box:
