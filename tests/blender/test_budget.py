@@ -97,7 +97,7 @@ def test_a_budget_below_all_takes_the_fastest_and_says_so() -> None:
     assert picked.choice == replace(QUICK, samples=1)  # 7 s, and XRDS 9.25 s
     decision = picked.decision(2.0)
     assert "\n" not in decision.reason
-    assert decision.reason.startswith("2 s is too short for this scene; the fastest")
+    assert decision.reason.startswith("2 s is too short for this scene; the nearest")
 
 
 def test_full_size_may_be_a_little_late_where_only_super_resolution_fits() -> None:
@@ -113,6 +113,39 @@ def test_full_size_may_be_a_little_late_where_only_super_resolution_fits() -> No
     assert "too short" in late.decision(quick / 1.05).reason
     early = chosen(quick / 1.2)
     assert (early.choice.scale, early.fits) == (4, True)
+
+
+OURS = ErrorModel(
+    {
+        Choice(mode, 0): Curve((1, 16), (best - 8, best))
+        for mode, best in {
+            Denoiser.XRDS_FAST: 30.0,
+            Denoiser.XRDS_HIGH: 34.0,
+            Denoiser.XRDS_BEST: 34.5,
+        }.items()
+    }
+)
+OUR_COSTS = replace(
+    COSTS, denoise={"XRDS-FAST": 1.0, "XRDS-HIGH": 6.0, "XRDS-BEST": 11.0}
+)
+
+
+@pytest.mark.parametrize(
+    ("left", "denoiser"),
+    [
+        (12.0, Denoiser.XRDS_BEST),  # the samples took less than expected
+        (10.9, Denoiser.XRDS_HIGH),
+        (5.9, Denoiser.XRDS_HIGH),  # what was chosen may be a little late
+        (4.9, Denoiser.XRDS_FAST),
+        (-3.0, Denoiser.XRDS_FAST),
+    ],
+)
+def test_samples_get_the_best_denoiser_for_the_seconds_left(
+    left: float, denoiser: Denoiser
+) -> None:
+    chosen = Choice(Denoiser.XRDS_HIGH, 4)
+    found = budget.denoiser_in_time(left, 20.0, chosen, OUR_COSTS, OURS)
+    assert found is denoiser
 
 
 def test_of_choices_as_fast_as_the_fastest_the_better_is_taken() -> None:

@@ -22,6 +22,7 @@ from xrds_core.errors import UsageError, XRDSError
 XRDS = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 1)
 PLAIN = budget.Choice(Denoiser.FAST_FAST, 0)
 FULL = budget.Choice(Denoiser.XRDS_FAST, 0)
+BEST = budget.Choice(Denoiser.XRDS_BEST, 0)
 
 
 # So dear that four samples are many: no test depends on how busy the machine is.
@@ -39,7 +40,7 @@ def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """Leave the picker nothing but these families, each as good as it is told."""
 
     def leave(**psnr: float) -> None:
-        families = {"xrds": XRDS, "plain": PLAIN, "full": FULL}
+        families = {"xrds": XRDS, "plain": PLAIN, "full": FULL, "best": BEST}
         curves = {
             families[name]: budget.Curve((1, 16), (best - 4, best))
             for name, best in psnr.items()
@@ -157,6 +158,30 @@ def test_full_size_is_denoised_by_ours_in_any_blender(
     assert picture.seconds["denoise"] > 0.0
 
 
+@pytest.mark.parametrize(
+    ("seconds_of_best", "quality"), [(400.0, "best"), (600.0, "fast")]
+)
+def test_time_that_the_samples_leave_is_for_a_better_denoiser(
+    still_life: Callable[..., Any],
+    only: Callable[..., None],
+    monkeypatch: pytest.MonkeyPatch,
+    seconds_of_best: float,
+    quality: str,
+) -> None:
+    pytest.importorskip("mitsuba_oidn")
+    only(full=40.0, best=41.0)
+    costs = replace(
+        COSTS, denoise=COSTS.denoise | {Denoiser.XRDS_BEST: seconds_of_best}
+    )
+    monkeypatch.setattr(picking, "probe", lambda *_: costs)
+    picture = render(still_life(64, 48), time_budget=500.0)
+    # Four samples were foreseen to take 400 s; in truth there is all the time.
+    assert picture.plan[0].value == "full size, 4 samples, fast denoising"
+    assert (picture.job.samples, picture.job.denoise) == (4, quality)
+    told = [each.value for each in picture.plan if each.decision == "denoise in time"]
+    assert told == [quality] * (quality == "best")
+
+
 def test_nothing_is_promised_where_nothing_denoises(
     still_life: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -186,7 +211,7 @@ def test_the_plan_told_is_the_one_rendered(
     assert told["facts"]["scale"] == picture.job.scale
     # What is left is what only a render can know.
     rest = {decision for decision, _ in decided[len(before) :]}
-    assert rest <= {"guide cache", "sessions", "guide prefilter"}
+    assert rest <= {"guide cache", "sessions", "guide prefilter", "denoise in time"}
 
 
 def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(

@@ -9,11 +9,10 @@ from typing import Any
 
 from ..cycles.passes import CyclesPasses
 from ..planning.lending import lending
-from ..planning.plan import Decision
 from ..scene.cuts import cuts
 from .facts import find_facts
 from .job import RenderJob
-from .picking import pick, picked_decisions
+from .picking import Pick, pick, picked_decisions
 from .rendering import call_engine
 
 
@@ -35,8 +34,8 @@ def explain(
         if not job.is_picked:
             return _told(depsgraph, job, scene, shot)
         with CyclesPasses(engine, depsgraph) as passes:
-            picked, decision = pick(passes, job, start)
-            return _told(depsgraph, picked, scene, shot, decision)
+            picked = pick(passes, job, start)
+            return _told(depsgraph, picked.job, scene, shot, picked)
 
     return call_engine(scene, look)
 
@@ -46,12 +45,12 @@ def _told(
     job: RenderJob,
     scene: Any,
     shot: Sequence[int],
-    choice: Decision | None = None,
+    picked: Pick | None = None,
 ) -> dict[str, Any]:
     facts = find_facts(depsgraph, job)
     decisions = job.plan(facts).decisions
     if job.temporal_radius and len(shot) > 1:
         decisions += lending(facts, job.temporal_radius, cuts(scene, shot))
-    if choice is not None:
-        decisions = picked_decisions(job, choice, decisions)
+    if picked is not None:
+        decisions = picked_decisions(picked, decisions)
     return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -22,11 +24,17 @@ if TYPE_CHECKING:
     from xrds_core.denoising import Denoised
 
 
-def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
+def render_full_size(
+    engine: Any,
+    depsgraph: Any,
+    job: RenderJob,
+    denoise_in_time: Callable[[], str] | None = None,
+) -> Picture:
     """Render into the engine's result and return the first view's picture.
 
-    Every pass but Combined is Cycles' own. Raises Cancelled when the user stops it,
-    and XRDSError where the denoiser cannot be loaded, before anything is rendered.
+    `denoise_in_time` gives the quality in the place of the job's, once the samples are
+    there. Every pass but Combined is Cycles' own. Raises Cancelled when the user stops
+    it, and XRDSError where the denoiser cannot be loaded, before anything is rendered.
     """
     denoiser = load_denoiser(job)
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
@@ -35,6 +43,11 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
         noisy, clock = sample_layer(
             engine, depsgraph, samples=job.samples, seed=job.seed
         )
+        plan = job.plan().decisions
+        if denoise_in_time is not None:
+            foreseen, job = job.denoise, replace(job, denoise=denoise_in_time())
+            plan = (*job.plan().decisions, *in_time(foreseen, job.denoise))
+            denoiser = load_denoiser(job)
         progress.begin(engine, progress.DENOISE, 2, 2)
         started = time.perf_counter()
         report = progress.reporter(engine)
@@ -62,10 +75,19 @@ def render_full_size(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
         albedo=noisy[first].albedo,
         normal=noisy[first].normal,
         seconds=dict.fromkeys(progress.STAGES, 0.0) | stages,
-        plan=(*job.plan().decisions, prefilter(denoised[first])),
+        plan=(*plan, prefilter(denoised[first])),
         peak_memory=peak_memory(),
         device=denoiser.device,
+        job=job,
     )
+
+
+def in_time(foreseen: str, quality: str) -> tuple[Decision, ...]:
+    """Why the denoising is another than a time budget has foreseen."""
+    if quality == foreseen:
+        return ()
+    why = f"by the seconds that were left after the samples; foreseen was {foreseen}"
+    return (Decision("denoise in time", quality, why),)
 
 
 def prefilter(denoised: Denoised) -> Decision:

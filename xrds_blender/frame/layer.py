@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -27,24 +28,13 @@ def render_layer(
     low-resolution picture in the result, enlarged.
     """
     start = time.perf_counter() if start is None else start
-    if job.is_picked:
-        return _render_picked(engine, depsgraph, job, start)
     place = history.place_of(depsgraph)
-    try:
-        if job.plain:
-            picture = render_plain(engine, depsgraph, job)
-        elif job.scale == 1:
-            picture = render_full_size(engine, depsgraph, job)
-        else:
-            if torch_folder.loaded() is None:  # which takes some seconds
-                progress.begin(engine, progress.LOADING, 0)
-            # first: missing weights are to cost no render
-            upscaler = load_upscaler(job)
-            picture = render_enlarged(engine, depsgraph, job, upscaler)
-    finally:
-        progress.end()
+    if job.is_picked:
+        picture = _render_picked(engine, depsgraph, job, start)
+    else:
+        picture = _render_job(engine, depsgraph, job)
     picture.seconds["total"] = time.perf_counter() - start
-    history.keep(place, job, picture)
+    history.keep(place, picture.job or job, picture)
     return picture
 
 
@@ -52,13 +42,30 @@ def _render_picked(
     engine: Any, depsgraph: Any, job: RenderJob, start: float
 ) -> Picture:
     """Probe the scene, choose what a time budget or a quality asks for, render it."""
-    place = history.place_of(depsgraph)
     with CyclesPasses(engine, depsgraph) as passes:
-        picked, decision = pick(passes, job, start)
+        picked = pick(passes, job, start)
+        decision = picked.decision
         engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
-        picture = render_layer(engine, depsgraph, picked)
-    seconds = picture.seconds | {"total": time.perf_counter() - start}
-    decisions = picked_decisions(picked, decision, picture.plan)
-    picture = replace(picture, seconds=seconds, plan=decisions, job=picked)
-    history.keep(place, picked, picture)
-    return picture
+        picture = _render_job(engine, depsgraph, picked.job, picked.denoise_in_time)
+    decisions = picked_decisions(picked, picture.plan)
+    return replace(picture, plan=decisions, job=picture.job or picked.job)
+
+
+def _render_job(
+    engine: Any,
+    depsgraph: Any,
+    job: RenderJob,
+    denoise_in_time: Callable[[], str] | None = None,
+) -> Picture:
+    try:
+        if job.plain:
+            return render_plain(engine, depsgraph, job)
+        if job.scale == 1:
+            return render_full_size(engine, depsgraph, job, denoise_in_time)
+        if torch_folder.loaded() is None:  # which takes some seconds
+            progress.begin(engine, progress.LOADING, 0)
+        # first: missing weights are to cost no render
+        upscaler = load_upscaler(job)
+        return render_enlarged(engine, depsgraph, job, upscaler)
+    finally:
+        progress.end()

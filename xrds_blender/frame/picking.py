@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from xrds_core.errors import XRDSError
@@ -31,15 +31,27 @@ from .job import RenderJob
 from .networks import known_networks, load_upscaler
 
 PROBE_PIXELS = 130_000  # of the largest probe
+TINY = 4  # how much smaller, in width and height, the other probe is
 LEAST_GUIDE = 0.4  # of a sample's seconds; 0.43 to 0.84 in the scenes that were timed
 DENOISER_RUNS = 3
 NETWORK_SIDE = 256  # of the output that a network is tried on, in pixels
 
 
-def pick(
-    passes: CyclesPasses, job: RenderJob, start: float
-) -> tuple[RenderJob, Decision]:
-    """The job for the seconds or the quality asked for, and why.
+@dataclass(frozen=True)
+class Pick:
+    """What a time budget or a quality became, and why.
+
+    `denoise_in_time` gives the quality of our denoiser once the samples are there, by
+    the seconds that are left then; None where nothing is left to choose.
+    """
+
+    job: RenderJob
+    decision: Decision
+    denoise_in_time: Callable[[], str] | None = None
+
+
+def pick(passes: CyclesPasses, job: RenderJob, start: float) -> Pick:
+    """The job for the seconds or the quality asked for.
 
     `start` is the perf_counter reading from which the budget counts; what has passed
     since then and what the probes take is part of it.
@@ -57,7 +69,17 @@ def pick(
         picked = _choose(job, costs, model, networks)
     goal = job.time_budget or job.quality
     assert goal is not None
-    return _job(job, picked), picked.decision(goal, job.time_budget is not None)
+    found = Pick(_job(job, picked), picked.decision(goal, job.time_budget is not None))
+    choice, seconds = picked.choice, job.time_budget
+    if seconds is None or choice.scale > 1 or not choice.denoiser.is_ours:
+        return found
+
+    def denoise_in_time() -> str:
+        left = start + seconds - time.perf_counter()
+        mode = budget.denoiser_in_time(left, seconds, choice, costs, model.errors)
+        return mode.quality
+
+    return replace(found, denoise_in_time=denoise_in_time)
 
 
 def foresee(scene: Any, job: RenderJob, networks: Sequence[Network]) -> Picked | None:
@@ -74,14 +96,12 @@ def foresee(scene: Any, job: RenderJob, networks: Sequence[Network]) -> Picked |
     return _choose(job, costs, model, known)
 
 
-def picked_decisions(
-    job: RenderJob, choice: Decision, rest: tuple[Decision, ...]
-) -> tuple[Decision, ...]:
+def picked_decisions(picked: Pick, rest: tuple[Decision, ...]) -> tuple[Decision, ...]:
     """The decisions of a job that was picked: why it was, and what it then leaves out.
 
     Of plain Cycles the choice says all.
     """
-    return (choice,) if job.plain else (choice, *rest)
+    return (picked.decision,) if picked.job.plain else (picked.decision, *rest)
 
 
 def _denoisers() -> tuple[Denoiser, ...]:
@@ -144,9 +164,8 @@ def probe(
     pixels = passes.region.width * passes.region.height
     scale = _probe_scale(pixels)
     passes.beauty(scale, 1, denoise=False)  # the first pays for more
-    beauty = passes.beauty(scale, 1, denoise=False).seconds["beauty"] * scale**2
+    beauty = _sample_seconds(passes, scale)
     denoise = _default_denoiser(passes, scale, job or RenderJob(), model)
-    denoise *= scale**2
     return budget.Costs(
         fixed=time.perf_counter() - start + model.other_per_megapixel * pixels / 1e6,
         beauty=beauty,
@@ -154,6 +173,25 @@ def probe(
         denoise={mode: denoise * x for mode, x in model.denoiser_speed.items()},
         network={n: denoise * model.network_speed[n] for n in networks},
     )
+
+
+def _sample_seconds(passes: CyclesPasses, scale: int) -> float:
+    """Seconds of a sample of the whole frame, from pictures of 1/`scale` and less.
+
+    What a render costs whatever its size, a tenth of a quick scene's probe, would be
+    `scale` squared times as much in the whole frame: so it is the slope between two
+    sizes.
+    """
+
+    def seconds(size: int) -> float:
+        return passes.beauty(size, 1, denoise=False).seconds["beauty"]
+
+    return _slope(seconds(scale), seconds(TINY * scale), scale)
+
+
+def _slope(small: float, tiny: float, scale: int) -> float:
+    """Seconds of the whole frame, from those at 1/`scale` and TINY times less."""
+    return max(small - tiny, 0.0) * scale**2 / (1 - 1 / TINY**2)
 
 
 def with_guides(costs: Costs, passes: CyclesPasses) -> Costs:
@@ -171,14 +209,14 @@ def _probe_scale(pixels: int) -> int:
 def _default_denoiser(
     passes: CyclesPasses, scale: int, job: RenderJob, model: budget.Model
 ) -> float:
-    """Seconds of Blender's default denoiser on a picture of 1/`scale` of the size.
+    """Seconds of Blender's default denoiser on the whole frame.
 
-    By our quickest one, where it is there: it needs no render.
+    By our quickest one on 1/`scale` of it, where it is there: it needs no render.
     """
     try:
         ours = load_denoiser(replace(job, denoise="fast"))
     except XRDSError:
-        return _slope(passes, scale) if has_denoiser() else 0.0
+        return _cycles_denoiser(passes, scale) if has_denoiser() else 0.0
     import numpy as np
 
     shape = passes.region.height // scale, passes.region.width // scale, 3
@@ -188,24 +226,21 @@ def _default_denoiser(
         begun = time.perf_counter()
         ours(noise, noise, noise)
         seconds.append(time.perf_counter() - begun)
-    return min(seconds) / model.denoiser_speed[Denoiser.XRDS_FAST]
+    fast = min(seconds) * scale**2 * len(passes.views)
+    return fast / model.denoiser_speed[Denoiser.XRDS_FAST]
 
 
-def _slope(passes: CyclesPasses, scale: int) -> float:
-    """Seconds that Cycles' denoiser adds to a render of 1/`scale` of the size.
-
-    What it costs whatever the size (0.1 s) would be lost in the whole frame: so they
-    are the slope between two sizes.
-    """
+def _cycles_denoiser(passes: CyclesPasses, scale: int) -> float:
+    """Seconds that Cycles' denoiser adds to a render of the whole frame."""
 
     def seconds(size: int) -> float:
         noisy = passes.beauty(size, 1, denoise=False).seconds["beauty"]
         denoised = passes.beauty(size, 1, denoiser=DEFAULT_DENOISER).seconds["beauty"]
         return max(denoised - noisy, 0.0)
 
-    seconds(8 * scale)  # the first pays for more, and is thrown away
-    tiny, small = seconds(8 * scale), seconds(2 * scale)
-    return max(small - tiny, 0.0) / (1 / 2**2 - 1 / 8**2)
+    small, tiny = 2 * scale, 2 * scale * TINY
+    seconds(tiny)  # the first pays for more, and is thrown away
+    return _slope(seconds(small), seconds(tiny), small)
 
 
 def _with_network(

@@ -71,7 +71,7 @@ _PRESETS = [
         "slower than the others",
     ),
 ]
-_DENOISE = [
+DENOISE = [
     (
         "best",
         "Best",
@@ -136,7 +136,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
     denoise: EnumProperty(
         name="Denoising",
         translation_context=CONTEXT,
-        items=_DENOISE,
+        items=DENOISE,
         default="high",
         description="How carefully noise is taken out of the picture. It takes as long "
         "for one sample as for a thousand",

@@ -15,6 +15,7 @@ from ..planning.plan import Plan
 from ..planning.ways import Means, Way
 from .machine import machine
 from .paragraph import translated
+from .properties import DENOISE
 from .ways_table import NAMES
 
 if TYPE_CHECKING:
@@ -32,13 +33,7 @@ _STAGES = {
     "write": "Writing",
     "total": "Total",
 }
-_QUALITIES = {
-    "best": "Best",
-    "high": "High",
-    "medium": "Medium",
-    "balanced": "Balanced",
-    "fast": "Fast",
-}
+_QUALITIES = {quality: label for quality, label, _ in DENOISE}
 
 
 @lru_cache(maxsize=1)

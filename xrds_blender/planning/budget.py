@@ -24,6 +24,9 @@ MODEL = Path(__file__).with_name("budget.json")
 AIM = 0.97
 # Where nothing fits: what is as fast as the fastest, as far as predictions can tell.
 ALIKE = 1.1
+# What was chosen may end this much late: a quicker denoiser would save little more time
+# and cost decibels.
+LATE = 0.05
 MOST_SAMPLES = 16384
 
 
@@ -57,15 +60,14 @@ class Choice:
     @property
     def label(self) -> str:
         """In a few words, as the panel and the command print it."""
+        samples = "1 sample" if self.samples == 1 else f"{self.samples} samples"
         if self.scale == 1 and self.denoiser.is_ours:
-            return (
-                f"full size, {self.samples} samples, {self.denoiser.quality} denoising"
-            )
+            return f"full size, {samples}, {self.denoiser.quality} denoising"
         if self.scale == 1:
-            return f"plain, {self.samples} samples, OIDN {self.denoiser}"
+            return f"plain, {samples}, OIDN {self.denoiser}"
         guides = "full guide" if self.guides == "full" else "guide"
         return (
-            f"{self.preset} x{self.scale}, {self.samples} samples, "
+            f"{self.preset} x{self.scale}, {samples}, "
             f"{self.guide_samples} {guides} samples, OIDN {self.denoiser}"
         )
 
@@ -235,7 +237,7 @@ class Picked:
         name, unit = ("time budget", "s") if in_seconds else ("quality", "dB")
         reason = f"{self.psnr:.1f} dB expected in {self.seconds:.1f} s"
         if not self.fits and in_seconds:
-            reason = f"{goal:g} s is too short for this scene; the fastest: {reason}"
+            reason = f"{goal:g} s is too short for this scene; the nearest: {reason}"
         elif not self.fits:
             reason = f"{goal:g} dB is beyond what was measured; the best: {reason}"
         elif self.rival is None:
@@ -269,6 +271,24 @@ def choose(
     rivals = [p for p in fitting if _kind(p.choice) != _kind(best.choice)]
     rival = max(rivals, key=_merit, default=None)
     return Picked(best.choice, best.seconds, best.psnr, rival)
+
+
+def denoiser_in_time(
+    left: float, budget: float, choice: Choice, costs: Costs, errors: ErrorModel
+) -> Denoiser:
+    """Ours with the least error for samples that are there and the seconds `left`.
+
+    `choice` at scale 1 is what was chosen for the `budget`: samples may have taken more
+    or less time than expected. Where nothing is in time, the quickest.
+    """
+    ours = [
+        family.denoiser for family, _ in errors.families([]) if family.denoiser.is_ours
+    ]
+    limits = dict.fromkeys(ours, left) | {choice.denoiser: left + LATE * budget}
+    in_time = [mode for mode in ours if costs.denoise[mode] <= limits[mode]]
+    if not in_time:
+        return min(ours, key=lambda mode: costs.denoise[mode])
+    return max(in_time, key=lambda mode: errors.psnr(replace(choice, denoiser=mode)))
 
 
 def reach(

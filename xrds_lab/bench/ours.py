@@ -25,7 +25,10 @@ from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Deno
 from xrds_core import metrics
 from xrds_core.atomic import read_json, write_json
 
-COUNTS = (1, 2, 4, 8, 16, 32, 64)
+COUNTS = (1, 2, 3, 4, 5, 6, 8, 12, 16, 24, 32, 64)
+# Blue noise of other counts is laid out less well: five samples are hardly better than
+# four. Between these the default's errors are a line.
+EVEN_COUNTS = (1, 2, 4, 8, 16, 32, 64)
 REFERENCE_SAMPLES, REFERENCE_SEEDS, SEED = 64, (11, 12), 404
 BORDER = (0.4, 0.6, 0.35, 0.6)  # of the frame: left, right, bottom, top
 TIMED = (1920, 1080)
@@ -89,12 +92,14 @@ def _errors(passes: Any, exposure: float) -> dict[str, Row]:
 def _row(passes: Any, count: int, reference: Any, exposure: float) -> Row:
     from xrds_core.denoising import Denoiser as OurDenoiser
 
-    rival = passes.beauty(1, count, denoiser=DEFAULT_DENOISER, seed=SEED)
-    noisy = passes.beauty(1, count, denoise=False, seed=SEED).radiance
-    guides = passes.guides(count, full=True, seed=SEED)
-    row = {str(DEFAULT_DENOISER): metrics.psnr(rival.radiance * exposure, reference)}
+    row = {}
+    if count in EVEN_COUNTS:
+        rival = passes.beauty(1, count, denoiser=DEFAULT_DENOISER, seed=SEED)
+        row[str(DEFAULT_DENOISER)] = metrics.psnr(rival.radiance * exposure, reference)
+    noisy = passes.guides(count, full=True, seed=SEED)
     for mode in OUR_DENOISERS:
-        ours = OurDenoiser(mode.quality)(noisy, guides.albedo, guides.normal).radiance
+        denoise = OurDenoiser(mode.quality)
+        ours = denoise(noisy.radiance, noisy.albedo, noisy.normal).radiance
         row[str(mode)] = metrics.psnr(ours * exposure, reference)
     return row
 
@@ -116,9 +121,17 @@ def joined(model: Model, measured: dict[str, dict[str, Row]]) -> Model:
 def _difference(
     measured: dict[str, dict[str, Row]], mode: Denoiser, count: int
 ) -> float:
-    """Median over the scenes: one whose reference is poor would sway a mean."""
-    rows = [scene[str(count)] for scene in measured.values()]
-    return statistics.median(row[mode] - row[DEFAULT_DENOISER] for row in rows)
+    """Of a denoiser from the default's line through the even counts.
+
+    The median over the scenes: one whose reference is poor would sway a mean.
+    """
+    return statistics.median(
+        scene[str(count)][mode] - _line(scene).at(count) for scene in measured.values()
+    )
+
+
+def _line(scene: dict[str, Row]) -> Curve:
+    return Curve.of({n: scene[str(n)][DEFAULT_DENOISER] for n in EVEN_COUNTS})
 
 
 def _speeds() -> dict[Denoiser, float]:
