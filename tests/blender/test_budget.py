@@ -138,6 +138,7 @@ OUR_COSTS = replace(
         (5.9, Denoiser.XRDS_HIGH),  # what was chosen may be a little late
         (4.9, Denoiser.XRDS_FAST),
         (-3.0, Denoiser.XRDS_FAST),
+        (-60.0, Denoiser.XRDS_HIGH),  # five seconds more are nothing then
     ],
 )
 def test_samples_get_the_best_denoiser_for_the_seconds_left(

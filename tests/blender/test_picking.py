@@ -182,6 +182,17 @@ def test_time_that_the_samples_leave_is_for_a_better_denoiser(
     assert told == [quality] * (quality == "best")
 
 
+def test_what_is_late_by_intent_keeps_its_denoiser(
+    still_life: Callable[..., Any], only: Callable[..., None]
+) -> None:
+    pytest.importorskip("mitsuba_oidn")
+    only(full=40.0, best=41.0)
+    picture = render(still_life(64, 48), time_budget=0.001)
+    # As dear as the quickest by what is foreseen, and late whatever is taken.
+    assert picture.job.denoise == "best"
+    assert "denoise in time" not in [each.decision for each in picture.plan]
+
+
 def test_nothing_is_promised_where_nothing_denoises(
     still_life: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:

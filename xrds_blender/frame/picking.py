@@ -31,6 +31,8 @@ from .job import RenderJob
 from .networks import known_networks, load_upscaler
 
 PROBE_PIXELS = 130_000  # of the largest probe
+PROBE_RUNS = 2  # of which the least counts: what else the machine does only adds
+LONG_PROBE = 0.4  # seconds after which it need not be repeated
 TINY = 4  # how much smaller, in width and height, the other probe is
 LEAST_GUIDE = 0.4  # of a sample's seconds; 0.43 to 0.84 in the scenes that were timed
 DENOISER_RUNS = 3
@@ -72,6 +74,8 @@ def pick(passes: CyclesPasses, job: RenderJob, start: float) -> Pick:
     found = Pick(_job(job, picked), picked.decision(goal, job.time_budget is not None))
     choice, seconds = picked.choice, job.time_budget
     if seconds is None or choice.scale > 1 or not choice.denoiser.is_ours:
+        return found
+    if not picked.fits:  # it is late by intent
         return found
 
     def denoise_in_time() -> str:
@@ -184,7 +188,10 @@ def _sample_seconds(passes: CyclesPasses, scale: int) -> float:
     """
 
     def seconds(size: int) -> float:
-        return passes.beauty(size, 1, denoise=False).seconds["beauty"]
+        runs: list[float] = []
+        while len(runs) < PROBE_RUNS and sum(runs) < LONG_PROBE:
+            runs.append(passes.beauty(size, 1, denoise=False).seconds["beauty"])
+        return min(runs)
 
     return _slope(seconds(scale), seconds(TINY * scale), scale)
 
