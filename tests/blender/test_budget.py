@@ -120,13 +120,20 @@ OURS = ErrorModel(
         Choice(mode, 0): Curve((1, 16), (best - 8, best))
         for mode, best in {
             Denoiser.XRDS_FAST: 30.0,
+            Denoiser.XRDS_MEDIUM: 32.0,
             Denoiser.XRDS_HIGH: 34.0,
             Denoiser.XRDS_BEST: 34.5,
         }.items()
     }
 )
 OUR_COSTS = replace(
-    COSTS, denoise={"XRDS-FAST": 1.0, "XRDS-HIGH": 6.0, "XRDS-BEST": 11.0}
+    COSTS,
+    denoise={
+        "XRDS-FAST": 1.0,
+        "XRDS-MEDIUM": 4.0,
+        "XRDS-HIGH": 6.0,
+        "XRDS-BEST": 11.0,
+    },
 )
 
 
@@ -136,7 +143,9 @@ OUR_COSTS = replace(
         (12.0, Denoiser.XRDS_BEST),  # the samples took less than expected
         (10.9, Denoiser.XRDS_HIGH),
         (5.9, Denoiser.XRDS_HIGH),  # what was chosen may be a little late
-        (4.9, Denoiser.XRDS_FAST),
+        (4.9, Denoiser.XRDS_MEDIUM),
+        (3.1, Denoiser.XRDS_MEDIUM),
+        (2.9, Denoiser.XRDS_FAST),
         (-3.0, Denoiser.XRDS_FAST),
         (-60.0, Denoiser.XRDS_HIGH),  # five seconds more are nothing then
     ],
@@ -145,7 +154,7 @@ def test_samples_get_the_best_denoiser_for_the_seconds_left(
     left: float, denoiser: Denoiser
 ) -> None:
     chosen = Choice(Denoiser.XRDS_HIGH, 4)
-    found = budget.denoiser_in_time(left, 20.0, chosen, OUR_COSTS, OURS)
+    found = budget.denoiser_in_time(20.0 - left, 20.0, chosen, OUR_COSTS, OURS)
     assert found is denoiser
 
 

@@ -79,8 +79,8 @@ def pick(passes: CyclesPasses, job: RenderJob, start: float) -> Pick:
         return found
 
     def denoise_in_time() -> str:
-        left = start + seconds - time.perf_counter()
-        mode = budget.denoiser_in_time(left, seconds, choice, costs, model.errors)
+        spent = time.perf_counter() - start
+        mode = budget.denoiser_in_time(spent, seconds, choice, costs, model.errors)
         return mode.quality
 
     return replace(found, denoise_in_time=denoise_in_time)

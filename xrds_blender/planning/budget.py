@@ -24,8 +24,8 @@ MODEL = Path(__file__).with_name("budget.json")
 AIM = 0.97
 # Where nothing fits: what is as fast as the fastest, as far as predictions can tell.
 ALIKE = 1.1
-# What was chosen may end this much late: a quicker denoiser would save little more time
-# and cost decibels.
+# What is no better than what was chosen may end this much late: a quicker denoiser
+# saves little more time and costs decibels.
 LATE = 0.05
 MOST_SAMPLES = 16384
 
@@ -274,23 +274,28 @@ def choose(
 
 
 def denoiser_in_time(
-    left: float, budget: float, choice: Choice, costs: Costs, errors: ErrorModel
+    spent: float, budget: float, choice: Choice, costs: Costs, errors: ErrorModel
 ) -> Denoiser:
-    """Ours with the least error for samples that are there and the seconds `left`.
+    """Ours with the least error for the samples that are there after `spent` seconds.
 
     `choice` at scale 1 is what was chosen for the `budget`: samples may have taken more
     or less time than expected. Where nothing is in time, about the quickest.
     """
-    ours = [
-        family.denoiser for family, _ in errors.families([]) if family.denoiser.is_ours
+    psnr = {
+        family.denoiser: curve.at(choice.samples)
+        for family, curve in errors.families([])
+        if family.denoiser.is_ours
+    }
+    late = budget * (1 + LATE)
+    ends = {mode: spent + costs.denoise[mode] for mode in psnr}
+    in_time = [
+        mode
+        for mode, end in ends.items()
+        if end <= (budget if psnr[mode] > psnr[choice.denoiser] else late)
     ]
-    limits = dict.fromkeys(ours, left) | {choice.denoiser: left + LATE * budget}
-    in_time = [mode for mode in ours if costs.denoise[mode] <= limits[mode]]
-    if not in_time:
-        spent = budget - left
-        latest = ALIKE * (spent + min(costs.denoise[mode] for mode in ours))
-        in_time = [mode for mode in ours if spent + costs.denoise[mode] <= latest]
-    return max(in_time, key=lambda mode: errors.psnr(replace(choice, denoiser=mode)))
+    quickest = min(ends.values())
+    about = [mode for mode, end in ends.items() if end <= quickest * ALIKE]
+    return max(in_time or about, key=lambda mode: psnr[mode])
 
 
 def reach(
