@@ -10,7 +10,7 @@ from xrds_blender.planning.budget import Choice, Curve
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 from xrds_blender.planning.ways import ALIKE
 
-from . import pareto, same_picture
+from . import hindsight, pareto, same_picture
 from .stages import PLAIN_FRAME, XRDS_FRAME, in_process_name
 from .sweep import DENOISERS, Config, xrds
 
@@ -82,7 +82,9 @@ def _budgets(
             for name, members in pareto.groups(points).items()
         }
         entry = {"scene": scene, "budget": multiple, "seconds": multiple * unit}
-        entries.append(entry | {"best": best, "picker": picks.get(f"{multiple:g}")})
+        pick = picks.get(f"{multiple:g}")
+        known = {"picker": pick, "hindsight": hindsight.best(pick, points)}
+        entries.append(entry | {"best": best} | known)
     return entries
 
 
@@ -145,6 +147,7 @@ def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
         return None
     ratios = [e["picker"]["seconds"]["total"] / e["seconds"] for e in made]
     gaps = [gap for e in made if (gap := _gap(e, None)) is not None]
+    missed = [e["hindsight"]["psnr"] - e["picker"]["psnr"] for e in _judged(made)]
     behind = [
         {
             "budget": multiple,
@@ -158,10 +161,21 @@ def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
         "within": sum(EARLIEST <= ratio <= LATEST for ratio in ratios) / len(ratios),
         "latest": max(ratios),
         "ratios": ratios,
-        "alike": sum(gap <= ALIKE for gap in gaps) / len(gaps) if gaps else None,
+        "alike": _share_alike(gaps),
         "farthest_behind": max(gaps, default=None),
+        "alike_in_hindsight": _share_alike(missed),
+        "missed": max(missed, default=None),
         "budgets": behind,
     }
+
+
+def _judged(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Those where something fitted at the speed of that frame."""
+    return [e for e in entries if e["hindsight"]]
+
+
+def _share_alike(gaps: Sequence[float]) -> float | None:
+    return sum(gap <= ALIKE for gap in gaps) / len(gaps) if gaps else None
 
 
 def _behind(

@@ -211,6 +211,12 @@ def _picker(report: Report) -> str:
             f" {picker['alike']:.0%} were within {ALIKE} dB of the best way "
             f"of the sweep, the worst {picker['farthest_behind']:.2f} dB below it."
         )
+    if picker["alike_in_hindsight"] is not None:
+        line += (
+            f" Of the ways at full size that fitted at the speed of that very frame, "
+            f"{picker['alike_in_hindsight']:.0%} were within {ALIKE} dB of the best, "
+            f"the worst {picker['missed']:.2f} dB below it."
+        )
     rows = [
         [f"{row['budget']:g}", _gap(row["behind_best"]), _gap(row["behind_oidn"])]
         for row in picker["budgets"]
