@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -71,6 +72,16 @@ def test_probes_measure_the_scene(still_life: Callable[..., Any]) -> None:
     assert set(costs.denoise) == set(Denoiser)
     assert min(costs.denoise.values()) > 0
     assert set(costs.network) == set(networks)
+
+
+def test_a_sample_is_never_for_nothing() -> None:
+    class Passes:
+        """Of a frame so small that its size makes no difference."""
+
+        def beauty(self, *_: Any, **__: Any) -> Any:
+            return SimpleNamespace(seconds={"beauty": 0.02})
+
+    assert picking._sample_seconds(Passes(), 4) > 0.0
 
 
 def test_guides_are_timed_only_where_super_resolution_may_win(

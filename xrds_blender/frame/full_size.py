@@ -43,10 +43,9 @@ def render_full_size(
         noisy, clock = sample_layer(
             engine, depsgraph, samples=job.samples, seed=job.seed
         )
-        plan = job.plan().decisions
+        foreseen = job.denoise
         if denoise_in_time is not None:
-            foreseen, job = job.denoise, replace(job, denoise=denoise_in_time())
-            plan = (*job.plan().decisions, *in_time(foreseen, job.denoise))
+            job = replace(job, denoise=denoise_in_time())
             denoiser = load_denoiser(job)
         progress.begin(engine, progress.DENOISE, 2, 2)
         started = time.perf_counter()
@@ -75,7 +74,11 @@ def render_full_size(
         albedo=noisy[first].albedo,
         normal=noisy[first].normal,
         seconds=dict.fromkeys(progress.STAGES, 0.0) | stages,
-        plan=(*plan, prefilter(denoised[first])),
+        plan=(
+            *job.plan().decisions,
+            *in_time(foreseen, job.denoise),
+            prefilter(denoised[first]),
+        ),
         peak_memory=peak_memory(),
         device=denoiser.device,
         job=job,

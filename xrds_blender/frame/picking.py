@@ -73,9 +73,8 @@ def pick(passes: CyclesPasses, job: RenderJob, start: float) -> Pick:
     assert goal is not None
     found = Pick(_job(job, picked), picked.decision(goal, job.time_budget is not None))
     choice, seconds = picked.choice, job.time_budget
-    if seconds is None or choice.scale > 1 or not choice.denoiser.is_ours:
-        return found
-    if not picked.fits:  # it is late by intent
+    is_ours = choice.scale == 1 and choice.denoiser.is_ours
+    if seconds is None or not is_ours or not picked.fits:  # or is late by intent
         return found
 
     def denoise_in_time() -> str:
@@ -193,7 +192,9 @@ def _sample_seconds(passes: CyclesPasses, scale: int) -> float:
             runs.append(passes.beauty(size, 1, denoise=False).seconds["beauty"])
         return min(runs)
 
-    return _slope(seconds(scale), seconds(TINY * scale), scale)
+    small, tiny = seconds(scale), seconds(TINY * scale)
+    # Of frames of a few pixels both take the same, but no sample is for nothing.
+    return max(_slope(small, tiny, scale), small * scale**2 / TINY**2)
 
 
 def _slope(small: float, tiny: float, scale: int) -> float:

@@ -147,7 +147,9 @@ def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
         return None
     ratios = [e["picker"]["seconds"]["total"] / e["seconds"] for e in made]
     gaps = [gap for e in made if (gap := _gap(e, None)) is not None]
-    missed = [e["hindsight"]["psnr"] - e["picker"]["psnr"] for e in _judged(made)]
+    missed = [
+        e["hindsight"]["psnr"] - e["picker"]["psnr"] for e in made if e["hindsight"]
+    ]
     behind = [
         {
             "budget": multiple,
@@ -167,11 +169,6 @@ def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
         "missed": max(missed, default=None),
         "budgets": behind,
     }
-
-
-def _judged(entries: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Those where something fitted at the speed of that frame."""
-    return [e for e in entries if e["hindsight"]]
 
 
 def _share_alike(gaps: Sequence[float]) -> float | None:

@@ -76,7 +76,7 @@ def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
     for panel, (key, label) in zip(panels, keys, strict=True):
         panel.set_xticks(budgets, [f"{budget:g}" for budget in budgets])
         panel.set_xticks([], minor=True)
-        panel.set_yscale("linear")
+        panel.set_yscale("linear")  # a factor near 1: a log axis has no numbers there
         panel.set_ylabel(f"times the {label}")
         panel.axhline(1.0, color="#cccccc", zorder=0, linewidth=1)
         for number, scene in enumerate(dict.fromkeys(e["scene"] for e in entries)):
