@@ -222,8 +222,7 @@ def _hindrance(options: argparse.Namespace) -> str:
     """The option under which frames cannot lend to each other; empty if they can."""
     if options.plain:
         return "--plain: Cycles renders each frame alone"
-    if options.time_budget or options.quality:
-        return "--time-budget or --quality: they choose settings for each frame"
-    if options.scale > 1 and options.guides == "full":
+    is_picked = options.time_budget or options.quality
+    if options.scale > 1 and options.guides == "full" and not is_picked:
         return "--guides full: frames lend fast guides alone"
     return ""

@@ -19,10 +19,10 @@ from ..cycles.size import picture_size
 from ..frame import record
 from ..frame.denoisers import load_denoiser
 from ..frame.job import NetworkFailed, Picture, RenderJob
+from ..frame.lending import can_lend
 from ..frame.networks import known_networks, load_upscaler
 from ..frame.rendering import render
 from ..shot.keeping import Keeper, keeper_of
-from ..shot.sampling import can_lend
 from ..shot.shot import keep_shot, render_shot
 from . import picture_file
 from .scene_file import AS_SAVED, SceneChoice, open_scene

@@ -12,6 +12,7 @@ from ..planning.lending import lending
 from ..scene.cuts import cuts
 from .facts import find_facts
 from .job import RenderJob
+from .lending import can_lend
 from .picking import Pick, pick, picked_decisions
 from .rendering import call_engine
 
@@ -33,8 +34,9 @@ def explain(
     def look(engine: Any, depsgraph: Any) -> dict[str, Any]:
         if not job.is_picked:
             return _told(depsgraph, job, scene, shot)
+        lends = len(shot) > 1 and can_lend(scene, job)
         with CyclesPasses(engine, depsgraph) as passes:
-            picked = pick(passes, job, start)
+            picked = pick(passes, job, start, shot=lends)
             return _told(depsgraph, picked.job, scene, shot, picked)
 
     return call_engine(scene, look)

@@ -52,34 +52,46 @@ class Pick:
     denoise_in_time: Callable[[], str] | None = None
 
 
-def pick(passes: CyclesPasses, job: RenderJob, start: float) -> Pick:
+def pick(
+    passes: CyclesPasses, job: RenderJob, start: float, *, shot: bool = False
+) -> Pick:
     """The job for the seconds or the quality asked for.
 
     `start` is the perf_counter reading from which the budget counts; what has passed
-    since then and what the probes take is part of it.
+    since then and what the probes take is part of it. Where the job is for all frames
+    of a `shot`, which lend each other their samples, the budget is what a frame takes
+    on the mean, and the probes come on top once.
     """
     model = budget.shipped()
-    model = replace(model, errors=model.errors.limited(_denoisers()))
+    errors = model.errors.limited(_denoisers())
     networks = [n for n in known_networks(job) if n in model.network_speed]
+    if shot:
+        errors = errors.in_shot(job.temporal_radius)
+        networks = [n for n in networks if n.guides == "fast"]  # others do not lend
+
+    def choose() -> Picked:
+        known = costs.in_shot(job.temporal_radius) if shot else costs
+        return _choose(job, known, errors, networks)
+
     costs = probe(passes, model, networks, start, job)
-    picked = _choose(job, costs, model, networks)
+    picked = choose()
     if picked.choice.scale > 1:  # guides and network were guesses so far
         costs = with_guides(costs, passes)
-        picked = _choose(job, costs, model, networks)
+        picked = choose()
     if picked.choice.scale > 1:  # the other networks are slower by as much
         costs = _with_network(costs, picked.choice.network, job, passes)
-        picked = _choose(job, costs, model, networks)
+        picked = choose()
     goal = job.time_budget or job.quality
     assert goal is not None
     found = Pick(_job(job, picked), picked.decision(goal, job.time_budget is not None))
     choice, seconds = picked.choice, job.time_budget
     is_ours = choice.scale == 1 and choice.denoiser.is_ours
-    if seconds is None or not is_ours or not picked.fits:  # or is late by intent
+    if seconds is None or shot or not is_ours or not picked.fits:  # or late by intent
         return found
 
     def denoise_in_time() -> str:
         spent = time.perf_counter() - start
-        mode = budget.denoiser_in_time(spent, seconds, choice, costs, model.errors)
+        mode = budget.denoiser_in_time(spent, seconds, choice, costs, errors)
         return mode.quality
 
     return replace(found, denoise_in_time=denoise_in_time)
@@ -93,10 +105,9 @@ def foresee(scene: Any, job: RenderJob, networks: Sequence[Network]) -> Picked |
     costs = history.costs(scene)
     if costs is None:
         return None
-    model = budget.shipped()
-    model = replace(model, errors=model.errors.limited(_denoisers()))
     known = [n for n in networks if n in costs.network]
-    return _choose(job, costs, model, known)
+    errors = budget.shipped().errors.limited(_denoisers())
+    return _choose(job, costs, errors, known)
 
 
 def picked_decisions(picked: Pick, rest: tuple[Decision, ...]) -> tuple[Decision, ...]:
@@ -125,12 +136,15 @@ def _denoisers() -> tuple[Denoiser, ...]:
 
 
 def _choose(
-    job: RenderJob, costs: Costs, model: budget.Model, networks: Sequence[Network]
+    job: RenderJob,
+    costs: Costs,
+    errors: budget.ErrorModel,
+    networks: Sequence[Network],
 ) -> Picked:
     if job.time_budget is not None:
-        return budget.choose(job.time_budget, costs, model.errors, networks)
+        return budget.choose(job.time_budget, costs, errors, networks)
     assert job.quality is not None
-    return budget.reach(job.quality, costs, model.errors, networks)
+    return budget.reach(job.quality, costs, errors, networks)
 
 
 def _job(job: RenderJob, picked: Picked) -> RenderJob:
@@ -166,11 +180,16 @@ def probe(
     """
     pixels = passes.region.width * passes.region.height
     scale = _probe_scale(pixels)
-    passes.beauty(scale, 1, denoise=False)  # the first pays for more
+    begun = time.perf_counter()
+    passes.beauty(scale, 1, denoise=False)  # the first syncs the scene, as any render
+    synced = time.perf_counter()
     beauty = _sample_seconds(passes, scale)
     denoise = _default_denoiser(passes, scale, job or RenderJob(), model)
+    sync = max(synced - begun - beauty / scale**2, 0.0)
+    spent = time.perf_counter() - start
     return budget.Costs(
-        fixed=time.perf_counter() - start + model.other_per_megapixel * pixels / 1e6,
+        fixed=spent + model.other_per_megapixel * pixels / 1e6,
+        probes=spent - sync,
         beauty=beauty,
         guide=LEAST_GUIDE * beauty,
         denoise={mode: denoise * x for mode, x in model.denoiser_speed.items()},
@@ -207,7 +226,13 @@ def with_guides(costs: Costs, passes: CyclesPasses) -> Costs:
     begun = time.perf_counter()
     scale = _probe_scale(passes.region.width * passes.region.height)
     guide = passes.time_guides(scale, 1)["guides"] * scale**2
-    return replace(costs, fixed=costs.fixed + time.perf_counter() - begun, guide=guide)
+    return replace(_after(costs, begun), guide=guide)
+
+
+def _after(costs: Costs, begun: float) -> Costs:
+    """The costs with the seconds since `begun`, which went into one more probe."""
+    spent = time.perf_counter() - begun
+    return replace(costs, fixed=costs.fixed + spent, probes=costs.probes + spent)
 
 
 def _probe_scale(pixels: int) -> int:
@@ -259,11 +284,8 @@ def _with_network(
     seconds = network_seconds_per_pixel(network, job)
     pixels = passes.region.width * passes.region.height
     factor = seconds * pixels / max(costs.network[network], 1e-9)
-    return replace(
-        costs,
-        fixed=costs.fixed + time.perf_counter() - begun,
-        network={n: s * factor for n, s in costs.network.items()},
-    )
+    network = {n: s * factor for n, s in costs.network.items()}
+    return replace(_after(costs, begun), network=network)
 
 
 def network_seconds_per_pixel(network: Network, job: RenderJob) -> float:

@@ -47,7 +47,7 @@ def on_the_way(job: RenderJob, way: Way, scene: Any, temporal_radius: int) -> Re
     What a time budget will choose stays open.
     """
     if job.is_picked:
-        return job
+        return replace(job, temporal_radius=temporal_radius)
     if way is Way.AUTOMATIC:
         way = best_way(scene, job)
         job = replace(job, denoise=BEST_DENOISE)

@@ -78,8 +78,8 @@ def _draw_choices(layout: Any, scene: Any, job: RenderJob, at_hand: Means) -> No
     if job.is_enlarged:
         offered = [p for p in PRESETS if _network(job, preset=p) in at_hand.networks]
         _offer(column, settings, "preset", offered)
-    if not (job.plain or job.is_picked):
-        column.prop(settings, "temporal_radius")
+    if not job.plain:
+        layout.prop(settings, "temporal_radius")
 
 
 class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):

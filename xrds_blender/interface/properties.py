@@ -198,7 +198,8 @@ class XRDSSettings(bpy.types.PropertyGroup):
         min=0.1,
         soft_max=3600.0,
         subtype="TIME_ABSOLUTE",
-        description="Seconds that a frame may take, trying out included",
+        description="Seconds that a frame may take, trying out included; in an "
+        "animation, on the mean of its frames",
     )
 
     @property

@@ -54,7 +54,8 @@ def next_render(scene: Any, job: RenderJob, at_hand: Means) -> list[Row]:
     """Name and value of what the render will do, take and leave out; five at most."""
     size = frame_size(scene.render)
     if job.is_picked:
-        return [("Picture", _size(*size)), ("About", _foreseen(scene, job, at_hand))]
+        rows = [("Picture", _size(*size)), ("About", _foreseen(scene, job, at_hand))]
+        return rows + _neighbours(size, job)
     if job.is_enlarged:
         return _enlarged(scene, job)
     rows = [("Picture", _sampled(*size, scene.cycles.samples))]

@@ -28,6 +28,12 @@ ALIKE = 1.1
 # saves little more time and costs decibels.
 LATE = 0.05
 MOST_SAMPLES = 16384
+# Of a neighbour's samples in a shot: those that count like the frame's own, as Cycles +
+# OIDN needs 4 to 5 times the samples for the same picture at a radius of 4.
+LENT = 0.5
+# Seconds that each neighbour takes, to be packed and accumulated, over those of the
+# quickest denoising.
+ACCUMULATION = 0.25
 
 
 class Network(NamedTuple):
@@ -76,8 +82,9 @@ class Choice:
 class Costs:
     """Seconds of one frame's parts, all for the whole frame at its full size.
 
-    `fixed`: scene sync, BVH, reading and writing, whatever is rendered; `beauty` and
-    `guide`: one sample; `denoise` by denoiser; `network` by network.
+    `fixed`: scene sync, BVH, reading and writing, whatever is rendered, and `probes`,
+    what has gone into finding all this out; `beauty` and `guide`: one sample; `denoise`
+    by denoiser; `network` by network.
     """
 
     fixed: float
@@ -85,6 +92,15 @@ class Costs:
     guide: float
     denoise: Mapping[Denoiser, float]
     network: Mapping[Network, float]
+    probes: float = 0.0
+
+    def in_shot(self, radius: int) -> Costs:
+        """Those of a frame to which `radius` frames before and after lend samples.
+
+        The probes are the first frame's alone.
+        """
+        lending = 2 * radius * ACCUMULATION * min(self.denoise.values())
+        return replace(self, fixed=self.fixed - self.probes + lending, probes=0.0)
 
     def seconds(self, choice: Choice) -> float:
         """Of the whole frame; raises KeyError for an unknown denoiser or network."""
@@ -110,14 +126,17 @@ class Costs:
 class Curve:
     """PSNR in dB over sample counts, never falling; linear in log2 of the count.
 
-    Beyond its last sample it is flat: what was not measured is not promised.
+    Beyond its last sample it is flat: what was not measured is not promised. Each
+    sample counts as `worth` of those.
     """
 
     samples: tuple[int, ...]
     psnr: tuple[float, ...]
+    worth: float = 1.0
 
-    def at(self, samples: int) -> float:
+    def at(self, count: int) -> float:
         """PSNR at a count of at least the first."""
+        samples = count * self.worth
         after = bisect_right(self.samples, samples)
         if after in {0, len(self.samples)}:
             return self.psnr[max(after - 1, 0)]
@@ -156,6 +175,13 @@ class ErrorModel:
             if choice.scale > 1 or choice.denoiser in denoisers
         }
         return ErrorModel(kept)
+
+    def in_shot(self, radius: int) -> ErrorModel:
+        """Of frames to which `radius` frames before and after lend their samples."""
+        worth = 1 + 2 * radius * LENT
+        return ErrorModel(
+            {choice: replace(c, worth=worth) for choice, c in self.curves.items()}
+        )
 
     def families(self, networks: Sequence[Network]) -> Iterator[tuple[Choice, Curve]]:
         """Everything but the sample counts, of what these weights can render."""

@@ -26,10 +26,12 @@ from ..cycles.passes import CyclesPasses
 from ..frame import history, progress
 from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.layer import render_layer
+from ..frame.lending import can_lend
 from ..scene.cuts import cuts
 from ..scene.facts import requested_passes, shapes_move
+from .choosing import ShotJob, choose_for_shot
 from .method import FullSize, method_of
-from .sampling import Sampled, can_continue, can_lend
+from .sampling import Sampled, can_continue
 
 _Passes = dict[tuple[str, str], Array]
 _First = tuple[int, _Passes]
@@ -48,10 +50,11 @@ class _Window:
 
     `passes` are Cycles' own of frames that were sampled before their turn. `first` is,
     by camera, the first frame that was sampled, and its passes of one sample; `count`
-    is how many were sampled since `began`.
+    is how many were sampled since `began`. `asked` is the job that `chosen` came from.
     """
 
-    job: RenderJob
+    asked: RenderJob
+    chosen: ShotJob
     sampled: dict[int, Sampled] = field(default_factory=dict)
     passes: dict[int, _Passes] = field(default_factory=dict)
     first: dict[str, _First] = field(default_factory=dict)
@@ -61,6 +64,11 @@ class _Window:
 
     def __post_init__(self) -> None:
         self.method = method_of(self.job)
+
+    @property
+    def job(self) -> RenderJob:
+        """That of all its frames."""
+        return self.chosen.job
 
     def begin_frame(self, scene: Any) -> None:
         """Show how far the animation is; frames ahead are sampled already."""
@@ -102,7 +110,7 @@ def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
         picture = _render_among_neighbours(engine, depsgraph, job)
     finally:
         progress.end()
-    history.keep(place, job, picture)
+    history.keep(place, picture.job or job, picture)
     return picture
 
 
@@ -130,8 +138,10 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
     scene, layer_name = depsgraph.scene_eval, depsgraph.view_layer_eval.name
     number, needed = scene.frame_current, _needed(scene, job)
     window = _windows.get((scene.name, layer_name))
-    if window is None or window.job != job:
-        window = _windows[scene.name, layer_name] = _Window(job)
+    if window is None or window.asked != job:
+        window = _Window(job, choose_for_shot(engine, depsgraph, job))
+        scene = depsgraph.scene_eval  # made anew where the scene was probed
+        _windows[scene.name, layer_name] = window
     window.forget_before(needed[0])
     window.begin_frame(scene)
     try:
@@ -145,7 +155,7 @@ def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Pic
         _keep(engine, layer_name, window, number)
         raise
     picture.seconds["total"] = time.perf_counter() - started
-    return picture
+    return window.chosen.told(picture)
 
 
 def _keep(engine: Any, layer_name: str, window: _Window, number: int) -> None:

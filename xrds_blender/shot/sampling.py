@@ -14,7 +14,7 @@ from xrds_core.temporal.samples import Portion, continued
 
 from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
 from ..cycles.settings import has_subsets
-from ..cycles.view import cameras_of, can_track
+from ..cycles.view import cameras_of
 from ..frame import progress
 from ..frame.job import RenderJob
 from ..frame.stopping import keep_samples
@@ -76,18 +76,6 @@ class Sampling:
     def own_seed(self) -> int:
         """One that no other frame has."""
         return (self.seed + self.number * SEED_STEP) % LARGEST_SEED
-
-
-def can_lend(scene: Any, job: RenderJob) -> bool:
-    """Whether a job's frames can lend to each other, and are to.
-
-    Not under most panoramic cameras, and full guides hold light of full size, too.
-    """
-    if job.plain or job.is_picked or not job.temporal_radius:
-        return False
-    if job.is_enlarged and job.guides != "fast":
-        return False
-    return scene.camera is not None and can_track(scene)
 
 
 def can_continue(scene: Any) -> bool:

@@ -16,6 +16,7 @@ from ..frame import progress
 from ..frame.job import Picture, RenderJob
 from ..frame.rendering import call_engine
 from ..scene.cuts import cuts
+from .choosing import ShotJob, choose_for_shot
 from .keeping import Keeper
 from .method import FullSize, method_of
 from .sampling import Sampled
@@ -34,10 +35,13 @@ def render_shot(
     them. A `keeper` keeps the samples of every frame rendered; what it has already is
     not rendered again, and lends to these frames from beyond their ends, too. Yields
     numbers and pictures, of stereo the first view's; the scene stays at the last frame
-    rendered. Raises what `render` raises.
+    rendered. What the job leaves open is chosen at the first frame to render. Raises
+    what `render` raises.
     """
-    method = method_of(job, keeper and keeper.write)
     todo = tuple(number for number in frames if not is_done(number))
+    chosen = _chosen(scene, job, todo)
+    job = chosen.job
+    method = method_of(job, keeper and keeper.write)
     beside = keeper.beside(frames, job.temporal_radius) if keeper else []
     lending = sorted({*frames, *beside})
     shot = Shot(todo, job.temporal_radius, cuts(scene, lending), lending=tuple(lending))
@@ -58,7 +62,14 @@ def render_shot(
         picture = method.finish(own, others, view)
         seconds = own.seconds | picture.seconds
         seconds["total"] = sum(seconds.values())
-        yield number, replace(picture, seconds=seconds)
+        yield number, chosen.told(replace(picture, seconds=seconds))
+
+
+def _chosen(scene: Any, job: RenderJob, todo: Sequence[int]) -> ShotJob:
+    if not (job.is_picked and todo):
+        return ShotJob(job)
+    scene.frame_set(todo[0])
+    return call_engine(scene, lambda *given: choose_for_shot(*given, job))
 
 
 def keep_shot(
