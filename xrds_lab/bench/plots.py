@@ -90,8 +90,6 @@ def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
 
 def growth_plot(growth: dict[str, Any]) -> bytes:
     """SVG of seconds and peak memory over pixels of the output, on all cores."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
     figure, panels = _figure("growth with the frame", "megapixels of the output")
     most = max(row["cores"] for row in growth["rows"])
     lines: dict[str, list[dict[str, Any]]] = {}
@@ -105,9 +103,7 @@ def growth_plot(growth: dict[str, Any]) -> bytes:
         panel.set_yscale("log")
         panel.set_xticks(sizes, [f"{size:.2g}" for size in sizes])
         panel.set_xticks([], minor=True)
-        panel.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        panel.yaxis.set_major_formatter("{x:g}")
-        panel.yaxis.set_minor_formatter(NullFormatter())
+        _number(panel.yaxis)
         for number, (name, rows) in enumerate(lines.items()):
             shown = [(r["pixels"] / 1e6, r[key] / unit) for r in rows if r[key]]
             if shown:
@@ -124,12 +120,22 @@ def _figure(title: str, axis: str) -> tuple[Any, Any]:
     panels = figure.subplots(1, 2)
     for panel, (measure, label) in zip(panels, MEASURES.items(), strict=True):
         panel.set_xscale("log")
+        _number(panel.xaxis)
         panel.set_xlabel(axis)
         panel.set_ylabel(label)
         panel.grid(visible=True, which="both", linewidth=0.3, color="#dddddd")
         if measure != "psnr":
             panel.set_yscale("log")
     return figure, panels
+
+
+def _number(axis: Any) -> None:
+    """Label a log axis 1, 2, 5, 10: by itself a short one gets labels that overlap."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _group(panel: Any, name: str, members: Sequence[Point], measure: str) -> None:
