@@ -49,6 +49,7 @@ MODULES = (
     "picking",
     "record",
     "shot",
+    "shot_budget",
     "shot_enlarged",
     "spare_passes",
     "translations",
