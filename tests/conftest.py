@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import signal
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -232,6 +233,19 @@ def life(still_life: Callable[..., Any]) -> Any:
     scene.cycles.seed = 1
     scene.xrds.way = "x2"
     return scene
+
+
+@pytest.fixture
+def blend(life: Any, tmp_path: Path) -> Path:
+    """The still life under a camera that moves, in a file; 64 x 48, one sample."""
+    life.render.resolution_x, life.render.resolution_y = 64, 48
+    life.cycles.samples = 1
+    for frame in (1, 5):
+        life.camera.location.x = 0.05 * (frame - 3)
+        life.camera.keyframe_insert("location", frame=frame)
+    path = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
 
 
 def load_image(path: Any) -> np.ndarray:

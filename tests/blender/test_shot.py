@@ -25,19 +25,6 @@ from xrds_core.sequence import finishing
 FRAMES = [1, 2, 3, 4, 5]
 
 
-@pytest.fixture
-def blend(life: Any, tmp_path: Path) -> Path:
-    """The still life under a camera that moves; 64 x 48 pixels, one sample."""
-    life.render.resolution_x, life.render.resolution_y = 64, 48
-    life.cycles.samples = 1
-    for frame in (1, 5):
-        life.camera.location.x = 0.05 * (frame - 3)
-        life.camera.keyframe_insert("location", frame=frame)
-    path = tmp_path / "shot.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
 def picture(path: Path) -> np.ndarray:
     channels = read_channels(path)
     return np.dstack([channels[name] for name in "RGB"])

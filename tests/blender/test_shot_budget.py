@@ -24,8 +24,8 @@ from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
 from xrds_blender.planning.denoiser import Denoiser
 
 FRAMES = [1, 2, 3]
-FULL, LOW = Choice(Denoiser.XRDS_FAST, 0), Choice(Denoiser.HIGH_FAST, 0, 4, "fast")
-LOW = replace(LOW, guides="fast", guide_samples=1)
+FULL = Choice(Denoiser.XRDS_FAST, 0)
+LOW = Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 1)
 FULL_GUIDES = replace(LOW, guides="full")
 # So dear that two samples are many: no test depends on how busy the machine is.
 COSTS = Costs(
@@ -70,30 +70,16 @@ def best(monkeypatch: pytest.MonkeyPatch, probed: list[int]) -> Callable[..., No
     return leave
 
 
-@pytest.fixture
-def shot(life: Any, tmp_path: Path) -> Path:
-    """The still life of three frames under a camera that moves, 64 x 48 pixels."""
-    life.render.resolution_x, life.render.resolution_y = 64, 48
-    life.cycles.samples = 1
-    for frame in (1, 3):
-        life.camera.location.x = 0.05 * (frame - 2)
-        life.camera.keyframe_insert("location", frame=frame)
-    life.frame_start, life.frame_end = 1, 3
-    path = tmp_path / "shot.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
-def rendered(shot: Path, radius: int = 1, **more: Any) -> dict[str, Any]:
+def rendered(blend: Path, radius: int = 1, **more: Any) -> dict[str, Any]:
     job = RenderJob(temporal_radius=radius, **{"time_budget": 300.0, **more})
-    frames = str(shot.parent / "command" / "#.exr")
-    return render_file(shot, frames, job, frames=FRAMES, resume=True)
+    frames = str(blend.parent / "command" / "#.exr")
+    return render_file(blend, frames, job, frames=FRAMES, resume=True)
 
 
 def test_a_shot_is_probed_once_and_lends(
-    shot: Path, probed: list[int], best: Callable[..., None]
+    blend: Path, probed: list[int], best: Callable[..., None]
 ) -> None:
-    result = rendered(shot)
+    result = rendered(blend)
     assert probed == [1]
     lent = [frame["temporal"]["frames"] for frame in result["frames"]]
     assert lent == [(1, 2), (1, 2, 3), (2, 3)]
@@ -103,41 +89,42 @@ def test_a_shot_is_probed_once_and_lends(
     assert "accumulation" in [each["decision"] for each in rest]
     assert "denoise in time" not in [each["decision"] for each in rest]
     assert result["scale"] == 1
-    result = rendered(shot)
+    result = rendered(blend)
     assert probed == [1]  # nothing is left to render
     assert result["kept"] == FRAMES
 
 
 def test_super_resolution_lends_by_the_guides_that_can(
-    shot: Path, probed: list[int], best: Callable[..., None]
+    blend: Path, probed: list[int], best: Callable[..., None]
 ) -> None:
     best(LOW)
-    result = rendered(shot)
+    result = rendered(blend)
     assert result["plan"][0]["value"].startswith("fast x4")
     assert result["frames"][1]["temporal"]["frames"] == (1, 2, 3)
     best(FULL_GUIDES)
-    (shot.parent / "command" / "1.exr").unlink()
-    assert "full guide" not in rendered(shot)["plan"][0]["value"]
+    (blend.parent / "command" / "1.exr").unlink()
+    assert "full guide" not in rendered(blend)["plan"][0]["value"]
 
 
 def test_an_animation_is_the_shot_of_the_command(
-    shot: Path, probed: list[int], best: Callable[..., None]
+    blend: Path, probed: list[int], best: Callable[..., None]
 ) -> None:
-    rendered(shot)
-    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    rendered(blend)
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
     scene = bpy.context.scene
     scene.render.engine = "XRDS"
+    scene.frame_start, scene.frame_end = 1, 3
     settings = scene.xrds
     settings.way, settings.temporal_radius = "automatic", 1
     settings.use_time_budget, settings.time_budget = True, 300.0
     image = scene.render.image_settings
     image.file_format, image.color_depth = "OPEN_EXR", "32"
-    scene.render.filepath = str(shot.parent / "f12" / "#.exr")
+    scene.render.filepath = str(blend.parent / "f12" / "#.exr")
     bpy.ops.render.render(animation=True)
     assert probed == [1, 1]
     for number in FRAMES:
         ours, theirs = (
-            read_channels(shot.parent / folder / f"{number}.exr")
+            read_channels(blend.parent / folder / f"{number}.exr")
             for folder in ("f12", "command")
         )
         for name in "RGB":
@@ -145,19 +132,19 @@ def test_an_animation_is_the_shot_of_the_command(
 
 
 def test_each_frame_is_chosen_for_where_none_lends(
-    shot: Path, probed: list[int], best: Callable[..., None]
+    blend: Path, probed: list[int], best: Callable[..., None]
 ) -> None:
-    assert rendered(shot, radius=0)["frames"][1]["temporal"] is None
+    assert rendered(blend, radius=0)["frames"][1]["temporal"] is None
     assert probed == FRAMES
 
 
 @pytest.mark.parametrize("goal", [{"time_budget": 300.0}, {"quality": 36.0}])
 def test_the_plan_told_is_the_one_rendered(
-    shot: Path, probed: list[int], best: Callable[..., None], goal: dict[str, float]
+    blend: Path, probed: list[int], best: Callable[..., None], goal: dict[str, float]
 ) -> None:
     ensure_registered()
-    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
     job = RenderJob(temporal_radius=1, **goal)
     told = explain(bpy.context.scene, job, FRAMES)["decisions"]
-    plan = rendered(shot, **({"time_budget": None} | goal))["plan"]
+    plan = rendered(blend, **({"time_budget": None} | goal))["plan"]
     assert told[0] == plan[0]

@@ -12,7 +12,7 @@ from . import history, progress, torch_folder
 from .full_size import render_full_size
 from .job import Picture, RenderJob
 from .networks import load_upscaler
-from .picking import pick, picked_decisions
+from .picking import pick, picked_decisions, report_pick
 from .plain import render_plain
 from .super_resolution import render_enlarged
 
@@ -44,8 +44,7 @@ def _render_picked(
     """Probe the scene, choose what a time budget or a quality asks for, render it."""
     with CyclesPasses(engine, depsgraph) as passes:
         picked = pick(passes, job, start)
-        decision = picked.decision
-        engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
+        report_pick(engine, picked)
         picture = _render_job(engine, depsgraph, picked.job, picked.denoise_in_time)
     decisions = picked_decisions(picked, picture.plan)
     return replace(picture, plan=decisions, job=picture.job or picked.job)

@@ -110,6 +110,12 @@ def foresee(scene: Any, job: RenderJob, networks: Sequence[Network]) -> Picked |
     return _choose(job, costs, errors, known)
 
 
+def report_pick(engine: Any, picked: Pick) -> None:
+    """Tell in Blender's log and reports what was chosen, and why."""
+    decision = picked.decision
+    engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
+
+
 def picked_decisions(picked: Pick, rest: tuple[Decision, ...]) -> tuple[Decision, ...]:
     """The decisions of a job that was picked: why it was, and what it then leaves out.
 

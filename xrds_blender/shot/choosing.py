@@ -13,7 +13,7 @@ from typing import Any
 from ..cycles.passes import CyclesPasses
 from ..frame import progress
 from ..frame.job import Picture, RenderJob
-from ..frame.picking import pick
+from ..frame.picking import pick, report_pick
 from ..planning.plan import Decision
 
 
@@ -43,6 +43,5 @@ def choose_for_shot(engine: Any, depsgraph: Any, job: RenderJob) -> ShotJob:
             picked = pick(passes, job, time.perf_counter(), shot=True)
     finally:
         progress.end()
-    decision = picked.decision
-    engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
-    return ShotJob(picked.job, (decision,))
+    report_pick(engine, picked)
+    return ShotJob(picked.job, (picked.decision,))
