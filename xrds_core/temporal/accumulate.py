@@ -17,6 +17,7 @@ import numpy as np
 
 from ..errors import PictureError
 from .agreement import REACH, agreement, brightness, likeness
+from .judge import MARGIN, Judge
 from .motion import grid, pair, places, surroundings
 from .moving import Movement
 from .survey import spread, survey
@@ -42,6 +43,7 @@ _SOFTNESS = 0.7
 # stays, however many samples there are, while what lending gains falls with them.
 _MOVING_HALF = 8.0
 _ROWS = 64  # at a time: their arrays stay in a processor's cache
+_TINY = np.float32(1e-9)
 # Every half float, by its bits.
 _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
 
@@ -81,17 +83,18 @@ def accumulate(
     on it. Raises PictureError where the frames hold different passes.
     """
     others = same_take(target, others)
-    lenders = _lenders(target, others, movement or Movement())
+    near, far = _lenders(target, others, movement or Movement())
+    judged = _can_judge(target, others)
+    lenders = [near, far] if judged else [near + far]
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
     samples = np.empty(height * width, np.float32)
 
     def work(first: int) -> float:
-        rows = slice(first, min(first + _ROWS, height))
-        block = _Block(target, rows)
-        taken = sum(lender.add(block) for lender in lenders)
-        means[block.pixels], samples[block.pixels] = _means(target, block)
-        return taken
+        block = _Block(target, slice(first, min(first + _ROWS, height)), judged)
+        groups = [_gathered(block, group) for group in lenders if group]
+        means[block.pixels], samples[block.pixels] = _means(target, block, groups)
+        return float(sum(group.lent.sum(dtype=np.float64) for group in groups))
 
     taken = sum(_in_threads(work, range(0, height, _ROWS), threads))
     asked = sum(x.samples for x in others) * height * width
@@ -100,54 +103,143 @@ def accumulate(
     return _unpacked(target, means, samples, rejected, frames)
 
 
+def _can_judge(target: Stored, others: Sequence[Stored]) -> bool:
+    return target.has_light and all(x.noise is not None for x in (target, *others))
+
+
 def _lenders(
     target: Stored, others: Sequence[Stored], movement: Movement
-) -> list[_Same | _Lender]:
-    same = [x for x in others if target.shows_same(x)]
+) -> tuple[list[_Same | _Lender], list[_Same | _Lender]]:
+    """Return what asks each neighbour: the nearest ones, and those farther away."""
     rest = [x for x in others if not target.shows_same(x)]
-    if not rest:
-        return [_Same(x) for x in same]
-    around, detours = surroundings(target), movement.detours(target, rest)
-    pairs = zip(rest, detours, strict=True)
-    asked = [_Lender(pair(target, other, way, around)) for other, way in pairs]
-    return [*(_Same(x) for x in same), *asked]
+    detours = dict(zip(map(id, rest), movement.detours(target, rest), strict=True))
+    around = surroundings(target) if rest else None
+    near = _nearest(target, others)
+    groups: tuple[list[_Same | _Lender], list[_Same | _Lender]] = ([], [])
+    for other in others:
+        lender: _Same | _Lender = _Same(other)
+        if id(other) in detours:
+            lender = _Lender(pair(target, other, detours[id(other)], around))
+        groups[other.number not in near].append(lender)
+    return groups
+
+
+def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
+    """Return the numbers of the frames just before and after, and the frame's own."""
+    before = [x.number for x in others if x.number < target.number]
+    after = [x.number for x in others if x.number > target.number]
+    return {target.number, *sorted(before)[-1:], *sorted(after)[:1]}
 
 
 class _Block:
-    """Some rows of the target, with a margin that the test of agreement looks at."""
+    """Some rows of the target, with a margin that the tests look at."""
 
-    def __init__(self, target: Stored, rows: slice) -> None:
+    def __init__(self, target: Stored, rows: slice, judged: bool) -> None:
         height, width = target.shape
-        self.rows = rows
-        first, last = max(rows.start - REACH, 0), min(rows.stop + REACH, height)
+        margin = MARGIN if judged else REACH
+        first, last = max(rows.start - margin, 0), min(rows.stop + margin, height)
+        self.rows = slice(first, last)
         self.pixels = slice(rows.start * width, rows.stop * width)
         self.wide = grid(target.shape, first, last)
         start = self.pixels.start - first * width
         self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
-        # rows of the margin that lie outside of the picture
-        self.outside = (REACH - rows.start + first, REACH - last + rows.stop)
-        own = _floats(target.picture[self.wide.pixels, :3])
-        self.brightness = {alike: brightness(own, alike) for alike in (True, False)}
-        size = self.pixels.stop - self.pixels.start
-        self.sums = np.zeros((size, target.picture.shape[1]), np.float32)
-        self.weights = np.zeros(size, np.float32)
+        self.own = _floats(target.picture[self.wide.pixels])
+        self.judge: Judge | None = None
+        if judged:
+            self.judge = _judge(target, self)
+        else:
+            light = self.own[:, :3]
+            self.brightness = {x: brightness(light, x) for x in (True, False)}
+
+    def shaped(self, x: NDArray[Any]) -> NDArray[Any]:
+        """The rows (n, ...) as (H, W, ...)."""
+        return x.reshape(self.rows.stop - self.rows.start, -1, *x.shape[1:])
+
+
+def _judge(target: Stored, block: _Block) -> Judge:
+    noise, pixels = target.noise, block.wide.pixels
+    assert noise is not None
+    known = np.ones(len(block.own), bool)
+    if target.spoilt is not None:
+        known = ~target.spoilt[pixels]
+    parts = (noise.brightness, noise.difference, noise.guides)
+    brightness, difference, guides = (block.shaped(_floats(x[pixels])) for x in parts)
+    return Judge(
+        block.shaped(block.own),
+        brightness,
+        difference,
+        np.square(guides),
+        block.shaped(known),
+    )
+
+
+class _Sums:
+    """What some neighbours lend to the wide rows of a block.
+
+    `values` (n, C) and `brightness` (n,) are sums by weight, `weights` (n,) the
+    weights, `lent` (n,) the samples.
+    """
+
+    def __init__(self, block: _Block) -> None:
+        self.values = np.zeros_like(block.own)
+        self.weights, self.lent, self.brightness = np.zeros(
+            (3, len(block.own)), np.float32
+        )
+
+    def add(
+        self, values: Array, weight: Array, lent: Array, root: Array | None
+    ) -> None:
+        values *= weight[:, None]
+        self.values += values
+        self.weights += weight
+        self.lent += lent
+        if root is not None:
+            self.brightness += root * weight
+
+    def scale(self, trust: Array) -> None:
+        """Let all count by weights (n,)."""
+        self.values *= trust[:, None]
+        self.weights *= trust
+        self.lent *= trust
+
+    def cut(self, inner: slice) -> None:
+        """Keep a part of the pixels alone."""
+        self.values, self.weights = self.values[inner], self.weights[inner]
+        self.lent = self.lent[inner]
+
+
+def _gathered(block: _Block, lenders: Sequence[_Same | _Lender]) -> _Sums:
+    """Return what a group of neighbours lends to the block's own rows."""
+    sums = _Sums(block)
+    for lender in lenders:
+        lender.add(block, sums)
+    if block.judge is not None:
+        weights = np.maximum(sums.weights, _TINY)
+        mean = block.shaped(sums.values / weights[:, None])
+        root = block.shaped(sums.brightness / weights)
+        seen = block.shaped(sums.weights > 0.0)
+        sums.scale(block.judge.trust(mean, root, seen).ravel())
+    sums.cut(block.inner)
+    return sums
 
 
 class _Same:
-    """A neighbour that shows the same in every pixel: there is nothing to ask."""
+    """A neighbour that shows the same in every pixel: there is nothing to look for."""
 
     def __init__(self, other: Stored) -> None:
         self._other = other
 
-    def add(self, block: _Block) -> float:
+    def add(self, block: _Block, sums: _Sums) -> None:
         """As `_Lender.add`."""
-        other = self._other
-        weight = np.full(len(block.weights), other.samples, np.float32)
+        other, pixels = self._other, block.wide.pixels
+        weight = _samples(other, pixels, len(block.own))
         if other.spoilt is not None:
-            weight[other.spoilt[block.pixels]] = 0.0
-        block.sums += _floats(other.picture[block.pixels]) * weight[:, None]
-        block.weights += weight
-        return float(weight.sum(dtype=np.float64))
+            weight[other.spoilt[pixels]] = 0.0
+        root = None
+        if block.judge is not None and other.noise is not None:
+            root = _floats(other.noise.brightness[pixels])
+        # a copy: NumPy's own float32 pictures are not to be changed
+        sums.add(_floats(other.picture[pixels]).copy(), weight, weight, root)
 
 
 class _Lender:
@@ -165,11 +257,11 @@ class _Lender:
         self._turn = _turn(target.camera, other.camera)
         self._fall = np.float32(-0.5 * target.samples ** (2 / 3) / _SOFTNESS**2)
 
-    def add(self, block: _Block) -> float:
-        """Add the samples it lends to the pixels of a block; return their sum."""
-        other, inner = self._pair.there, block.inner
+    def add(self, block: _Block, sums: _Sums) -> None:
+        """Add the samples it lends to the pixels of a block."""
+        other = self._pair.there
         if not self._tiles.any():
-            return 0.0
+            return
         found = places(self._pair, block.wide)
         if other.spoilt is not None:
             found.seen[...] &= ~other.spoilt.take(found.pixel)
@@ -177,21 +269,21 @@ class _Lender:
         if self._turn is not None:
             normal = slice(6, 9) if other.has_light else slice(3, 6)
             picked[:, normal] = picked[:, normal] @ self._turn.T
-        weight = self._agreement(block, picked, found.seen)
-        weight *= found.seen[inner]
+        weight = found.seen.astype(np.float32)
+        root = None
+        if block.judge is None:
+            weight *= self._agreement(block, picked, found.seen)
+        elif other.noise is not None:
+            root = _floats(other.noise.brightness.take(found.pixel))
         self._doubt_moving(weight, block, picked, found.seen)
         weight *= spread(self._tiles, self._pair.here.shape, block.rows).ravel()
-        weight *= np.float32(other.samples)
-        taken = float(weight.sum(dtype=np.float64))
-        weight *= np.exp(found.apart[inner] * self._fall)
-        picked = picked[inner]
-        picked *= weight[:, None]
-        block.sums += picked
-        block.weights += weight
-        return taken
+        weight *= _samples(other, found.pixel, len(weight))
+        lent = weight.copy()
+        weight *= np.exp(found.apart * self._fall)
+        sums.add(picked, weight, lent, root)
 
     def _agreement(self, block: _Block, picked: Array, seen: Mask) -> Array:
-        """Return the weights (n,) of the block's inner pixels."""
+        """Return the weights (n,) of the block's pixels by the light of both."""
         target = self._pair.here
         known = seen
         if target.spoilt is not None:
@@ -199,40 +291,50 @@ class _Lender:
         alike = target.samples == self._pair.there.samples
         difference = brightness(picked[:, :3], alike) - block.brightness[alike]
         difference *= known
-        return agreement(self._rows(block, difference)).ravel()
+        return agreement(block.shaped(difference)).ravel()
 
     def _doubt_moving(
         self, weight: Array, block: _Block, picked: Array, seen: Mask
     ) -> None:
-        """Lower the weights (n,) of inner pixels that show what moves by itself."""
+        """Lower the weights (n,) of pixels that show what moves by itself."""
         detour = self._pair.detour
         if detour is None:
             return
-        pixels = block.pixels
+        pixels = block.wide.pixels
+        assert isinstance(pixels, slice)
         part = slice(*detour.pixels.searchsorted((pixels.start, pixels.stop)))
         moving = detour.pixels[part] - pixels.start
         if not moving.size:
             return
         target = self._pair.here
         guides = slice(3, 9) if target.has_light else slice(0, 6)
-        difference = picked[:, guides] - target.picture[block.wide.pixels, guides]
-        rows = self._rows(block, difference), self._rows(block, seen)
+        difference = block.shaped(picked[:, guides] - block.own[:, guides])
+        alike = likeness(difference, block.shaped(seen)).ravel()
         share = np.float32(1.0 / (1.0 + target.samples / _MOVING_HALF))
-        weight[moving] *= share * likeness(*rows).ravel()[moving]
-
-    def _rows(self, block: _Block, x: NDArray[Any]) -> NDArray[Any]:
-        """A block's wide rows (n, ...) as (H, W, ...), 0 beyond the picture."""
-        rows = x.reshape(-1, self._pair.here.shape[1], *x.shape[1:])
-        return np.pad(rows, (block.outside, *[(0, 0)] * x.ndim))
+        weight[moving] *= share * alike[moving]
 
 
-def _means(target: Stored, block: _Block) -> tuple[Array, Array]:
+def _samples(
+    frame: Stored, pixels: slice | NDArray[np.integer], count: int
+) -> NDArray[np.float32]:
+    """Return how many samples flat pixels (n,) of a frame have."""
+    if frame.counts is None:
+        return np.full(count, frame.samples, np.float32)
+    return _floats(frame.counts[pixels]).copy()
+
+
+def _means(
+    target: Stored, block: _Block, groups: Sequence[_Sums]
+) -> tuple[Array, Array]:
     """Return the means of the target's own samples and those lent, and their number."""
-    sums, weights = block.sums, block.weights
-    own = _floats(target.picture[block.pixels])
-    samples = np.full(len(own), target.samples, np.float32)
+    own = block.own[block.inner]
+    samples = _samples(target, block.pixels, len(own))
     if target.spoilt is not None:
         samples[target.spoilt[block.pixels]] = 0.0
+    if not groups:
+        return np.where(samples[:, None] > 0.0, own, np.float32(np.nan)), samples
+    sums = np.sum([group.values for group in groups], axis=0)
+    weights = np.sum([group.weights for group in groups], axis=0)
     total = samples + weights
     sums -= own * weights[:, None]
     with np.errstate(invalid="ignore"):  # NaN where nobody has samples

@@ -45,14 +45,13 @@ def brightness(radiance: Array, alike: bool = True) -> Array:
 
 
 def agreement(difference: Array) -> Array:
-    """Return the weights (H - 2 REACH, W) in (0, 1] of a neighbour's samples.
+    """Return the weights (H, W) in (0, 1] of a neighbour's samples.
 
     `difference` (H, W): brightness of the neighbour minus the frame's own, 0 where
-    nothing is lent. The rows at both ends serve those between; beyond the columns at
-    both ends nothing is lent.
+    nothing is lent, as beyond its ends.
     """
     count = np.float32((2 * REACH + 1) ** 2)
-    wide = np.pad(difference, ((0, 0), (REACH, REACH)))
+    wide = np.pad(difference, REACH)
     square = np.square(_box(wide))
     spread = _box(np.square(wide)) - square / count
     z2 = square / np.maximum(spread, _TINY)
@@ -62,7 +61,7 @@ def agreement(difference: Array) -> Array:
 
 
 def likeness(difference: Array, seen: Mask) -> Array:
-    """Return the weights (H - 2 REACH, W) in (0, 1] of what moves by itself.
+    """Return the weights (H, W) in (0, 1] of what moves by itself.
 
     `difference` (H, W, 6): albedo and normal of the neighbour minus the frame's own,
     where the neighbour is `seen` (H, W). What moves may be a pane, or may shine, and
@@ -73,8 +72,7 @@ def likeness(difference: Array, seen: Mask) -> Array:
     apart = square[..., :3].sum(axis=-1)
     apart += np.float32(_NORMAL_SHARE) * square[..., 3:].sum(axis=-1)
     mean = _box3(apart * seen) / np.maximum(_box3(seen.astype(np.float32)), _TINY)
-    inner = mean[REACH:-REACH]
-    return np.float32(1.0) / (np.float32(1.0) + np.square(inner / _ALIKE**2))
+    return np.float32(1.0) / (np.float32(1.0) + np.square(mean / _ALIKE**2))
 
 
 def _box3(x: Array) -> Array:

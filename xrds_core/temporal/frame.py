@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import PictureError
+from .halves import Halves, Noise, noise_of
 from .neighbours import extreme
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ LARGEST_HALF = 65504.0
 # Share of itself by which nearness differs between neighbours on one surface.
 _SURFACE = 0.02
 _PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
-_OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "index": ()}
+_OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "index": (), "counts": ()}
 
 
 @dataclass(frozen=True)
@@ -117,7 +118,10 @@ class Frame:
     surface was one frame before minus where it is, then where it is minus where it will
     be one frame later, in pixels, y upwards; `index` (H, W), integers that name the
     object at each pixel, and `matrices`, from such an integer to the object's (4, 4)
-    matrix to world. Without these, whatever is hit is taken to stand still.
+    matrix to world. Without these, whatever is hit is taken to stand still. `counts`
+    (H, W): samples of each pixel, where they differ; `samples` is their mean. `halves`
+    of the samples tell what is noise: with them no neighbour is believed that shows
+    something else.
     """
 
     number: int
@@ -132,6 +136,8 @@ class Frame:
     index: NDArray[Any] | None = None
     matrices: Mapping[int, Matrix] = field(default_factory=dict)
     still: bool = False
+    counts: Array | None = None
+    halves: Halves | None = None
 
     def __post_init__(self) -> None:
         for name, channels in (_PASSES | _OPTIONAL).items():
@@ -162,7 +168,8 @@ class Stored:
     alpha (or not), in half floats where memory counts. `nearness` (H W) is 1 / depth, 0
     without a hit; the depth itself for an orthographic camera; NaN where it is not
     known. `spoilt` (H W) says which pixels held NaN or infinities and are 0 now; None
-    if none did.
+    if none did. `counts` (H W): samples of each pixel where they differ. `noise` is
+    what its halves say.
     """
 
     number: int
@@ -176,6 +183,8 @@ class Stored:
     index: NDArray[Any] | None = None
     matrices: Mapping[int, Matrix] = field(default_factory=dict)
     still: bool = False
+    counts: NDArray[Any] | None = None
+    noise: Noise | None = None
 
     @property
     def has_light(self) -> bool:
@@ -239,7 +248,17 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         index=None if frame.index is None else np.ravel(frame.index),
         matrices=frame.matrices,
         still=frame.still,
+        counts=None if frame.counts is None else _counts(frame.counts),
+        noise=None
+        if frame.halves is None
+        else noise_of(frame.halves, frame.samples, dtype),
     )
+
+
+def _counts(counts: Array) -> NDArray[Any]:
+    """Flat, in half floats; what is no count lends nothing."""
+    counts = np.nan_to_num(counts.ravel(), posinf=0.0, neginf=0.0)
+    return np.clip(counts, 0.0, LARGEST_HALF).astype(np.float16)
 
 
 def _nearness(frame: Frame) -> Array:

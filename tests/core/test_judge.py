@@ -1,0 +1,126 @@
+"""Neighbours that show something else, found by the halves of a frame's samples."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from shots import camera
+
+from xrds_core.temporal.accumulate import accumulate
+from xrds_core.temporal.frame import Frame, Stored, store
+from xrds_core.temporal.halves import Halves, noise_of
+from xrds_core.temporal.judge import box
+
+Array = NDArray[np.float32]
+SHAPE = (48, 64)
+SAMPLES = 16.0
+PLAIN = np.full((*SHAPE, 3), 0.5, np.float32)
+SPOTS = np.random.default_rng(7).choice(np.float32([0.2, 0.8]), (*SHAPE, 1))
+SPOTS = np.repeat(SPOTS, 3, axis=-1)
+OTHER_SPOTS = np.ascontiguousarray(SPOTS[:, ::-1])
+
+
+def frame(number: int, light: Array, albedo: Array, noise: float = 0.2) -> Frame:
+    """A frame under a camera that stands still: a wall, light times albedo."""
+    rng = np.random.default_rng(number)
+
+    def halves(truth: Array, spread: float) -> Array:
+        grain = rng.standard_normal((2, *truth.shape)) * spread * 2**0.5
+        return (truth + grain).astype(np.float32)
+
+    normal = np.broadcast_to(np.float32([0, 0, 1]), PLAIN.shape)
+    parts = Halves(
+        halves(light * albedo, noise), halves(albedo, 0.02), halves(normal, 0.01)
+    )
+    return Frame(
+        number=number,
+        camera=camera(),
+        radiance=parts.mean("radiance"),
+        albedo=parts.mean("albedo"),
+        normal=parts.mean("normal"),
+        depth=np.full(SHAPE, 5.0, np.float32),
+        samples=SAMPLES,
+        halves=parts,
+    )
+
+
+def shot(light: Array, albedo: Array, others: tuple[Array, Array]) -> list[Stored]:
+    """Five frames; all but the middle one show `others`, light and albedo."""
+    return [
+        store(frame(n, *((light, albedo) if n == 3 else others))) for n in range(1, 6)
+    ]
+
+
+def gathered(frames: list[Stored]) -> tuple[Array, Array]:
+    """The radiance of the middle frame and its samples, in those of one frame."""
+    result = accumulate(frames[2], frames[:2] + frames[3:])
+    assert result.radiance is not None
+    return result.radiance, result.samples / SAMPLES
+
+
+def error(picture: Array, truth: Array) -> float:
+    return float(np.mean(np.square(picture - truth, dtype=np.float64)))
+
+
+def test_neighbours_that_agree_all_count() -> None:
+    _, samples = gathered(shot(PLAIN, SPOTS, (PLAIN, SPOTS)))
+    assert samples.mean() > 4.3  # halves are taken for parts of one sequence
+
+
+def test_a_pattern_that_differs_is_seen_though_its_mean_is_the_same() -> None:
+    """As of what a mirror shows: the old test of light compares means of areas."""
+    truth = PLAIN * SPOTS
+    other = OTHER_SPOTS
+    seen = (other, other, SPOTS, other, other)
+    frames = [store(frame(n, PLAIN, x, 0.05)) for n, x in enumerate(seen)]
+    judged, samples = gathered(frames)
+    assert samples.mean() < 1.1
+    alone = frames[2].picture[:, :3].reshape(truth.shape)
+    assert error(judged, truth) < 1.05 * error(alone, truth)
+    blind, _ = gathered([replace(x, noise=None) for x in frames])
+    assert error(blind, truth) > 1.1 * error(judged, truth)
+
+
+def test_a_shadow_that_guides_do_not_show_lends_nothing() -> None:
+    shadow = PLAIN.copy()
+    shadow[:, 32:] *= 0.3
+    _, samples = gathered(shot(PLAIN, PLAIN, (shadow, PLAIN)))
+    assert samples[:, 40:].mean() < 1.1
+
+
+def test_one_wrong_neighbour_far_away_spoils_no_near_ones() -> None:
+    right, wrong = (PLAIN, SPOTS), (PLAIN, OTHER_SPOTS)
+    frames = [store(frame(n, *(wrong if n in (1, 5) else right))) for n in range(1, 6)]
+    _, samples = gathered(frames)
+    assert 2.5 < samples.mean() < 3.1
+
+
+def test_a_pixel_without_samples_takes_those_of_neighbours() -> None:
+    frames = [frame(n, PLAIN, SPOTS) for n in range(1, 6)]
+    frames[2].radiance[20, 30] = np.nan
+    picture, samples = gathered([store(x) for x in frames])
+    assert np.isfinite(picture).all()
+    assert samples[20, 30] == pytest.approx(4.0, rel=0.05)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 3e38, -1e6])
+def test_noise_is_finite_whatever_the_halves_hold(bad: float) -> None:
+    halves = frame(1, PLAIN, SPOTS).halves
+    assert halves is not None
+    halves.radiance[0, 3, 4] = bad
+    halves.albedo[1, 5, 6] = bad
+    with np.errstate(all="raise"):
+        noise = noise_of(halves, SAMPLES, np.float16)
+    for array in (noise.brightness, noise.difference, noise.guides):
+        assert np.isfinite(array).all()
+
+
+def test_box_is_a_mean() -> None:
+    x = np.random.default_rng(0).standard_normal((20, 30)).astype(np.float32)
+    for size in (1, 3, 5, 7):
+        half = size // 2
+        expected = x[8 - half : 9 + half, 9 - half : 10 + half].mean()
+        assert box(x, size)[8, 9] == pytest.approx(expected, abs=1e-6)

@@ -1,0 +1,98 @@
+"""Two halves of a frame's samples, and what they say of its noise.
+
+The mean of a frame lies off the truth by noise that the frame alone cannot tell from
+texture. Two halves of its samples can: what they share is the picture, what they differ
+in is noise, pixel by pixel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .agreement import brightness
+
+if TYPE_CHECKING:
+    from numpy.typing import DTypeLike, NDArray
+
+    from ..arrays import Array
+
+# Albedo beyond this is a lamp; it must not outvote the pixels around it.
+_BRIGHTEST = 4.0
+# Normals turn where nothing else changes, so they count less than albedo.
+_NORMAL_SHARE = 0.1
+# Parts of one sequence fill each other's gaps, so they differ more than independent
+# halves would: their correlation is about -1/20 for each doubling of the samples.
+_CORRELATION = -1 / 20
+
+
+@dataclass(frozen=True)
+class Halves:
+    """What each half of a frame's samples shows; float32, the two halves first.
+
+    `radiance`, `albedo`, `normal` (2, H, W, 3) and `alpha` (2, H, W), or None, are as
+    in `Frame`, which holds the means of both. The halves are two parts of one sample
+    sequence, or of two seeds.
+    """
+
+    radiance: Array
+    albedo: Array
+    normal: Array
+    alpha: Array | None = None
+
+    def mean(self, name: str) -> Array | None:
+        """Return the mean of both halves of a pass by its name."""
+        halves = getattr(self, name)
+        return None if halves is None else (halves[0] + halves[1]) * np.float32(0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """What the halves of a frame say of its noise, flat, (H W).
+
+    `brightness` is the mean of the roots of both halves' luminance, `difference` half
+    of what these roots differ by. `guides` is the standard deviation of the
+    frame's guides.
+    """
+
+    brightness: NDArray[Any]
+    difference: NDArray[Any]
+    guides: NDArray[Any]
+
+
+def guides_of(picture: Array) -> Array:
+    """Return (..., 6 or 7): albedo, normal and alpha, scaled to be compared.
+
+    `picture` (..., 9 or 10) is radiance, albedo, normal and perhaps alpha.
+    """
+    guides = picture[..., 3:].copy()
+    np.clip(guides[..., :3], 0.0, _BRIGHTEST, out=guides[..., :3])
+    guides[..., 3:6] *= np.float32(_NORMAL_SHARE**0.5)
+    return guides
+
+
+def noise_of(halves: Halves, samples: float, dtype: DTypeLike) -> Noise:
+    """Return the noise of a frame of `samples` per pixel; finite everywhere."""
+    roots = brightness(halves.radiance)
+    parts = [halves.radiance, halves.albedo, halves.normal]
+    if halves.alpha is not None:
+        parts.append(halves.alpha[..., None])
+    one, two = guides_of(np.concatenate(parts, axis=-1))
+    variance = np.square((one - two) * np.float32(0.5)).sum(axis=-1)
+    variance *= np.float32(_independent(samples))
+    found = (roots[0] + roots[1]) / 2, (roots[0] - roots[1]) / 2, np.sqrt(variance)
+    return Noise(*(_packed(x, dtype) for x in found))
+
+
+def _packed(x: Array, dtype: DTypeLike) -> NDArray[Any]:
+    largest = float(np.finfo(np.dtype(dtype).name).max)
+    finite = np.nan_to_num(x.ravel(), nan=0.0, posinf=largest, neginf=-largest)
+    return np.clip(finite, -largest, largest).astype(dtype)
+
+
+def _independent(samples: float) -> float:
+    """Return the variance of a mean over that of halves taken to be independent."""
+    r = max(_CORRELATION * np.log2(max(samples, 1.0)), -0.5)
+    return float((1 + r) / (1 - r))
