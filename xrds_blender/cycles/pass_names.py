@@ -20,6 +20,14 @@ _KEPT = {ALBEDO, NORMAL, DEPTH, COMBINED, "Depth", "Position", "Normal", "UV"}
 _KEPT |= {"IndexOB", "IndexMA", "Object Index", "Material Index"}
 _KEPT |= {"DiffCol", "GlossCol", "TransCol"}
 _KEPT |= {"Diffuse Color", "Glossy Color", "Transmission Color"}
+# What names things cannot be averaged either.
+_OF_FIRST_SAMPLE = {"Depth", "Position", "IndexOB", "IndexMA"}
+_OF_FIRST_SAMPLE |= {"Object Index", "Material Index"}
+
+
+def is_of_first_sample(name: str) -> bool:
+    """Whether a pass is not a mean over samples, as depth and cryptomattes."""
+    return name in _OF_FIRST_SAMPLE or name.startswith("Crypto")
 
 
 def is_light(name: str) -> bool:

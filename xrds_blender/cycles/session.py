@@ -77,7 +77,7 @@ def run(engine: Any, depsgraph: Any, *, exact: bool = True) -> StageClock:
     import bpy
 
     cycles = functions()
-    samples = _samples(depsgraph)
+    samples = samples_of(depsgraph)
     with StageClock() as clock:
         if getattr(engine, "session", None) and (
             (exact and samples < engine.most_samples) or not _tagged(depsgraph)
@@ -124,7 +124,7 @@ def _noise_in_sight(engine: Any, depsgraph: Any) -> Iterator[None]:
                 write_pass(layer, NOISY, view, picture)
 
 
-def _samples(depsgraph: Any) -> int:
+def samples_of(depsgraph: Any) -> int:
     """Samples per pixel that Cycles will take: a view layer may have its own."""
     cycles, layer = depsgraph.scene_eval.cycles, depsgraph.view_layer_eval
     if layer.samples == 0 or cycles.use_layer_samples == "IGNORE":

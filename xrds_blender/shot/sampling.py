@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from xrds_core.errors import Cancelled, SceneError
 from xrds_core.temporal.frame import Camera, Frame, store
 from xrds_core.temporal.samples import Portion, continued
 
+from ..cycles import session
+from ..cycles.halves import sample_halves, sample_motion
 from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
 from ..cycles.settings import has_subsets
 from ..cycles.view import cameras_of
@@ -51,7 +53,8 @@ class Sampling:
 
     `count` samples per pixel; `geometry` names passes. `place` is the frame's in the
     shot where frames continue one sequence, None where each begins its own. `still`
-    is as in `Frame`.
+    is as in `Frame`. A frame that `has_halves` is sampled in two; one that
+    `needs_motion` is rendered once more without motion blur, to tell it.
     """
 
     number: int
@@ -62,6 +65,8 @@ class Sampling:
     place: int | None = None
     radius: int = 0
     still: bool = False
+    has_halves: bool = False
+    needs_motion: bool = False
 
     def portion(self, count: int, other: int = 0) -> Portion | None:
         """The frame's part, of `count` samples, of the sequence it continues.
@@ -99,15 +104,34 @@ def sampling_of(
     if not job.temporal_radius or not can_continue(scene):
         place = None
     geometry = _geometry(depsgraph)
+    count = job.samples or session.samples_of(depsgraph)
+    blurred = scene.render.use_motion_blur
     return Sampling(
         number=scene.frame_current,
         cameras=cameras,
-        count=job.samples or scene.cycles.samples,
+        count=count,
         seed=scene.cycles.seed if job.seed is None else job.seed,
         geometry=geometry if place is None else [LATE_DEPTH, *geometry[1:]],
         place=place,
         radius=job.temporal_radius,
         still=not scene_facts(depsgraph).moving,
+        has_halves=_has_halves(scene, job, count),
+        needs_motion=blurred and shapes_move(depsgraph),
+    )
+
+
+def _has_halves(scene: Any, job: RenderJob, count: int) -> bool:
+    """Whether a frame's samples can be had in two halves that add up to all of them.
+
+    Not where Cycles decides by itself how many samples a pixel takes.
+    """
+    cycles = scene.cycles
+    is_even = not cycles.use_adaptive_sampling and not cycles.time_limit
+    return (
+        count > 1
+        and job.temporal_radius > 0
+        and has_subsets(scene)
+        and (job.samples is not None or (is_even and not cycles.use_sample_subset))
     )
 
 
@@ -142,6 +166,8 @@ def noisy_frame(
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     progress.begin(engine, f"{progress.SAMPLES} of frame {how.number}", 1, 2)
     try:
+        if how.has_halves:
+            return _frames_of_halves(engine, depsgraph, how)
         noisy, clock = sample_layer(
             engine,
             depsgraph,
@@ -158,6 +184,26 @@ def noisy_frame(
         for view, samples in noisy.items()
     }
     return frames, {"sync": clock.sync, "beauty": clock.render}
+
+
+def _frames_of_halves(
+    engine: Any, depsgraph: Any, how: Sampling
+) -> tuple[dict[str, Frame], dict[str, float]]:
+    """Render a frame in two halves; under motion blur its motion beside them."""
+    motion, seconds = {}, dict.fromkeys(("sync", "beauty"), 0.0)
+    if how.needs_motion:
+        motion, seconds = sample_motion(engine, depsgraph, how.own_seed)
+    portion = how.portion(how.count) or Portion(how.own_seed, how.count, 0, how.count)
+    found, more = sample_halves(engine, depsgraph, portion, how.geometry)
+    frames = {}
+    for view, half in found.items():
+        samples = half.whole
+        if view in motion:
+            still = motion[view]
+            samples = replace(samples, depth=still.depth, vector=still.vector)
+        frame = light_of(how, how.cameras[view], samples)
+        frames[view] = replace(frame, halves=half.halves)
+    return frames, {stage: seconds[stage] + more[stage] for stage in seconds}
 
 
 def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:

@@ -41,11 +41,15 @@ class Halves:
     albedo: Array
     normal: Array
     alpha: Array | None = None
+    shares: tuple[float, float] = (0.5, 0.5)
 
     def mean(self, name: str) -> Array | None:
         """Return the mean of both halves of a pass by its name."""
         halves = getattr(self, name)
-        return None if halves is None else (halves[0] + halves[1]) * np.float32(0.5)
+        if halves is None:
+            return None
+        one, two = (np.float32(share) for share in self.shares)
+        return np.asarray(halves[0] * one + halves[1] * two)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,9 +84,12 @@ def noise_of(halves: Halves, samples: float, dtype: DTypeLike) -> Noise:
     if halves.alpha is not None:
         parts.append(halves.alpha[..., None])
     one, two = guides_of(np.concatenate(parts, axis=-1))
-    variance = np.square((one - two) * np.float32(0.5)).sum(axis=-1)
+    # of the mean: half of what equal halves differ by
+    spread = np.float32((halves.shares[0] * halves.shares[1]) ** 0.5)
+    variance = np.square((one - two) * spread).sum(axis=-1)
     variance *= np.float32(_independent(samples))
-    found = (roots[0] + roots[1]) / 2, (roots[0] - roots[1]) / 2, np.sqrt(variance)
+    middle, apart = (roots[0] + roots[1]) / 2, (roots[0] - roots[1]) * spread
+    found = (middle, apart, np.sqrt(variance))
     return Noise(*(_packed(x, dtype) for x in found))
 
 

@@ -9,7 +9,7 @@ and gain nothing there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -34,6 +34,17 @@ class Portion:
     whole: int
     offset: int
     length: int
+
+    def halves(self) -> tuple[Portion, Portion]:
+        """Return the first and the second half, of two samples or more."""
+        first = self.length - self.length // 2
+        second = replace(self, offset=self.offset + first, length=self.length - first)
+        return replace(self, length=first), second
+
+    def shares(self) -> tuple[float, float]:
+        """Return what share of the samples each half has."""
+        first, second = self.halves()
+        return first.length / self.length, second.length / self.length
 
 
 def portions(
