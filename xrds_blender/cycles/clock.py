@@ -16,19 +16,21 @@ from typing import Any
 # after its last sample.
 _RENDERING = ("Sample ", "Rendered ", "Finish", "Reading full buffer", "Denoising")
 _PEAK = re.compile(r"Mem:[\d.]+M, Peak:([\d.]+)M")
+_SAMPLE = re.compile(r"Sample (\d+)/")
 
 
 class StageClock:
     """Times one Cycles render: `sync` (scene and BVH) and `render` seconds.
 
-    `peak` is the largest memory in bytes that Cycles reported, 0 when it reported none.
+    `peak` is the largest memory in bytes that Cycles reported, `samples` the most that
+    it said it had taken; 0 when it reported none.
     """
 
     def __init__(self) -> None:
         self._start = self._end = 0.0
         self._sync = self._status = 0.0
         self._syncing = True
-        self.peak = 0
+        self.peak = self.samples = 0
 
     def __enter__(self) -> StageClock:
         import bpy
@@ -56,6 +58,8 @@ class StageClock:
         if match := _PEAK.search(line):
             self.peak = max(self.peak, int(float(match[1]) * 2**20))
         status = line.rpartition("|")[2].strip()
+        if match := _SAMPLE.match(status):
+            self.samples = max(self.samples, int(match[1]))
         self._status = now
         self._syncing = not status.startswith(_RENDERING)
 

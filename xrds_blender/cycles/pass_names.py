@@ -6,6 +6,7 @@ ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth
 GUIDE_PASSES = ((ALBEDO, "RGB", "COLOR"), (NORMAL, "XYZ", "VECTOR"))
 COMBINED, NOISY = "Combined", "Noisy Image"
 FIRST_HIT, MOTION = "Depth", "Vector"
+SAMPLE_COUNT = "Debug Sample Count"
 # Light that guides are rendered without, and what was made of it: these passes come
 # from the low-resolution render.
 _LIGHTS = ("Diffuse", "Glossy", "Transmission", "Volume")

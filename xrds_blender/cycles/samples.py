@@ -13,13 +13,24 @@ from xrds_core.temporal.samples import Portion
 
 from . import live, session, spare_passes
 from .once import render_once
-from .pass_names import ALBEDO, COMBINED, DEPTH, FIRST_HIT, MOTION, NOISY, NORMAL
+from .pass_names import (
+    ALBEDO,
+    COMBINED,
+    DEPTH,
+    FIRST_HIT,
+    MOTION,
+    NOISY,
+    NORMAL,
+    SAMPLE_COUNT,
+)
 
 GEOMETRY = ((FIRST_HIT, "Z"), (MOTION, "XYZW"))
 """Passes that tell where a pixel was in another frame."""
 LATE_DEPTH = (DEPTH, "Z")
 """In the place of the first hit's depth where a sequence is continued: that one is
 written by its first sample alone."""
+COUNTS = (SAMPLE_COUNT, "X")
+"""Pass that tells how many samples each pixel took, where Cycles decides that."""
 Reader = Callable[[str], Array | None]
 """Pixels (H, W, channels) of a pass by name, None where there is none."""
 
@@ -30,7 +41,8 @@ class Samples:
 
     `picture` (H, W, 4) is radiance and alpha; `albedo` and `normal` are (H, W, 3),
     normals in camera space. `depth` (H, W) of the first hit, in the scene's units, and
-    `vector` (H, W, 4), motion in pixels, are there when asked for.
+    `vector` (H, W, 4), motion in pixels, are there when asked for; so are `counts`
+    (H, W), the samples that a pixel took as a share of the most that it could.
     """
 
     picture: Array
@@ -38,6 +50,7 @@ class Samples:
     normal: Array
     depth: Array | None = None
     vector: Array | None = None
+    counts: Array | None = None
 
 
 def sample_layer(
@@ -51,9 +64,9 @@ def sample_layer(
 ) -> tuple[dict[str, Samples], session.StageClock]:
     """Render without Cycles' denoiser; samples by view, and what it took.
 
-    `geometry` names those of GEOMETRY that are wanted, or LATE_DEPTH. `portion` is of
-    a longer sequence, in the place of samples and seed. The result holds Cycles' own
-    passes. Raises Cancelled when the user stops it.
+    `geometry` names those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS.
+    `portion` is of a longer sequence, in the place of samples and seed. The result
+    holds Cycles' own passes. Raises Cancelled when the user stops it.
     """
     layer_name = depsgraph.view_layer_eval.name
     for name, letters in geometry:
@@ -87,7 +100,10 @@ def read_samples(read: Reader, wanted: Collection[str]) -> Samples:
     picture = read(COMBINED) if noisy is None else noisy
     passes = [picture, read(ALBEDO), read(NORMAL)]
     depth, vector = read_geometry(read, wanted) if wanted else (None, None)
-    return Samples(*(np.ascontiguousarray(x) for x in passes), depth, vector)
+    counts = read(SAMPLE_COUNT) if SAMPLE_COUNT in wanted else None
+    if counts is not None:
+        counts = np.ascontiguousarray(counts[..., 0])
+    return Samples(*(np.ascontiguousarray(x) for x in passes), depth, vector, counts)
 
 
 def read_geometry(read: Reader, wanted: Collection[str]) -> tuple[Array, Array | None]:

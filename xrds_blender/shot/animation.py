@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -120,13 +121,18 @@ def _has_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> bool:
 
 
 def _renders_single_frames() -> bool:
-    """Whether Blender was started for frames by number.
+    """Whether Blender was started for frames by number alone.
 
-    Each is a render job of its own then, which could keep nothing for the next.
+    Each is a render job of its own then, which could keep nothing for the next. What
+    stands after -- is a script's, as is everything where Blender is a module.
     """
     import bpy
 
-    return bpy.app.background and bool({"-f", "--render-frame"} & set(sys.argv))
+    if not (bpy.app.background and bpy.app.binary_path):
+        return False
+    words = set(takewhile(lambda word: word != "--", sys.argv))
+    animates = {"-a", "--render-anim"} & words
+    return bool({"-f", "--render-frame"} & words) and not animates
 
 
 def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
@@ -273,7 +279,7 @@ def _sample(
     """
     scene = depsgraph.scene_eval
     asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
-    if not can_continue(scene) or (asked and shapes_move(depsgraph)):
+    if not can_continue(scene, window.job) or (asked and shapes_move(depsgraph)):
         return window.method.sample(engine, depsgraph, between=between)
     number, camera = scene.frame_current, scene.camera.name_full
     first, kept = window.first.get(camera, (number, {}))

@@ -26,7 +26,7 @@ from ..frame import progress
 from ..frame.job import RenderJob
 from .sampling import Sampled
 
-_FORM = 1  # counts up where samples of the same settings become others
+_FORM = 2  # counts up where samples of the same settings become others
 
 
 @dataclass(frozen=True)

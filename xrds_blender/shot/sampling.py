@@ -14,7 +14,7 @@ from xrds_core.temporal.samples import Portion, continued
 
 from ..cycles import session
 from ..cycles.halves import sample_halves, sample_motion
-from ..cycles.samples import GEOMETRY, LATE_DEPTH, Samples, sample_layer
+from ..cycles.samples import COUNTS, GEOMETRY, LATE_DEPTH, Samples, sample_layer
 from ..cycles.settings import has_subsets
 from ..cycles.view import cameras_of
 from ..frame import progress
@@ -25,6 +25,7 @@ from ..scene.facts import scene_facts, shapes_move, stands_still
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
 LARGEST_SEED = 2**31 - 1
+_FEWEST = 1.0  # samples, on the mean of a frame
 
 
 Keep = Callable[[Mapping[str, Frame]], object]
@@ -83,9 +84,12 @@ class Sampling:
         return (self.seed + self.number * SEED_STEP) % LARGEST_SEED
 
 
-def can_continue(scene: Any) -> bool:
-    """Whether frames can take parts of one sequence: where pixels stand still."""
-    return stands_still(scene.camera) and has_subsets(scene)
+def can_continue(scene: Any, job: RenderJob) -> bool:
+    """Whether frames can take parts of one sequence: where pixels stand still.
+
+    And where the file does not let Cycles decide how many samples a pixel takes.
+    """
+    return stands_still(scene.camera) and has_subsets(scene) and _is_even(scene, job)
 
 
 def sampling_of(
@@ -101,9 +105,10 @@ def sampling_of(
     cameras = cameras_of(engine, depsgraph)
     if not cameras:
         raise SceneError("such panoramas lend nothing; set the temporal radius to 0")
-    if not job.temporal_radius or not can_continue(scene):
+    is_even = _is_even(scene, job)
+    if not job.temporal_radius or not can_continue(scene, job):
         place = None
-    geometry = _geometry(depsgraph)
+    geometry = [*_geometry(depsgraph), *([] if is_even else [COUNTS])]
     count = job.samples or session.samples_of(depsgraph)
     blurred = scene.render.use_motion_blur
     return Sampling(
@@ -115,24 +120,22 @@ def sampling_of(
         place=place,
         radius=job.temporal_radius,
         still=not scene_facts(depsgraph).moving,
-        has_halves=_has_halves(scene, job, count),
+        has_halves=is_even and _has_halves(scene, job, count),
         needs_motion=blurred and shapes_move(depsgraph),
     )
 
 
-def _has_halves(scene: Any, job: RenderJob, count: int) -> bool:
-    """Whether a frame's samples can be had in two halves that add up to all of them.
-
-    Not where Cycles decides by itself how many samples a pixel takes.
-    """
+def _is_even(scene: Any, job: RenderJob) -> bool:
+    """Whether every pixel takes as many samples as it is asked to."""
     cycles = scene.cycles
-    is_even = not cycles.use_adaptive_sampling and not cycles.time_limit
-    return (
-        count > 1
-        and job.temporal_radius > 0
-        and has_subsets(scene)
-        and (job.samples is not None or (is_even and not cycles.use_sample_subset))
-    )
+    decides = cycles.use_adaptive_sampling or cycles.time_limit
+    return job.samples is not None or not decides
+
+
+def _has_halves(scene: Any, job: RenderJob, count: int) -> bool:
+    """Whether a frame's even samples can be had in two halves that add up to all."""
+    is_part = job.samples is None and scene.cycles.use_sample_subset
+    return count > 1 and job.temporal_radius > 0 and has_subsets(scene) and not is_part
 
 
 def sample_frame(
@@ -179,6 +182,8 @@ def noisy_frame(
     except Cancelled:
         keep_samples(engine, layer_name, job)
         raise
+    if clock.samples:  # where Cycles stopped before the most it was allowed
+        how = replace(how, count=min(clock.samples, how.count))
     frames = {
         view: light_of(how, how.cameras[view], samples)
         for view, samples in noisy.items()
@@ -209,6 +214,9 @@ def _frames_of_halves(
 def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
     """One view's samples as accumulation takes them."""
     assert samples.depth is not None
+    counts = samples.counts
+    if counts is not None:
+        counts = counts * np.float32(how.count)
     return Frame(
         number=how.number,
         camera=camera,
@@ -218,8 +226,9 @@ def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
         normal=samples.normal,
         depth=samples.depth,
         vector=samples.vector,
-        samples=how.count,
+        samples=how.count if counts is None else max(float(counts.mean()), _FEWEST),
         still=how.still,
+        counts=counts,
     )
 
 

@@ -15,8 +15,9 @@ import numpy as np
 from .. import exr
 from ..exr_library import Part
 from ..temporal.frame import LARGEST_HALF
+from ..temporal.halves import noise_of
 from .cameras import to_header
-from .names import CAMERA_NORMAL, NOISY
+from .names import CAMERA_NORMAL, NOISE, NOISY
 from .reading import KEY, NAME, RADIUS, SAMPLES, STILL
 
 if TYPE_CHECKING:
@@ -75,12 +76,22 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
         passes.append((NOISY, "A", frame.alpha[..., None]))
     if frame.vector is not None:
         passes.append(("Vector", "XYZW", frame.vector))
+    if frame.halves is not None:
+        passes.append((NOISE, "XYZ", _noise(frame)))
     channels: dict[str, NDArray[Any]] = {
         f"{layer}{name}.{letter}": _half(array[..., i])
         for name, letters, array in passes
         for i, letter in enumerate(letters)
     }
     return channels | {f"{layer}Depth.Z": frame.depth.astype(np.float32)}
+
+
+def _noise(frame: Frame) -> Array:
+    """Return (H, W, 3): brightness, difference and guides of `Noise`."""
+    assert frame.halves is not None
+    noise = noise_of(frame.halves, frame.samples, np.float16)
+    parts = (noise.brightness, noise.difference, noise.guides)
+    return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 
 
 def _half(x: Array) -> NDArray[np.float16]:

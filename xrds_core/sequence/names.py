@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
 CAMERA_NORMAL = "Denoising Normal"
+NOISE = "XRDS Noise"  # what halves of the samples say, in frames that XRDS keeps
 # Of passes in the order in which they are looked for, in any case of letters.
 _USUAL = {
     "beauty": (NOISY, COMBINED, "beauty", "RGBA", "rgb", "C", "Ci"),
@@ -60,6 +61,7 @@ class Found:
     position: list[str]
     depth: list[str]
     vector: list[str]
+    noise: list[str]
     picture: list[str]
     alpha: str | None
     has_camera_normal: bool
@@ -86,10 +88,16 @@ def find(channels: Channels, names: PassNames) -> Found:
         position=_channels(channels, names, "position"),
         depth=_depth(channels, names),
         vector=_channels(channels, names, "vector", _MOTION),
+        noise=_noise(channels),
         picture=channels.of(target) or ["R", "G", "B"],
         alpha=next((x for x in alphas if x in channels.names), None),
         has_camera_normal=(normal or "").endswith(CAMERA_NORMAL),
     )
+
+
+def _noise(channels: Channels) -> list[str]:
+    found = channels.find(NOISE, ("XYZ",))
+    return [] if found is None else channels.of(found, ("XYZ",))
 
 
 def _target(channels: Channels, prefix: str) -> str:

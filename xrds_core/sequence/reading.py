@@ -9,6 +9,7 @@ import numpy as np
 
 from ..exr import File
 from ..temporal.frame import SKY_DEPTH, Camera, Frame, Stored, store
+from ..temporal.halves import Noise
 from ..temporal.motion import centres, pixels_of
 from .cameras import from_header, told_camera
 from .errors import NotLending, Unfit
@@ -104,8 +105,9 @@ def read_frame(
         vector=_vector(file, found, reading),
         still=bool(part.attributes.get(STILL, 0)),
     )
+    stored = store(frame, np.float16)
     return FrameFile(
-        stored=store(frame, np.float16),
+        stored=replace(stored, noise=_noise(file, found)),
         inner=_inner(file.window, part.data_window),
         part=number_of_part,
         channels=channels,
@@ -212,6 +214,14 @@ def _vector(file: File, found: Found, reading: Reading) -> Array | None:
         motion = motion * np.array(reading.motion_scale, np.float32)
         return -np.concatenate((motion, motion), axis=-1)
     return motion
+
+
+def _noise(file: File, found: Found) -> Noise | None:
+    """What halves said of a frame that XRDS kept."""
+    if not found.noise:
+        return None
+    planes = (np.nan_to_num(file.plane(name).ravel()) for name in found.noise)
+    return Noise(*(plane.astype(np.float16) for plane in planes))
 
 
 def _samples(part: Part, reading: Reading) -> int:
