@@ -261,13 +261,15 @@ def _copy(
         part = file.parts[number]
         channels = part.channels
     for name, pixels in planes.items():
-        if name in channels:
-            old = channels[name].pixels
+        old = channels[name].pixels if name in channels else None
+        if old is not None and old.dtype.kind == "f":
             old[...] = fitting(pixels, old.dtype)
-        else:
+        else:  # no integers, in which light would be cut to 0
             channels[name] = OpenEXR.Channel(name, np.ascontiguousarray(pixels))
     try:
-        if alone:
+        if not alone:
+            _make_writable(file.parts)
+        else:
             header = {k: v for k, v in part.header.items() if k not in _OF_CHANNELS}
             header["type"] = OpenEXR.scanlineimage
             file = OpenEXR.File(header, channels)
@@ -275,6 +277,34 @@ def _copy(
             file.write(str(path))
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
+
+
+def _make_writable(parts: Any) -> None:
+    """Bring parts into a form that the library can write.
+
+    Smaller levels of a texture would be those of the noisy picture, and the library
+    writes none; nor does it write channels of different sizes, so that their values are
+    repeated.
+    """
+    import OpenEXR
+
+    for part in parts:
+        if "tiles" in part.header:
+            tiles = part.header["tiles"]
+            tiles.mode = OpenEXR.ONE_LEVEL
+            part.header["tiles"] = tiles
+        for name, channel in part.channels.items():
+            across, down = channel.xSampling, channel.ySampling
+            if (across, down) != (1, 1):
+                part.channels[name] = OpenEXR.Channel(
+                    name, _repeated(channel.pixels, across, down, part)
+                )
+
+
+def _repeated(pixels: Pixels, across: int, down: int, part: Any) -> Pixels:
+    (left, top), (right, bottom) = _window(part.header["dataWindow"])
+    whole = pixels.repeat(down, axis=0).repeat(across, axis=1)
+    return np.ascontiguousarray(whole[: bottom - top + 1, : right - left + 1])
 
 
 def _window(corners: Any) -> Window:

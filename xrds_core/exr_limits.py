@@ -27,11 +27,19 @@ def limit_of(size: int) -> int:
 
 
 def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
-    """Raise PictureError for windows that cannot be, or whose pixels take too much."""
+    """Raise PictureError for windows that cannot be, or whose pixels take too much.
+
+    Data lie in the display window, or both in one around them. Deep pixels have any
+    number of samples, which no header tells: they are refused.
+    """
     claimed = 0
     for header in headers:
-        areas = [_area(path, header, name) for name in ("dataWindow", "displayWindow")]
-        claimed += max(areas) * len(header["channels"]) * _BYTES
+        if "deep" in str(header.get("type", "")):
+            raise PictureError(
+                f"{path} is deep; save it with flat channels of full resolution"
+            )
+        windows = [_window(path, header, x) for x in ("dataWindow", "displayWindow")]
+        claimed += _area_around(windows) * len(header["channels"]) * _BYTES
     if claimed > limit:
         raise PictureError(
             f"{path} claims {claimed / 1e9:.1f} GB of pixels, more than a file of its "
@@ -39,9 +47,16 @@ def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
         )
 
 
-def _area(path: object, header: Any, name: str) -> int:
+def _window(path: object, header: Any, name: str) -> list[int]:
+    """Return left, top, right and bottom, exclusive."""
     (left, top), (right, bottom) = header[name]
-    width, height = int(right) - int(left) + 1, int(bottom) - int(top) + 1
+    left, top, right, bottom = int(left), int(top), int(right) + 1, int(bottom) + 1
+    width, height = right - left, bottom - top
     if not (0 < width <= _LARGEST_SIDE and 0 < height <= _LARGEST_SIDE):
         raise PictureError(f"{path} is damaged: its {name} is {width}x{height} pixels")
-    return width * height
+    return [left, top, right, bottom]
+
+
+def _area_around(windows: list[list[int]]) -> int:
+    lefts, tops, rights, bottoms = zip(*windows, strict=True)
+    return (max(rights) - min(lefts)) * (max(bottoms) - min(tops))

@@ -8,6 +8,9 @@ from pathlib import Path
 
 RADIUS = 4
 """Frames before and after that lend their samples, by default: more bring little."""
+MOST_RADIUS = 32
+"""What a file may recommend: all these frames are kept in memory."""
+_MOST_RUNS = 50  # of frame numbers that a line has room for
 
 
 def frame_path(pattern: str, frame: int) -> Path:
@@ -26,7 +29,8 @@ def frame_path(pattern: str, frame: int) -> Path:
 def frame_numbers(pattern: str) -> list[int]:
     """Return the numbers of the frames that are there, in order.
 
-    [] where there are none, also of a pattern without #.
+    [] where there are none, also of a pattern without #. What has such a name need not
+    be a file: whoever reads it tells.
     """
     parts = _split(pattern)
     folder = Path(pattern).parent
@@ -34,20 +38,22 @@ def frame_numbers(pattern: str) -> list[int]:
         return []
     before, _, after = (re.escape(str(part)) for part in parts)
     name = re.compile(f"{before}(-?[0-9]+){after}")
-    found = (name.fullmatch(path.name) for path in folder.iterdir())
-    numbers = {int(match[1]) for match in found if match}
-    return sorted(n for n in numbers if frame_path(pattern, n).is_file())
+    names = {path.name for path in folder.iterdir()}
+    numbers = {int(match[1]) for match in map(name.fullmatch, names) if match}
+    return sorted(n for n in numbers if frame_path(pattern, n).name in names)
 
 
 def in_words(numbers: Sequence[int]) -> str:
-    """Say frame numbers, which are in order, as 1-24, 30."""
+    """Say frame numbers, which are in order, as 1-24, 30; of many runs the first."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and runs[-1][-1] == number - 1:
             runs[-1].append(number)
         else:
             runs.append([number])
-    return ", ".join(f"{x[0]}-{x[-1]}" if len(x) > 1 else f"{x[0]}" for x in runs)
+    told = [f"{x[0]}-{x[-1]}" if len(x) > 1 else f"{x[0]}" for x in runs[:_MOST_RUNS]]
+    more = sum(map(len, runs[_MOST_RUNS:]))
+    return ", ".join(told) + (f" and {more} more" if more else "")
 
 
 def _split(pattern: str) -> tuple[str, int, str] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -36,6 +36,10 @@ _OVERLAP_WINDOWS = 5
 # (`paper`), on pictures of 256 to 2048 pixels squared.
 _CPU_OVERHEAD = 2.0
 _GPU_OVERHEAD = 1.5
+# The base divides by albedo: radiance above this (a power of 2, so that nothing is
+# rounded) is brought down before and back after, or it would leave float32.
+_BRIGHT = 2.0**64
+_LARGEST = np.float32(3.4e38)
 _TILE_BYTES = 100.0  # per output pixel beside the network: guides, result, weights
 
 
@@ -246,7 +250,11 @@ class Upscaler:
         """Write the base outside of `area`, which stays 0."""
         if area is not None and _size(area) == inputs.low.shape[:2]:
             return
-        write_base(picture[..., :3], inputs)
+        base = picture[..., :3]
+        bright = np.float32(_BRIGHT if inputs.low.max() > _BRIGHT else 1.0)
+        write_base(base, replace(inputs, low=inputs.low / bright))
+        np.minimum(base, _LARGEST / bright, out=base)
+        base *= bright
         if area is not None:
             rows, columns = (
                 slice(s.start * self.scale, s.stop * self.scale) for s in area

@@ -96,6 +96,14 @@ def test_an_even_picture_needs_no_network(fast: Upscaler) -> None:
     np.testing.assert_allclose(result.radiance, 0.4, rtol=1e-5)
 
 
+@pytest.mark.parametrize("value", [3e38, 3.4e38])
+def test_the_brightest_even_picture_stays_finite(fast: Upscaler, value: float) -> None:
+    low = np.full((16, 16, 3), value, np.float32)
+    albedo = np.full((32, 32, 3), 0.5, np.float32)
+    picture = fast(low, albedo, np.full_like(albedo, 0.6)).radiance
+    np.testing.assert_allclose(picture, low[0, 0, 0], rtol=1e-5)
+
+
 @pytest.mark.parametrize("wrong", ["no normals", "bright sky", "light on nothing"])
 def test_doubts_are_computed(fast: Upscaler, wrong: str) -> None:
     """Guides without normals, a sky that albedo cannot hold, fog over black."""

@@ -116,8 +116,9 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
     denoiser = Denoiser(
         options.denoise, options.device, memory_limit=options.memory_limit
     )
+    others = (options.camera,) if options.camera else ()
     return denoise_sequence(
-        Files(options.source, options.out, options.picture_only),
+        Files(options.source, options.out, options.picture_only, others),
         denoiser,
         frames=options.frames,
         radius=options.temporal_radius,
@@ -149,6 +150,6 @@ def _check(result: dict[str, Any]) -> None:
     missing = [each["frame"] for each in result["left_out"]]
     if missing:
         raise XRDSError(
-            f"frames {in_words(missing)} could not be read and were left out; render "
-            "them again, then denoise with --resume"
+            f"frames {in_words(missing)} could not be finished and were left out; "
+            "render them again, then denoise with --resume"
         )

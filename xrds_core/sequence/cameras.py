@@ -16,7 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import UsageError
-from ..temporal.frame import Camera, Sphere
+from ..files import read_stream
+from ..temporal.frame import Camera
+from . import attributes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -31,6 +33,7 @@ SPHERE = "xrds/sphere"
 _AHEAD = np.diag([1.0, 1.0, -1.0, 1.0])  # to and from a camera that looks along +Z
 _SKEW = 1e-3
 _SENSOR = 36.0  # mm, of a camera in JSON that names none
+_MOST_BYTES = 64 << 20  # of a file of cameras: a hundred thousand frames
 
 
 def to_header(camera: Camera) -> dict[str, list[list[float]] | str]:
@@ -47,25 +50,32 @@ def to_header(camera: Camera) -> dict[str, list[list[float]] | str]:
     }
 
 
-def from_header(attributes: Mapping[str, Any], size: tuple[int, int]) -> Camera | None:
+def from_header(told: Mapping[str, Any], size: tuple[int, int]) -> Camera | None:
     """Return the camera that a header tells; None without the attributes.
 
-    `size` is (width, height) of the display window. Raises ValueError for matrices that
-    are no camera's.
+    `size` is (width, height) of the display window. Raises ValueError for what is no
+    camera's.
     """
-    if VIEW not in attributes or not {NDC, PROJECT, SPHERE} & set(attributes):
+    if VIEW not in told or not {NDC, PROJECT, SPHERE} & set(told):
         return None
-    view = _matrix(attributes[VIEW]).T
-    if SPHERE in attributes:
-        west, east, south, north = map(float, attributes[SPHERE].split())
-        sphere = Sphere((west, east), (south, north))
+    view = attributes.placement(_transposed(told[VIEW]))
+    if SPHERE in told:
+        sphere = attributes.sphere(told[SPHERE])
         return Camera(_AHEAD @ view, np.zeros((4, 4)), size, sphere=sphere)
-    if PROJECT in attributes:
-        return Camera(_AHEAD @ view, _matrix(attributes[PROJECT]).T, size)
-    seen: Matrix = _matrix(attributes[NDC]).T @ _inverse(view)
+    if PROJECT in told:
+        project = attributes.projection(_transposed(told[PROJECT]))
+        return Camera(_AHEAD @ view, project, size)
+    ndc = attributes.matrix(_transposed(told[NDC]))
+    seen: Matrix = ndc @ np.linalg.inv(view)
     perspective = abs(seen[3, 2]) > _SKEW * abs(seen[3, 3])
     turned: Matrix = _AHEAD if not perspective or seen[3, 2] > 0 else np.eye(4)
-    return Camera(turned @ view, _project(seen @ turned, perspective), size)
+    project = _project(seen @ turned, perspective)
+    return Camera(turned @ view, attributes.projection(project.tolist()), size)
+
+
+def _transposed(rows: Any) -> list[list[float]]:
+    """Headers hold matrices for row vectors, cameras those for columns."""
+    return attributes.matrix(rows).T.tolist()
 
 
 def _project(seen: Matrix, perspective: bool) -> Matrix:
@@ -108,16 +118,16 @@ def read_cameras(path: Path) -> dict[int | None, dict[str, Any]]:
     another `name` lend nothing to each other. Raises UsageError.
     """
     try:
-        told = json.loads(path.read_text("utf-8"))
+        told = json.loads(read_stream(path, _MOST_BYTES).decode("utf-8"))
         keys = {None if k == "all" else int(k): v for k, v in told.items()}
         for camera in keys.values():
             _told_camera(camera, (2, 2), 1.0)
-    except OSError as error:
-        raise UsageError(f"cannot read {path}: {error.strerror}") from error
     except KeyError as error:
         raise UsageError(f"{path}: a camera lacks {error}") from error
     except (ValueError, TypeError, AttributeError) as error:
         raise UsageError(f"{path} is no file of cameras ({error})") from error
+    except RecursionError as error:
+        raise UsageError(f"{path} is no file of cameras (lists in lists)") from error
     return keys
 
 
@@ -130,7 +140,7 @@ def told_camera(
     """Return the camera of a frame as `read_cameras` has it, or None.
 
     `size` is (width, height) of the display window, `aspect` a pixel's width over its
-    height.
+    height. Raises ValueError where the two together make no camera.
     """
     told = cameras.get(number, cameras.get(None))
     return None if told is None else _told_camera(told, size, aspect)
@@ -139,34 +149,26 @@ def told_camera(
 def _told_camera(
     told: Mapping[str, Any], size: tuple[int, int], aspect: float
 ) -> Camera:
-    view = _inverse(_matrix(told["to_world"]))
+    view = np.linalg.inv(attributes.placement(told["to_world"]))
     name = str(told.get("name", ""))
-    if "project" in told:
-        return Camera(view, _matrix(told["project"]), size, name=name)
+    rows = told["project"] if "project" in told else _lens(told, size, aspect).tolist()
+    return Camera(view, attributes.projection(rows), size, name=name)
+
+
+def _lens(told: Mapping[str, Any], size: tuple[int, int], aspect: float) -> Matrix:
+    """Return `Camera.project` of a focal length, or of an orthographic width."""
     width, height = size[0] * aspect, size[1]
     project = np.zeros((4, 4))
-    shift_x, shift_y = told.get("shift", (0.0, 0.0))
+    shift_x, shift_y = attributes.pair(told.get("shift", [0.0, 0.0]))
     shift = np.array([2 * shift_x, 2 * shift_y * width / height])
     if "ortho_width" in told:
-        across = 2.0 / float(told["ortho_width"])
+        across = 2.0 / attributes.positive(told["ortho_width"])
         project[2, 2], project[3, 3] = -1.0, 1.0
         project[:2, 3] = -shift
     else:
-        across = 2.0 * float(told["focal_length"]) / told.get("sensor_width", _SENSOR)
+        sensor = attributes.positive(told.get("sensor_width", _SENSOR))
+        across = 2.0 * attributes.positive(told["focal_length"]) / sensor
         project[2, 2], project[2, 3], project[3, 2] = -1.0, -1.0, -1.0
         project[:2, 2] = shift
     project[0, 0], project[1, 1] = across, across * width / height
-    return Camera(view, project, size, name=name)
-
-
-def _matrix(rows: Any) -> Matrix:
-    matrix = np.array(rows, np.float64)
-    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-        raise ValueError("a matrix has not 4 rows of 4 numbers")
-    return matrix
-
-
-def _inverse(matrix: Matrix) -> Matrix:
-    if abs(np.linalg.det(matrix[:3, :3])) < 1e-30:
-        raise ValueError("a matrix has no inverse")
-    return np.asarray(np.linalg.inv(matrix))
+    return project

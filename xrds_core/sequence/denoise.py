@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import exr
 from ..errors import PictureError, UsageError
-from ..files import check_folder, check_place
+from ..files import check_folder, check_places
 from ..frames import RADIUS, frame_numbers, frame_path
 from ..temporal.moving import Movement
 from ..temporal.window import Shot, slide
@@ -34,12 +34,13 @@ class Files:
     """Where frames come from and go to; # stands for digits of the frame number.
 
     `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
-    the input as well, as they are.
+    the input as well, as they are. `others` are files that are read beside the frames.
     """
 
     source: str
     output: str
     picture_only: bool = False
+    others: tuple[Path, ...] = ()
 
     def write(self, number: int, frame: FrameFile, finished: Finished) -> Path:
         """Write a finished frame, whole or not at all; raises PictureError."""
@@ -71,8 +72,11 @@ class Files:
         except PictureError:
             return False
 
-    def check(self, numbers: Sequence[int]) -> None:
-        """Refuse outputs that cannot be; make their folder."""
+    def check(self, numbers: Sequence[int], there: Sequence[int]) -> None:
+        """Refuse outputs that cannot be; make their folder.
+
+        `there` are all frames that have a file: none may be written over.
+        """
         if Path(self.output).suffix.lower() != ".exr":
             raise UsageError(f"output {self.output!r} must end in .exr")
         if len(numbers) > 1 and "#" not in Path(self.output).name:
@@ -80,9 +84,10 @@ class Files:
                 f"all {len(numbers)} frames would be written to {self.output!r}; add "
                 "#### for the frame number"
             )
-        for number in numbers:
-            source, path = (frame_path(x, number) for x in (self.source, self.output))
-            check_place(path, [source])
+        inputs = [frame_path(self.source, n) for n in there]
+        known = set(there)
+        outputs = (frame_path(self.output, n) for n in numbers if n in known)
+        check_places(outputs, [*inputs, *self.others])
         check_folder(Path(self.output).parent)
 
 
@@ -100,8 +105,8 @@ def denoise_sequence(
 
     Args:
         files: inputs and outputs.
-        frames: their numbers; all that are there by default. Others that are there
-            lend, too.
+        frames: their numbers; all that are there by default. Others that are there,
+            between these or beside them, lend, too.
         radius: how many frames before and after lend; by default what the files
             recommend, or 4.
         resume: leave outputs as they are that lie there whole, of their size, and
@@ -118,20 +123,23 @@ def denoise_sequence(
             be written; outputs before it are complete.
     """
     numbers = sorted(set(frames)) if frames else _all_frames(files.source)
-    files.check(numbers)
+    there = _there(files.source, numbers)
+    files.check(numbers, there)
     if "#" not in Path(files.source).name:
         radius = radius or 0  # a frame alone
     loader = Loader(files.source, reading or Reading(), lends=radius != 0, say=say)
-    loader.look(numbers)
-    first = loader.first(numbers)
+    loader.look(numbers, set(there))
+    readable = [n for n in numbers if n not in loader.failed]
+    first = loader.first(readable)
     if radius is None:
         radius = RADIUS if first is None or first.radius is None else first.radius
-    lending = (*numbers, *_beside(files.source, numbers, radius))
+    lending = (*numbers, *there)
     shot = Shot((), radius, lending=lending)
-    done = {n for n in numbers if resume and files.is_done(n, shot.lenders(n))}
+    written = set(_there(files.output, numbers) if resume else ())
+    done = {n for n in numbers if n in written and files.is_done(n, shot.lenders(n))}
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
-    todo = [n for n in numbers if n not in done]
+    todo = [n for n in readable if n not in done]
     shot = Shot(tuple(todo), radius, lending=lending)
     entries = []
     clock = Clock()
@@ -146,7 +154,7 @@ def denoise_sequence(
         "device": denoiser.device,
         "frames": entries,
         "kept": sorted(done),
-        "left_out": _left_out(loader, todo),
+        "left_out": _left_out(loader, [n for n in numbers if n not in done]),
     }
 
 
@@ -158,8 +166,11 @@ def _entries(
     resume: bool,
     say: Say,
 ) -> Iterator[dict[str, Any]]:
-    """Finish and write the frames of a shot; yields what is told of each."""
-    lenders, movement = Lenders(say), Movement()
+    """Finish and write the frames of a shot; yields what is told of each.
+
+    A frame that cannot be written is left out; two of them in a row end the work.
+    """
+    lenders, movement, fails = Lenders(say), Movement(), False
     for number, own, beside in slide(shot, loader.load):
         # another machine may have been quicker
         if resume and files.is_done(number, shot.lenders(number)):
@@ -169,10 +180,19 @@ def _entries(
             own.stored, others, denoiser, movement, region=own.inner
         )
         started = time.perf_counter()
-        path = files.write(number, own, finished)
+        try:
+            path, fails = files.write(number, own, finished), False
+        except PictureError as error:
+            if fails:
+                raise
+            fails = True
+            loader.leave_out(number, error)
+            continue
+        lenders.heed(own, others, finished.gathered)
         seconds = {"read": loader.seconds(), **finished.seconds}
         seconds["write"] = time.perf_counter() - started
         yield _entry(number, path, shot.radius, finished, seconds)
+    lenders.sum_up()
 
 
 def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
@@ -189,13 +209,11 @@ def _all_frames(pattern: str) -> list[int]:
     return numbers
 
 
-def _beside(pattern: str, numbers: Sequence[int], radius: int) -> list[int]:
-    """Frames before the first and after the last that are there, to lend."""
-    steps = [b - a for a, b in pairwise(numbers)]
-    reach = radius * min(steps, default=1)
-    first, last = numbers[0] - reach, numbers[-1] + reach
-    there = [n for n in frame_numbers(pattern) if first <= n <= last]
-    return [n for n in there if not numbers[0] <= n <= numbers[-1]]
+def _there(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
+    """The frames that have a file; one without # is that of every number."""
+    if "#" in Path(pattern).name:
+        return frame_numbers(pattern)
+    return numbers if os.path.lexists(pattern) else []
 
 
 def _entry(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ..temporal.accumulate import Accumulated
     from ..temporal.frame import Stored
     from .reading import FrameFile
 
@@ -19,6 +20,7 @@ class Lenders:
     def __init__(self, say: Callable[[str], object]) -> None:
         self._say = say
         self._odd: set[int] = set()
+        self._asked = self._lent = False
 
     def of(
         self, number: int, own: FrameFile, beside: Mapping[int, FrameFile]
@@ -31,6 +33,21 @@ class Lenders:
             for n, other in beside.items()
             if other.lends and self._fits(number, own, n, other)
         ]
+
+    def heed(
+        self, own: FrameFile, others: Sequence[Stored], gathered: Accumulated
+    ) -> None:
+        """Notice whether anything is ever lent in this shot."""
+        self._asked |= bool(others)
+        self._lent |= bool((gathered.samples > own.stored.samples).any())
+
+    def sum_up(self) -> None:
+        """Tell of a shot in which nothing was lent: its cameras may be wrong."""
+        if self._asked and not self._lent:
+            self._say(
+                "no frame took samples of another: what they show lies elsewhere by "
+                "their cameras and depths; check these if it is one shot"
+            )
 
     def _fits(self, number: int, own: FrameFile, n: int, other: FrameFile) -> bool:
         why = _difference(own, other)

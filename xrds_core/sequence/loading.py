@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from ..errors import PictureError
@@ -19,7 +19,7 @@ class Loader:
     """Reads frames; `failed` are the reasons of those that cannot be, by number.
 
     A frame that is damaged or lacks passes is left out, and the others go on without
-    it. But what the first one lacks will be lacking in all: that is raised.
+    it. But what the first two lack will be lacking in all: that is raised.
     """
 
     def __init__(
@@ -32,23 +32,35 @@ class Loader:
         self._any_is_fit = False
         self._seconds = 0.0
 
-    def look(self, numbers: Sequence[int]) -> None:
-        """Tell of frames that have no file, all in one line."""
-        paths = {n: frame_path(self._pattern, n) for n in numbers}
-        missing = {n: path for n, path in paths.items() if not path.is_file()}
-        self.failed |= {n: f"no file {path}" for n, path in missing.items()}
+    def look(self, numbers: Sequence[int], there: Container[int]) -> None:
+        """Tell of frames that have no file, all in one line; `there` are the others."""
+        missing = [n for n in numbers if n not in there]
+        paths = {n: frame_path(self._pattern, n) for n in missing}
+        self.failed |= {n: f"no file {path}" for n, path in paths.items()}
         self._ahead |= dict.fromkeys(missing)
         if missing:
-            which = in_words(sorted(missing))
-            first = next(iter(missing.values()))
+            first, which = paths[missing[0]], in_words(missing)
             self._say(f"left out for want of a file, as {first}: frames {which}")
 
-    def first(self, numbers: Sequence[int]) -> FrameFile | None:
-        """Return the first of some frames that can be read; None if none can."""
+    def first(self, numbers: Iterable[int]) -> FrameFile | None:
+        """Return the first of some frames that can be read; None if none can.
+
+        Raises Unfit where the first two are, or the only one.
+        """
+        unfit: Unfit | None = None
         for number in numbers:
-            frame = self._ahead[number] = self.load(number)
+            try:
+                frame = self.load(number)
+            except Unfit as error:
+                if unfit is not None:
+                    raise unfit from error
+                unfit = error
+                continue
+            self._ahead[number] = frame
             if frame is not None:
                 return frame
+        if unfit is not None:
+            raise unfit
         return None
 
     def load(self, number: int) -> FrameFile | None:
@@ -61,11 +73,15 @@ class Loader:
         except PictureError as error:
             if isinstance(error, Unfit) and not self._any_is_fit:
                 raise
-            self.failed[number] = str(error)
-            self._say(f"frame {number} is left out: {error}")
+            self.leave_out(number, error)
             return None
         finally:
             self._seconds += time.perf_counter() - started
+
+    def leave_out(self, number: int, error: PictureError) -> None:
+        """Tell of a frame that cannot be finished."""
+        self.failed[number] = str(error)
+        self._say(f"frame {number} is left out: {error}")
 
     def seconds(self) -> float:
         """Return the seconds that reading took since this was asked last."""

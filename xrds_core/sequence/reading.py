@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..exr import File
+from ..frames import MOST_RADIUS
 from ..temporal.frame import SKY_DEPTH, Camera, Frame, Stored, store
 from ..temporal.halves import Noise
 from ..temporal.motion import centres, pixels_of
+from . import attributes
 from .cameras import from_header, told_camera
 from .errors import NotLending, Unfit
 from .names import Found, PassNames, find
@@ -85,25 +87,19 @@ def read_frame(
     number_of_part, channels = _target(file, found)
     part = file.parts[number_of_part]
     file.window = _window(part)
-    camera = _camera(file, part, number, reading)
-    depth = None
-    if camera is not None:
-        depth = _depth(file, found, camera, reading)
-    if lends and (camera is None or depth is None):
-        lacking = "camera" if camera is None else "depth"
-        raise NotLending(f"{path} has no {lacking}", _REMEDY[lacking])
+    camera, depth = _geometry(file, part, found, number, reading, lends)
     beauty = _stack(file, found.beauty)
     frame = Frame(
         number=number,
         camera=camera or _CENTRE,
         radiance=beauty,
-        albedo=_stack(file, found.albedo),
-        normal=_normal(file, found, camera, reading),
+        albedo=_guide(_stack(file, found.albedo)),
+        normal=_guide(_normal(file, found, camera, reading)),
         depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
         samples=_samples(part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
-        vector=_vector(file, found, reading),
-        still=bool(part.attributes.get(STILL, 0)),
+        vector=_vector(file, found, reading) if lends else None,
+        still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
     )
     stored = store(frame, np.float16)
     return FrameFile(
@@ -112,7 +108,7 @@ def read_frame(
         part=number_of_part,
         channels=channels,
         key=str(part.attributes.get(KEY, "")),
-        radius=part.attributes.get(RADIUS),
+        radius=attributes.whole_or_none(part.attributes.get(RADIUS), 0, MOST_RADIUS),
         lends=camera is not None and depth is not None,
     )
 
@@ -125,22 +121,43 @@ _REMEDY = {
 }
 
 
+def _geometry(
+    file: File, part: Part, found: Found, number: int, reading: Reading, lends: bool
+) -> tuple[Camera | None, Array | None]:
+    """Camera and depth; without `lends` what of a camera can be used, and no depth.
+
+    Raises NotLending, with `lends`, for what is missing or unusable.
+    """
+    try:
+        camera = _camera(file, part, number, reading)
+    except NotLending:
+        if lends:
+            raise
+        camera = None
+    if not lends:
+        return camera, None
+    depth = None if camera is None else _depth(file, found, camera, reading)
+    if camera is None or depth is None:
+        lacking = "camera" if camera is None else "depth"
+        raise NotLending(f"{file.path} has no {lacking}", _REMEDY[lacking])
+    return camera, depth
+
+
 def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | None:
     """The camera that the options tell, or else the header."""
     (left, top), (right, bottom) = part.display_window
     size = (right - left + 1, bottom - top + 1)
     told = part.attributes
-    if reading.cameras is not None:
-        aspect = told.get("pixelAspectRatio", 1.0)
-        camera = told_camera(reading.cameras, number, size, aspect)
-    else:
-        try:
+    try:
+        if reading.cameras is not None:
+            aspect = attributes.number(told.get("pixelAspectRatio", 1.0), 1e-3, 1e3)
+            camera = told_camera(reading.cameras, number, size, aspect)
+        else:
             camera = from_header(told, size)
-        except ValueError as error:
-            raise Unfit(
-                f"{file.path}: its worldToCamera and worldToNDC cannot be used "
-                f"({error}); give --camera cameras.json"
-            ) from error
+    except ValueError as error:
+        raise NotLending(
+            f"{file.path}: its camera cannot be used ({error})", _REMEDY["camera"]
+        ) from error
     if camera is None or file.window is None:
         return None
     (x, y), _ = file.window
@@ -175,7 +192,7 @@ def _from_depth(depth: Array) -> Array:
 
 
 def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
-    """Raise PictureError where the camera does not show positions at their pixels."""
+    """Raise NotLending where the camera does not show positions at their pixels."""
     seen = np.flatnonzero(np.isfinite(depth.ravel()) & (depth.ravel() > 0.0))
     if not seen.size:
         return
@@ -183,13 +200,14 @@ def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
     world = points.reshape(-1, 3)[spots].astype(np.float64)
     there = pixels_of(camera) @ np.column_stack((world, np.ones(len(world)))).T
     x, y = centres(spots, depth.shape[1])
-    apart = np.hypot(there[0] / there[2] - x, there[1] / there[2] - y)
-    off = float(np.median(apart))
+    with np.errstate(all="ignore"):  # a wrong camera may lie in a point, or far off
+        apart = np.hypot(there[0] / there[2] - x, there[1] / there[2] - y)
+        off = float(np.median(apart))
     if not off < _FITS:
-        raise Unfit(
+        raise NotLending(
             f"{file.path}: its camera shows the Position pass {off:.0f} pixels beside "
-            "its pixels; give another --camera, --position-space camera, or "
-            "--temporal-radius 0"
+            "its pixels",
+            "give another --camera, --position-space camera, or --temporal-radius 0",
         )
 
 
@@ -228,10 +246,10 @@ def _samples(part: Part, reading: Reading) -> int:
     """Samples per pixel: as asked for, or as XRDS or Blender wrote them."""
     if reading.samples:
         return reading.samples
-    told = [part.attributes.get(SAMPLES, 0)]
+    told = [part.attributes.get(SAMPLES)]
     told += [v for k, v in part.attributes.items() if _is_cycles_samples(k)]
-    counts = [int(x) for x in told if str(x).isdigit() and int(x) > 0]
-    return counts[0] if counts else _UNTOLD_SAMPLES
+    counts = [attributes.whole_or_none(x, 1) for x in told]
+    return next((x for x in counts if x is not None), _UNTOLD_SAMPLES)
 
 
 def _is_cycles_samples(name: str) -> bool:
@@ -240,12 +258,29 @@ def _is_cycles_samples(name: str) -> bool:
 
 def _target(file: File, found: Found) -> tuple[int, list[str]]:
     """Return the part that takes the picture, and its channels' names there."""
-    there = found.picture[0] in file.names.names
-    part, first = file.place(found.picture[0] if there else found.beauty[0])
-    names = [file.place(x)[1] for x in found.picture] if there else found.picture
-    if found.alpha is not None:
-        names = [*names, f"{first.rpartition('.')[0]}.A".lstrip(".") if there else "A"]
-    return part, names
+    prefix = found.picture[0].rpartition(".")[0]
+    alpha = f"{prefix}.A" if prefix else "A"
+    wanted = [*found.picture, alpha] if found.alpha is not None else found.picture
+    there = [name for name in wanted if name in file.names.names]
+    parts = {file.place(name)[0] for name in there}
+    if len(parts) > 1:
+        raise Unfit(
+            f"{file.path} holds {', '.join(there)} in several parts; save them in one"
+        )
+    if not parts:
+        return file.place(found.beauty[0])[0], [x.rpartition(".")[2] for x in wanted]
+    ahead = file.place(there[0])[1].rpartition(".")[0]
+    return parts.pop(), [_in_layer(ahead, x.rpartition(".")[2]) for x in wanted]
+
+
+def _in_layer(layer: str, letter: str) -> str:
+    return f"{layer}.{letter}" if layer else letter
+
+
+def _guide(x: Array) -> Array:
+    """Guides without NaN: a sky may have no normal, and has good light all the same."""
+    known = np.isfinite(x).all(axis=-1, keepdims=True)
+    return x if known.all() else np.where(known, x, np.float32(0.0))
 
 
 def _stack(file: File, names: list[str]) -> Array:

@@ -8,6 +8,7 @@ is there.
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, TypeVar
@@ -49,7 +50,7 @@ class Shot:
 
     def lenders(self, frame: int) -> tuple[int, ...]:
         """Return the frames that lend to `frame`, the nearest ones first."""
-        place = self.order.index(frame)
+        place = bisect_left(self.order, frame)
         around = self.order[max(0, place - self.radius) : place + self.radius + 1]
         take = self._take(frame)
         return tuple(
@@ -61,7 +62,7 @@ class Shot:
 
     def is_between(self, frame: int) -> bool:
         """Return whether it lies between two lenders that themselves do not."""
-        place = self.order.index(frame)
+        place = bisect_left(self.order, frame)
         beside = {*self.order[place - 1 : place], *self.order[place + 1 : place + 2]}
         return place % 2 == 1 and len(beside) == 2 and beside <= {*self.lenders(frame)}
 
