@@ -88,7 +88,7 @@ def holdout(stage: Set) -> None:
 def shadow_catcher(stage: Set) -> None:
     """A box that turns and its shadow alone, for another picture."""
     light(stage, 0.5)
-    stage.lamp("SUN", 3.0, (-2, -3, 5), (0, 0, 0), angle=0.05)
+    stage.lamp("SUN", 1.2, (-2, -3, 5), (0, 0, 0), angle=0.05)
     ground = stage.put(sheet(14, 14), solid("ground", Base_Color=(0.5, 0.5, 0.5)))
     ground.is_shadow_catcher = True
     thing = stage.put(box(0.9, 0.9, 1.1), checks("turned", CREAM, WARM), (0, 0, 0.1))

@@ -10,7 +10,8 @@ from .stage import Set, glass, key, over, room, slide, truck
 def pane(stage: Set) -> None:
     """A thin pane of glass before the things, under a moving camera."""
     room(stage)
-    thing = stage.put(box(1.8, 0.02, 1.7), glass(), (0.1, -0.6, 0.3), 0.2)
+    clear = glass(ior=2.0)  # heavy glass mirrors the room as well
+    thing = stage.put(box(1.8, 0.02, 1.7), clear, (0.1, -0.6, 0.3), 0.4)
     thing.visible_shadow = False
     truck(stage)
 
@@ -49,10 +50,10 @@ def water(stage: Set) -> None:
 def caustics(stage: Set) -> None:
     """A ball of glass that moves, and the light that it gathers on the floor."""
     lamp = room(stage)
-    lamp.data.energy = 150
+    lamp.data.energy = 80
     ball = stage.put(sphere(0.45, 48), glass(), (0.0, -0.4, 0.6))
     slide(ball, (0.035, 0.0, 0.0))
-    stage.lamp("SPOT", 900, (-2.4, 0.6, 3.4), (0, -0.4, 0.4), shadow_soft_size=0.35)
+    stage.lamp("SPOT", 900, (-2.4, 0.6, 3.4), (0, -0.4, 0.4), shadow_soft_size=0.25)
 
 
 def smoke(stage: Set) -> None:
@@ -72,7 +73,7 @@ def smoke(stage: Set) -> None:
     dense = nodes.math("MAXIMUM", dense, 0.0)
     cloud = nodes.add("VolumeScatter", Color=(0.9, 0.9, 0.9), Density=dense)
     nodes.replace(Volume=cloud.outputs[0])
-    stage.put(box(2.6, 1.0, 1.8), nodes.material, (0.0, 0.0, 0.1))
+    stage.put(box(2.6, 1.0, 1.8), nodes.material, (0.0, 0.0, 0.9))
     key(drift.inputs[1], "default_value", over(lambda k: (-0.03 * k, 0, -0.03 * k)))
     key(boil.inputs["W"], "default_value", over(lambda k: 0.03 * k))
     cycles = stage.scene.cycles

@@ -140,7 +140,7 @@ def _pushed(shape: Shape, phase: float) -> Any:
     """Vertices of a ball with waves on it."""
     away = shape.vertices / np.linalg.norm(shape.vertices, axis=1, keepdims=True)
     waves = np.sin(5 * away @ np.array((1.0, 0.6, 0.8)) + phase)
-    return shape.vertices + 0.16 * waves[:, None] * away
+    return shape.vertices + 0.1 * waves[:, None] * away
 
 
 def shape_keys(stage: Set) -> None:

@@ -18,8 +18,8 @@ _FLICKER = (1.0, 0.2, 0.7, 1.2, 0.1, 0.9, 0.4, 1.3, 0.6, 0.05, 1.1, 0.8, 0.3)
 def moving_lamp(stage: Set) -> None:
     """The lamp moves: shadows move and shading changes."""
     lamp = room(stage)
-    lamp.data.size = 0.4
-    lamp.location = (1.2, -1.6, 3.2)
+    lamp.data.size, lamp.data.energy = 0.4, 220
+    lamp.location = (1.2, -1.2, 3.4)
     slide(lamp, (-0.09, 0.0, 0.0))
 
 
@@ -67,8 +67,8 @@ def turning_sky(stage: Set) -> None:
     place = nodes.add("TexCoord").outputs["Generated"]
     way = nodes.add("Mapping", Vector=place)
     sky = nodes.add("TexEnvironment", image=_sky(), Vector=way.outputs[0])
-    nodes.light(sky.outputs["Color"], 1.0)
-    turned = over(lambda k: (0.0, 0.0, 0.008 * k))
+    nodes.light(sky.outputs["Color"], 0.8)
+    turned = over(lambda k: (0.0, 0.0, 0.02 * k))
     key(way.inputs["Rotation"], "default_value", turned)
 
 
@@ -85,7 +85,7 @@ def _sky(width: int = 512, height: int = 256) -> bpy.types.Image:
     x, y = np.meshgrid(np.arange(width) / width, np.arange(height) / height)
     high = np.clip((y - 0.5) * 2, 0, 1)[..., None]
     pixels = (1 - high) * (0.75, 0.7, 0.65) + high * (0.2, 0.4, 0.85)
-    waves = np.sin(40 * x + 6 * np.sin(9 * y)) * np.sin(70 * y + 3 * np.sin(25 * x))
+    waves = np.sin(88 * x + 6 * np.sin(9 * y)) * np.sin(90 * y + 3 * np.sin(50 * x))
     pixels = pixels * (1 + 0.35 * np.where(y > 0.5, waves, 0))[..., None]
     pixels[y < 0.5] = (0.25, 0.22, 0.18)
     for u, v, size, power in ((0.3, 0.72, 0.02, 150), (0.85, 0.63, 0.04, 25)):
@@ -101,8 +101,8 @@ def _sky(width: int = 512, height: int = 256) -> bpy.types.Image:
 def bright_panel(stage: Set) -> None:
     """A panel that shines moves before the things and lights them."""
     lamp = room(stage)
-    lamp.data.energy = 120
-    stuff = glow("panel", (0.5, 0.75, 1.0), 6.0)
+    lamp.data.energy = 20
+    stuff = glow("panel", (0.15, 0.4, 0.9), 10.0)
     panel = stage.put(sheet(1.0, 0.6), stuff, (0.0, 0.9, 1.5))
     panel.rotation_euler[0] = math.radians(70)
     slide(panel, (0.05, 0.0, 0.0))

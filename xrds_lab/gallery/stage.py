@@ -42,8 +42,9 @@ def open_set(folder: Path, size: tuple[int, int] = SIZE) -> Set:
     scene = empty_scene(*size)
     cycles = scene.cycles
     cycles.max_bounces = cycles.transmission_bounces = 6
-    cycles.diffuse_bounces, cycles.glossy_bounces = 2, 4
+    cycles.diffuse_bounces, cycles.glossy_bounces = 1, 4
     cycles.transparent_max_bounces = 8
+    cycles.use_light_tree = False  # one or two lamps: it only takes time
     scene.frame_start, scene.frame_end = 1, 9
     return Set(scene, folder)
 
@@ -108,8 +109,8 @@ def uv(surface: Surface, density: float = 1.0) -> Value:
 def bricks(
     name: str, one: Colour, two: Colour, density: float = 2.0, **more: Any
 ) -> bpy.types.Material:
-    """Bricks of two colours, half a metre long over `density`."""
-    surface = Surface(name, Roughness=0.6, **more)
+    """Matt bricks of two colours, half a metre long over `density`."""
+    surface = Surface(name, Roughness=1.0, Specular_IOR_Level=0.0, **more)
     colours = surface.add(
         "TexBrick",
         Vector=uv(surface, density),
@@ -181,7 +182,7 @@ def walls(stage: Set) -> None:
     stage.put(box(0.1, 14, 5), marble("side", COLD, CREAM, 3.0), (-4.5, 0, 0))
 
 
-def lamp(stage: Set, watts: float = 700.0) -> bpy.types.Object:
+def lamp(stage: Set, watts: float = 420.0) -> bpy.types.Object:
     """A soft lamp above the things."""
     return stage.lamp("AREA", watts, (1.2, -1.2, 4.6), (0, 0.6, 0), size=2.5)
 

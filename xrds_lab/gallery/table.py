@@ -39,7 +39,8 @@ class Shot:
     """One shot: nine frames, of which the fifth and the first are judged.
 
     `samples` are the counts it is judged at in place of those asked for. Where it is
-    `adaptive` they are the most that a pixel gets.
+    `adaptive` they are the most that a pixel gets. `version` counts up whenever the
+    scene changes: what was rendered of the one before is then left.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Shot:
     samples: tuple[int, ...] = ()
     frames: tuple[int, ...] = FRAMES
     adaptive: bool = False
+    version: int = 1
 
     @property
     def what(self) -> str:
