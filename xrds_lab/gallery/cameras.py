@@ -114,10 +114,10 @@ def _adaptive(stage: Set, threshold: float) -> None:
 
 def on_twos(stage: Set) -> None:
     """Every second frame is rendered: a step of two."""
-    from . import figures
+    from . import bending
 
     room(stage)
-    figures.walker(stage, (0.1, -0.7, 0.0))
+    bending.walker(stage, (0.1, -0.7, 0.0))
     truck(stage, 0.01)
     stage.scene.frame_start, stage.scene.frame_end, stage.scene.frame_step = 1, 17, 2
     aim(stage.scene.camera, EYE, TARGET)

@@ -44,9 +44,9 @@ def _cards(stage: Set) -> None:
         ((-1.4, -0.6), (-0.5, 0.1), (0.3, -0.9), (1.2, -0.2), (0.8, 0.6))
     ):
         card = stage.put(sheet(1.1, 1.5), stuff, (x, y, 1.0))
-        lean, way = math.radians(90), 0.4 * (number - 2)
+        way = 0.4 * (number - 2)
         swing = over(
-            lambda k, n=number, w=way: (lean, 0.02 * k * (-1) ** n, w + 0.01 * k)
+            lambda k, n=number, w=way: (math.pi / 2, 0.02 * k * (-1) ** n, w + 0.01 * k)
         )
         key(card, "rotation_euler", swing)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 import zlib
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -25,8 +26,9 @@ GENERATION = {NOISY: 1, REFERENCE: 1}
 REACH = 4
 """Frames to each side that lend to a frame."""
 REFERENCE_SAMPLES = 512
-SEEDS = (1_000_003, 2_000_003)
-"""Of the two references of a frame; no noisy frame has a seed near them."""
+PART_SAMPLES = 256
+"""References are means of parts, so that they can grow."""
+_FIRST_SEED = 1_000_003  # no noisy frame has a seed near it
 
 
 @dataclass(frozen=True)
@@ -52,11 +54,6 @@ class Request:
         made = f"v{shot.version}.{GENERATION[self.kind]}-blender{version}"
         return f"{self.shot}-{width}x{height}-{what}{seed}-{made}.npz"
 
-    @property
-    def cost(self) -> float:
-        """What it takes beside others: samples, and what every render takes."""
-        return self.samples + 3.0
-
     def as_dict(self) -> dict[str, Any]:
         """Plain values, to be told to another process."""
         return asdict(self) | {"size": list(self.size)}
@@ -74,15 +71,28 @@ class Measure:
     samples: tuple[int, ...] = SAMPLES
     reference_samples: int = REFERENCE_SAMPLES
     size: tuple[int, int] = SIZE
+    middle_only: bool = False
 
-    def references(self, shot: Shot, number: int) -> list[Request]:
-        """The two references of a frame."""
-        return [
-            Request(
-                shot.name, REFERENCE, self.reference_samples, number, seed, self.size
-            )
-            for seed in SEEDS
-        ]
+    def judged(self, shot: Shot) -> tuple[int, ...]:
+        """Numbers of the frames that are judged, the middle one first."""
+        return shot.judged[:1] if self.middle_only else shot.judged
+
+    def references(self, shot: Shot, number: int) -> tuple[list[Request], ...]:
+        """The parts of the two references of a frame."""
+        count = min(self.reference_samples, PART_SAMPLES)
+        parts = -(-self.reference_samples // count)
+
+        def part(which: int) -> Request:
+            seed = _FIRST_SEED * (which + 1)
+            return Request(shot.name, REFERENCE, count, number, seed, self.size)
+
+        both = ([part(2 * i + which) for i in range(parts)] for which in (0, 1))
+        return tuple(both)
+
+    def rank(self, shot: Shot, request: Request) -> tuple[int, int]:
+        """The order of references of all shots: parts, then frames."""
+        part = (request.seed // _FIRST_SEED - 1) // 2
+        return part, shot.judged.index(request.number)
 
     def noisy(self, shot: Shot, samples: int) -> list[Request]:
         """All noisy frames of a shot at some samples per pixel."""
@@ -93,7 +103,12 @@ class Measure:
 
     def all_of(self, shot: Shot) -> list[Request]:
         """All that a shot's figures need, the middle frame's references first."""
-        wanted = [r for number in shot.judged for r in self.references(shot, number)]
+        wanted = [
+            request
+            for number in self.judged(shot)
+            for parts in self.references(shot, number)
+            for request in parts
+        ]
         for samples in shot.counts(self.samples):
             wanted += self.noisy(shot, samples)
         return wanted
@@ -114,9 +129,10 @@ class Store:
         """Noisy frames by view; raises SceneError without them."""
         return packing.unpack(self._read(request))
 
-    def reference(self, request: Request) -> Array:
+    def reference(self, parts: Sequence[Request]) -> Array:
         """Radiance and alpha (H, W, 4) of a reference; raises SceneError without."""
-        return self._read(request)["picture"].astype(np.float32)
+        pictures = [self._read(part)["picture"].astype(np.float32) for part in parts]
+        return np.asarray(np.mean(pictures, axis=0))
 
     def keep_frames(self, request: Request, frames: dict[str, Frame]) -> None:
         """Write noisy frames."""

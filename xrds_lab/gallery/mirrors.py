@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..studio.geometry import box, sphere
 from ..studio.nodes import solid
-from . import figures
+from . import bending
 from .stage import COLD, CREAM, Set, checks, mirror, room, slide, truck, turn
 
 
@@ -44,14 +44,14 @@ def figure_in_ball(stage: Set) -> None:
     """A figure that walks, in a chrome ball, before a camera that stands still."""
     room(stage)
     stage.put(sphere(0.9, 64), mirror(), (0.9, 0.6, 0.9))
-    figures.walker(stage, (-0.9, -0.6, 0.0))
+    bending.walker(stage, (-0.9, -0.6, 0.0))
 
 
 def figure_in_mirror(stage: Set) -> None:
     """A figure that walks, in a plane mirror, before a camera that stands still."""
     room(stage)
     stage.put(box(3.6, 0.05, 2.4), mirror(), (0.6, 2.6, 0.1), -0.15)
-    figures.walker(stage, (-0.7, 0.6, 0.0))
+    bending.walker(stage, (-0.7, 0.6, 0.0))
 
 
 def glossy_floor(stage: Set) -> None:

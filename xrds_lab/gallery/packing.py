@@ -74,9 +74,12 @@ def _unpacked(kind: type[Any], arrays: Mapping[str, Array], prefix: str) -> Any:
 
 def _dataclass_of(kind: type[Any], field: dataclasses.Field[Any]) -> type[Any] | None:
     """The dataclass that a field is said to hold, if it is one."""
-    known = vars(sys.modules[kind.__module__])
-    named = (known.get(word) for word in re.findall(r"\w+", str(field.type)))
-    return next((x for x in named if dataclasses.is_dataclass(x)), None)  # type: ignore[arg-type,return-value]
+    modules = [vars(sys.modules[each.__module__]) for each in kind.__mro__]
+    for word in re.findall(r"\w+", str(field.type)):
+        found = next((known[word] for known in modules if word in known), None)
+        if isinstance(found, type) and dataclasses.is_dataclass(found):
+            return found
+    return None
 
 
 def _value(array: Array, said: str) -> Any:

@@ -29,7 +29,7 @@ def render_apart(
 ) -> None:
     """Render requests of one shot in another process; raises SceneError if it fails."""
     asked = json.dumps([request.as_dict() for request in requests])
-    command = [sys.executable, "-m", _MODULE, str(store.directory), asked]
+    command = [sys.executable, "-P", "-m", _MODULE, str(store.directory), asked]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as child:

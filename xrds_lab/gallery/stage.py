@@ -77,18 +77,14 @@ def curves_of(owner: Any) -> list[Any]:
 def slide(thing: Any, step: Point) -> None:
     """Move a thing by `step` a frame, through where it is now."""
     at = tuple(thing.location)
-    moved = over(
-        lambda k: tuple(x + k * by for x, by in zip(at, step, strict=True))
-    )
+    moved = over(lambda k: tuple(x + k * by for x, by in zip(at, step, strict=True)))
     key(thing, "location", moved)
 
 
 def turn(thing: Any, step: Point) -> None:
     """Turn a thing by `step` radians a frame about its axes."""
     now = tuple(thing.rotation_euler)
-    turned = over(
-        lambda k: tuple(x + k * by for x, by in zip(now, step, strict=True))
-    )
+    turned = over(lambda k: tuple(x + k * by for x, by in zip(now, step, strict=True)))
     key(thing, "rotation_euler", turned)
 
 
@@ -150,9 +146,7 @@ def marble(
 
 def mirror(name: str = "mirror", roughness: float = 0.0) -> bpy.types.Material:
     """Silver."""
-    return solid(
-        name, Base_Color=(0.95, 0.95, 0.95), Metallic=1.0, Roughness=roughness
-    )
+    return solid(name, Base_Color=(0.95, 0.95, 0.95), Metallic=1.0, Roughness=roughness)
 
 
 def glass(name: str = "glass", ior: float = 1.45) -> bpy.types.Material:

@@ -42,8 +42,7 @@ _PACE = 0.04  # metres in a frame, about four pixels
 
 def _limb(x: float, low: float, high: float, radius: float) -> Shape:
     heights = np.linspace(high, low, 14)
-    bulge = tube([(x, 0.0, float(z)) for z in heights], radius, 20)
-    return bulge
+    return tube([(x, 0.0, float(z)) for z in heights], radius, 20)
 
 
 def _parts() -> list[tuple[Shape, list[str]]]:
