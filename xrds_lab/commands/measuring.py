@@ -9,11 +9,12 @@ from typing import Any
 from xrds_blender.command import arguments
 from xrds_blender.command.deferred import need_blender, no_lines
 from xrds_blender.command.options import DEVICE_HELP, GUIDES, PRESETS
-from xrds_core.errors import XRDSError
+from xrds_core.errors import UsageError, XRDSError
 
 from ..progress import report_line
 
 MOTIONS = ("pan", "fast", "still", "objects", "both")
+GALLERY_HALVES = ("choosing", "judging")
 STABILITY = ("arrays", "large", "scenes", "shots", "load", "accumulation")
 
 
@@ -163,7 +164,7 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         "bench", help="error against run time, of frames or of shots; a report"
     )
     add = command.add_argument
-    add("scenes", type=Path, nargs="+", metavar="SCENE.blend")
+    add("scenes", type=Path, nargs="*", metavar="SCENE.blend")
     add(
         "-o",
         "--out",
@@ -184,7 +185,9 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         help="in place of the files' own",
     )
     add(
-        "--reference-samples", type=arguments.positive, default=128, help="of each half"
+        "--reference-samples",
+        type=arguments.positive,
+        help="of each half; 128, of the gallery 512",
     )
     add("--windows", type=Path, help="JSON file of windows that errors are taken on")
     add("--references", type=Path, help="folder of NAME.exr, for the windows")
@@ -229,6 +232,7 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     add("--device", default="auto", help=DEVICE_HELP)
     add("--weights", type=Path, help="folder of weights files")
     _add_shots(command.add_argument_group("shots, instead of single frames"))
+    _add_gallery(command.add_argument_group("the gallery, instead of scenes"))
     command.set_defaults(work=_bench, lines=_bench_lines)
     return command
 
@@ -242,7 +246,11 @@ def _add_shots(group: Any) -> None:
         default=MOTIONS,
         help=f"of {', '.join(MOTIONS)}",
     )
-    add("--samples", type=arguments.integers, default=(2,), help="per frame, as 2,16")
+    add(
+        "--samples",
+        type=arguments.integers,
+        help="per frame, as 2,16; 2, of the gallery 2,4,16",
+    )
     add(
         "--radii",
         type=arguments.integers,
@@ -264,8 +272,25 @@ def _add_shots(group: Any) -> None:
     add("--films", action="store_true", help="also the best and the worst shot as WebP")
 
 
+def _add_gallery(group: Any) -> None:
+    add = group.add_argument
+    add(
+        "--gallery",
+        nargs="*",
+        metavar="NAME",
+        help="judge small shots, by name or all, block by block against frames alone",
+    )
+    add("--half", choices=GALLERY_HALVES, help="of the gallery: its shots alone")
+    add("--middle-only", action="store_true", help="judge no first frames")
+    add("--references-only", action="store_true", help="render these, judge nothing")
+
+
 def _bench(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("bench")
+    if options.gallery is not None:
+        return _bench_gallery(options)
+    if not options.scenes:
+        raise UsageError("no scenes: give files, or --gallery")
     if options.shots:
         return _bench_shots(options)
     if options.low_budgets:
@@ -292,6 +317,28 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
     )
 
 
+def _bench_gallery(options: argparse.Namespace) -> dict[str, Any]:
+    from ..gallery.bench import bench_gallery
+    from ..gallery.frames import REFERENCE_SAMPLES, Measure
+    from ..gallery.stage import SIZE
+    from ..gallery.table import SAMPLES
+
+    measure = Measure(
+        options.samples or SAMPLES,
+        options.reference_samples or REFERENCE_SAMPLES,
+        options.resolution or SIZE,
+        options.middle_only,
+    )
+    return bench_gallery(
+        options.gallery,
+        options.out,
+        measure,
+        cache=options.cache,
+        half=options.half,
+        references_only=options.references_only,
+    )
+
+
 def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
     from ..bench.low_budgets import low_budgets
 
@@ -314,7 +361,7 @@ def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
         options.out,
         Measure(
             options.motions,
-            options.samples,
+            options.samples or (2,),
             options.radii,
             options.pair_samples,
             equal_quality=options.equal,
@@ -328,8 +375,9 @@ def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
 
 def _inputs(options: argparse.Namespace) -> dict[str, Any]:
     """What every kind of bench measures on."""
-    names = ("windows", "references", "resolution", "cache", "reference_samples")
-    return {name: getattr(options, name) for name in names}
+    names = ("windows", "references", "resolution", "cache")
+    given = {name: getattr(options, name) for name in names}
+    return given | {"reference_samples": options.reference_samples or 128}
 
 
 def _bench_lines(result: dict[str, Any]) -> list[str]:

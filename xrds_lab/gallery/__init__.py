@@ -1,0 +1,1 @@
+"""A gallery of small shots that judges whether accumulation is ever worse."""
