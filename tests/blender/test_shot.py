@@ -123,6 +123,7 @@ def test_under_a_still_camera_frames_continue_one_sequence(
     if not has_subsets(scene):
         pytest.skip("this Blender continues no sequence")
     scene.camera.animation_data_clear()
+    scene.cycles.use_adaptive_sampling = False
     gathered = []
     accumulate = finishing.accumulate
 

@@ -49,6 +49,7 @@ def lit(life: Any, tmp_path: Path) -> Path:
     bpy.data.lights["Lamp"].type = "POINT"
     lamp = bpy.data.lights["Lamp"]
     lamp.shadow_soft_size = 0.0
+    life.cycles.use_adaptive_sampling = False
     for frame in (1, 5):
         lamp.energy = 100 * frame
         lamp.keyframe_insert("energy", frame=frame)
