@@ -44,6 +44,12 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         default="high",
         help="quality of the denoiser (default: high)",
     )
+    add(
+        "--halves",
+        metavar="B.exr",
+        help="files with as many other samples of each frame; #### is its number: no "
+        "neighbour that shows something else is believed then",
+    )
     add("--resume", action="store_true", help="skip frames whose files are complete")
     add(
         "--picture-only",
@@ -112,13 +118,16 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
         normal_space=options.normal_space,
         position_space=options.position_space,
         motion_scale=options.motion_scale or (1.0, 1.0),
+        halves=options.halves,
     )
     denoiser = Denoiser(
         options.denoise, options.device, memory_limit=options.memory_limit
     )
     others = (options.camera,) if options.camera else ()
     return denoise_sequence(
-        Files(options.source, options.out, options.picture_only, others),
+        Files(
+            options.source, options.out, options.picture_only, others, options.halves
+        ),
         denoiser,
         frames=options.frames,
         radius=options.temporal_radius,

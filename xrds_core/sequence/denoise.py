@@ -34,13 +34,15 @@ class Files:
     """Where frames come from and go to; # stands for digits of the frame number.
 
     `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
-    the input as well, as they are. `others` are files that are read beside the frames.
+    the input as well, as they are. `others` are files that are read beside the frames,
+    `halves` the pattern of their other halves.
     """
 
     source: str
     output: str
     picture_only: bool = False
     others: tuple[Path, ...] = ()
+    halves: str | None = None
 
     def write(self, number: int, frame: FrameFile, finished: Finished) -> Path:
         """Write a finished frame, whole or not at all; raises PictureError."""
@@ -84,7 +86,8 @@ class Files:
                 f"all {len(numbers)} frames would be written to {self.output!r}; add "
                 "#### for the frame number"
             )
-        inputs = [frame_path(self.source, n) for n in there]
+        patterns = [self.source] if self.halves is None else [self.source, self.halves]
+        inputs = [frame_path(pattern, n) for pattern in patterns for n in there]
         known = set(there)
         outputs = (frame_path(self.output, n) for n in numbers if n in known)
         check_places(outputs, [*inputs, *self.others])

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import PictureError
 from ..exr import File
-from ..frames import MOST_RADIUS
+from ..frames import MOST_RADIUS, frame_path
 from ..temporal.frame import SKY_DEPTH, Camera, Frame, Stored, store
-from ..temporal.halves import Noise
+from ..temporal.halves import Halves, Noise
 from ..temporal.motion import centres, pixels_of
 from . import attributes
 from .cameras import from_header, told_camera
@@ -42,7 +43,8 @@ class Reading:
     `cameras` are those of `cameras.read_cameras`; `samples` per pixel; `normal_space`
     and `position_space` are `world` or `camera`, None for what the passes' names say;
     `motion_scale` are the factors that make a motion pass of two channels pixels to the
-    next frame, x to the right and y upwards.
+    next frame, x to the right and y upwards. `halves` is a pattern of files with as
+    many other samples of each frame.
     """
 
     names: PassNames = field(default_factory=PassNames)
@@ -51,6 +53,7 @@ class Reading:
     normal_space: str | None = None
     position_space: str | None = None
     motion_scale: tuple[float, float] = (1.0, 1.0)
+    halves: str | None = None
 
 
 @dataclass(frozen=True)
@@ -101,9 +104,13 @@ def read_frame(
         vector=_vector(file, found, reading) if lends else None,
         still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
     )
+    if reading.halves is not None:
+        frame = _with_other_half(frame, file, camera, reading)
     stored = store(frame, np.float16)
+    if stored.noise is None:
+        stored = replace(stored, noise=_noise(file, found))
     return FrameFile(
-        stored=replace(stored, noise=_noise(file, found)),
+        stored=stored,
         inner=_inner(file.window, part.data_window),
         part=number_of_part,
         channels=channels,
@@ -111,6 +118,34 @@ def read_frame(
         radius=attributes.whole_or_none(part.attributes.get(RADIUS), 0, MOST_RADIUS),
         lends=camera is not None and depth is not None,
     )
+
+
+def _with_other_half(
+    frame: Frame, file: File, camera: Camera | None, reading: Reading
+) -> Frame:
+    """The mean of a frame and of the file with as many other samples of it."""
+    assert reading.halves is not None
+    path = frame_path(reading.halves, frame.number)
+    if not path.is_file():
+        raise PictureError(f"there is no file {path}, the frame's other half")
+    other = File(path)
+    found = find(other.names, reading.names)
+    part = other.parts[_target(other, found)[0]]
+    if _window(part) != file.window or (found.alpha is None) != (frame.alpha is None):
+        raise Unfit(f"{path} is no half of {file.path}: its size or alpha differs")
+    other.window = file.window
+    passes = {
+        "radiance": _stack(other, found.beauty),
+        "albedo": _guide(_stack(other, found.albedo)),
+        "normal": _guide(_normal(other, found, camera, reading)),
+    }
+    if found.alpha:
+        passes["alpha"] = other.plane(found.alpha)
+    halves = Halves(
+        **{name: np.stack((getattr(frame, name), x)) for name, x in passes.items()}
+    )
+    means: dict[str, Any] = {name: halves.mean(name) for name in passes}
+    return replace(frame, **means, samples=2 * frame.samples, halves=halves)
 
 
 _REMEDY = {

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
 
 Kept = TypeVar("Kept")
 
-# Of albedo and normal, in half floats, and nearness; then of radiance, a Vector pass
-# and an alpha, in half floats, and an index.
+# Of albedo and normal, in half floats, and nearness; then of radiance and its noise, a
+# Vector pass and an alpha, in half floats, and an index.
 _BYTES = 2 * 3 * 2 + 4
-_LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES, _INDEX_BYTES = 6, 8, 2, 4
+_LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES, _INDEX_BYTES = 12, 8, 2, 4
 
 
 @dataclass(frozen=True)
