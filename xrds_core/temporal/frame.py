@@ -216,7 +216,9 @@ class Stored:
     @property
     def bytes(self) -> int:
         """What this frame takes of the memory."""
-        arrays = (self.picture, self.nearness, self.vector, self.index)
+        arrays = [self.picture, self.nearness, self.vector, self.index, self.counts]
+        if self.noise is not None:
+            arrays += vars(self.noise).values()
         return sum(0 if x is None else x.nbytes for x in arrays)
 
 
