@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..studio.geometry import Point, Shape, joined, sheet, sphere, tube
-from .stage import COLD, CREAM, WARM, Set, checks, key, marble, over, room, truck
+from .stage import COLD, CREAM, WARM, Set, bake, checks, key, marble, over, room, truck
 
 # Parent, head and tail of each bone, metres above the floor.
 _BONES: dict[str, tuple[str, Point, Point]] = {
@@ -174,7 +174,7 @@ def displacement(stage: Set) -> None:
 
 
 def cloth(stage: Set) -> None:
-    """A cloth that falls over a ball: a simulation, run through before it is seen."""
+    """A cloth that falls over a ball: a baked simulation."""
     room(stage)
     ball = stage.put(sphere(0.55), marble("under", WARM, CREAM), (0.0, -0.4, 0.55))
     ball.modifiers.new("solid", "COLLISION")
@@ -183,7 +183,4 @@ def cloth(stage: Set) -> None:
     )
     cover = drape.modifiers.new("cloth", "CLOTH")
     cover.settings.quality = 4
-    cache = cover.point_cache
-    cache.frame_start, cache.frame_end = -7, 20
-    for frame in range(-7, 21):  # as playing it does; Blender keeps the result
-        stage.scene.frame_set(frame)
+    bake(stage, cover.point_cache, -7)

@@ -16,6 +16,7 @@ from .stage import (
     LEAF,
     WARM,
     Set,
+    bake,
     checks,
     key,
     marble,
@@ -66,8 +67,7 @@ def particles(stage: Set) -> None:
     how.effector_weights.gravity = 0.05
     how.render_type, how.instance_object = "OBJECT", grain
     how.particle_size = 1.0
-    for frame in range(-60, 21):
-        stage.scene.frame_set(frame)
+    bake(stage, source.particle_systems[0].point_cache, -60)
 
 
 def vanish(stage: Set) -> None:

@@ -88,6 +88,13 @@ def turn(thing: Any, step: Point) -> None:
     key(thing, "rotation_euler", turned)
 
 
+def bake(stage: Set, cache: Any, start: int) -> None:
+    """Run a simulation from a frame on and keep it: frames come in any order."""
+    cache.frame_start, cache.frame_end = start, KEYED[-1]
+    stage.scene.frame_set(start)
+    bpy.ops.ptcache.bake_all(bake=True)
+
+
 def truck(stage: Set, step: float = 0.04) -> None:
     """Move the camera sideways, about three pixels a frame."""
     slide(stage.scene.camera, (step, 0.0, 0.0))

@@ -1,9 +1,10 @@
 """The gallery's shots: what each tests, and which half of the gallery it is in.
 
 Figures and thresholds of the product are chosen on one half and judged on the other;
-shots that are alike lie in different halves. Simulations are run through in memory
-when the scene is built, as playing them does; a baked cache in files is not among them,
-nor a smoke simulation: its cache needs minutes.
+shots that are alike lie in different halves. Simulations are baked in memory when the
+scene is built; of smoke there is a procedural one, for that simulation keeps its cache
+in files and takes minutes. An object cannot change its mesh by keyframes: geometry
+nodes swap it.
 """
 
 from __future__ import annotations
