@@ -61,7 +61,7 @@ class FrameFile:
     """A frame as it lies in a file.
 
     `stored` covers the display window and all that the picture's data window has
-    beyond it, or the data window alone; `inner` cuts the latter out of its arrays.
+    beyond it, or of a frame that need not lend the data window alone; `inner` cuts the latter out of its arrays.
     `part` is where the picture lies and `channels` are those that it takes, R, G, B
     and, where the file has alpha, A. `key`: of equal ones the render settings are the
     same; "" if untold. `radius`: what the file recommends, or None. `lends` is False
@@ -89,7 +89,7 @@ def read_frame(
     found = find(file.names, reading.names)
     number_of_part, channels = _target(file, found)
     part = file.parts[number_of_part]
-    file.window = _window(part)
+    file.window = _window(part) if lends else part.data_window
     camera, depth = _geometry(file, part, found, number, reading, lends)
     beauty = _stack(file, found.beauty)
     frame = Frame(
