@@ -251,10 +251,15 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         matrices=frame.matrices,
         still=frame.still,
         counts=None if frame.counts is None else _counts(frame.counts),
-        noise=None
-        if frame.halves is None
-        else noise_of(frame.halves, frame.samples, dtype),
+        noise=_noise(frame, dtype),
     )
+
+
+def _noise(frame: Frame, dtype: DTypeLike) -> Noise | None:
+    """What halves say; of guides alone nothing is asked."""
+    if frame.halves is None or frame.radiance is None:
+        return None
+    return noise_of(frame.halves, frame.samples, dtype)
 
 
 def _counts(counts: Array) -> NDArray[Any]:
