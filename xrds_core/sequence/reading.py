@@ -61,7 +61,8 @@ class FrameFile:
     """A frame as it lies in a file.
 
     `stored` covers the display window and all that the picture's data window has
-    beyond it, or of a frame that need not lend the data window alone; `inner` cuts the latter out of its arrays.
+    beyond it, or of a frame that need not lend the data window alone; `inner` cuts the
+    latter out of its arrays.
     `part` is where the picture lies and `channels` are those that it takes, R, G, B
     and, where the file has alpha, A. `key`: of equal ones the render settings are the
     same; "" if untold. `radius`: what the file recommends, or None. `lends` is False

@@ -46,14 +46,14 @@ class Trails:
     """
 
     def __init__(self) -> None:
-        self._moving: WeakKeyDictionary[Stored, dict[bool, Mask]]
+        self._moving: WeakKeyDictionary[Stored, dict[int, Mask]]
         self._moving = WeakKeyDictionary()
 
     def detours(self, here: Stored, others: Sequence[Stored]) -> dict[int, Detour]:
         """Return, by position in `others`, the places of what moved by itself.
 
-        Frames of one number as `here` show the same moment and need none. Where a
-        frame in between is missing nothing moving is known beyond it.
+        Frames of one number as `here` show the same moment and need none. The way leads
+        from each frame to the nearest that is there.
         """
         frames = {x.number: x for x in (*others, here) if x.vector is not None}
         trails: dict[int, Trail] = {}
@@ -83,7 +83,7 @@ class Trails:
         """Follow the moving pixels of `here` frame by frame; number -> places."""
         x, y = centres(np.flatnonzero(self.moving(here, frames)), here.shape[1])
         trail, frame = {}, here
-        while (after := frames.get(frame.number + step)) is not None:
+        while (after := _beside(frame, frames, step)) is not None:
             x, y = self._step(frame, after, frames, x, y)
             trail[after.number], frame = (x, y), after
         return trail
@@ -97,11 +97,11 @@ class Trails:
         y: Array,
     ) -> tuple[Array, Array]:
         """Carry places (NaN: lost) into the frame before or after."""
-        forward = there.number > here.number
+        steps = there.number - here.number
         start = nearest(x, y, here.shape)
-        flow_x, flow_y = _flow(here, start.pixel, forward)
+        flow_x, flow_y = _flow(here, start.pixel, steps)
         found = nearest(x + flow_x, y + flow_y, there.shape)
-        back_x, back_y = _flow(there, found.pixel, not forward)
+        back_x, back_y = _flow(there, found.pixel, -steps)
         left = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2
         was, near = here.nearness[start.pixel], there.nearness[found.pixel]
         agreed = (left < AGREEMENT_OF_MOVING**2) & (np.abs(near - was) < _NEARER * was)
@@ -116,16 +116,23 @@ class Trails:
         is taken to move where no camera beside the frame is known.
         """
         known = self._moving.setdefault(frame, {})
-        for forward in (True, False):
-            beside = frames.get(frame.number + (1 if forward else -1))
+        for step in (1, -1):
+            beside = _beside(frame, frames, step)
             if beside is not None and frame.vector is not None:
-                if forward not in known:
-                    known[forward] = _unexplained(frame, beside.camera, forward)
-                return known[forward]
+                steps = beside.number - frame.number
+                if steps not in known:
+                    known[steps] = _unexplained(frame, beside.camera, steps)
+                return known[steps]
         return np.full(frame.nearness.shape, frame.vector is not None)
 
 
-def _unexplained(frame: Stored, beside: Camera, forward: bool) -> Mask:
+def _beside(frame: Stored, frames: Mapping[int, Stored], step: int) -> Stored | None:
+    """Return the nearest of `frames` after a frame, or before it (`step` -1)."""
+    there = [n for n in frames if (n - frame.number) * step > 0]
+    return frames[min(there, key=lambda n: n * step)] if there else None
+
+
+def _unexplained(frame: Stored, beside: Camera, steps: int) -> Mask:
     """Return (H W): where the Vector pass differs from the camera's own motion.
 
     It is a mean over the pixel's samples, so it may lie anywhere between what the
@@ -134,7 +141,7 @@ def _unexplained(frame: Stored, beside: Camera, forward: bool) -> Mask:
     own = grid(frame.shape)
     forth = passage(frame.camera, beside)
     x, y, _ = carry(forth, own.x, own.y, frame.nearness)
-    flows = _flow(frame, slice(None), forward)
+    flows = _flow(frame, slice(None), steps)
     apart = np.zeros(frame.shape, np.float32)
     for still, flow in ((x - own.x, flows[0]), (y - own.y, flows[1])):
         explained, given = still.reshape(frame.shape), flow.reshape(frame.shape)
@@ -145,9 +152,12 @@ def _unexplained(frame: Stored, beside: Camera, forward: bool) -> Mask:
 
 
 def _flow(
-    frame: Stored, pixels: NDArray[np.int32] | slice, forward: bool
+    frame: Stored, pixels: NDArray[np.int32] | slice, steps: int
 ) -> tuple[Array, Array]:
-    """Return (x, y downwards) in pixels to the next frame, or to the previous one."""
+    """Return (x, y downwards) in pixels to the frame `steps` later, or before.
+
+    The pass leads one frame on; in a shot in steps, motion is taken to be even.
+    """
     assert frame.vector is not None
-    picked = frame.vector[pixels].astype(np.float32)
-    return (-picked[:, 2], picked[:, 3]) if forward else (picked[:, 0], -picked[:, 1])
+    picked = frame.vector[pixels].astype(np.float32) * np.float32(abs(steps))
+    return (-picked[:, 2], picked[:, 3]) if steps > 0 else (picked[:, 0], -picked[:, 1])
