@@ -101,8 +101,8 @@ def read_samples(read: Reader, wanted: Collection[str]) -> Samples:
     passes = [picture, read(ALBEDO), read(NORMAL)]
     depth, vector = read_geometry(read, wanted) if wanted else (None, None)
     counts = read(SAMPLE_COUNT) if SAMPLE_COUNT in wanted else None
-    if counts is not None:
-        counts = np.ascontiguousarray(counts[..., 0])
+    if counts is not None:  # all 0 where this Blender's pass has another name
+        counts = np.ascontiguousarray(counts[..., 0]) if counts.any() else None
     return Samples(*(np.ascontiguousarray(x) for x in passes), depth, vector, counts)
 
 
