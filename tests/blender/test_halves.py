@@ -1,0 +1,79 @@
+"""Frames of a shot are sampled in two halves, whose mean is the usual frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+pytest.importorskip("mitsuba_oidn")
+
+from xrds_blender.cycles.settings import has_subsets
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.frame.rendering import call_engine
+from xrds_blender.shot import sampling
+from xrds_core.temporal.frame import Frame
+
+
+@pytest.fixture
+def scene(blend: Path) -> Any:
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    if not has_subsets(scene):
+        pytest.skip("this Blender renders no part of a sequence")
+    scene.cycles.use_adaptive_sampling = False
+    return scene
+
+
+def sampled(scene: Any, **job: Any) -> Frame:
+    how = RenderJob(**{"scale": 1, "temporal_radius": 2, "seed": 3} | job)
+    frames, _ = call_engine(scene, lambda *given: sampling.noisy_frame(*given, how))
+    return next(iter(frames.values()))
+
+
+@pytest.mark.parametrize("samples", [2, 5, 8])
+def test_the_mean_of_both_halves_is_one_render(
+    scene: Any, samples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frame = sampled(scene, samples=samples)
+    monkeypatch.setattr(sampling, "_has_halves", lambda *_: False)
+    whole = sampled(scene, samples=samples)
+    assert whole.halves is None
+    assert frame.halves is not None
+    for name in ("radiance", "albedo", "normal", "alpha"):
+        found, expected = getattr(frame, name), getattr(whole, name)
+        assert found == pytest.approx(expected, rel=1e-3, abs=1e-4)
+        halves = getattr(frame.halves, name)
+        assert np.abs(halves[0] - halves[1]).max() > 0 or name == "alpha"
+    assert np.array_equal(frame.depth, whole.depth)
+
+
+def test_one_sample_has_no_halves(scene: Any) -> None:
+    assert sampled(scene, samples=1).halves is None
+
+
+def test_a_noise_threshold_is_kept_and_its_samples_are_counted(scene: Any) -> None:
+    cycles = scene.cycles
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, 0.2
+    cycles.samples = 64
+    frame = sampled(scene)
+    assert frame.halves is None
+    assert frame.counts is not None
+    assert 1.0 <= frame.samples <= 64.0
+    assert frame.samples == pytest.approx(frame.counts.mean(), rel=1e-3)
+
+
+def test_motion_under_blur_is_told_by_a_render_without(scene: Any) -> None:
+    thing = next(x for x in scene.objects if x.type == "MESH")
+    for number in (1, 5):
+        thing.location.x += 0.2
+        thing.keyframe_insert("location", frame=number)
+    scene.render.use_motion_blur = True
+    scene.frame_set(3)
+    frame = sampled(scene, samples=2)
+    assert frame.vector is not None
+    assert np.abs(frame.vector).max() > 0.5
+    assert frame.halves is not None
