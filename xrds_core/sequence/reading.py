@@ -9,7 +9,14 @@ import numpy as np
 
 from ..exr import File
 from ..frames import MOST_RADIUS
-from ..temporal.frame import SKY_DEPTH, Camera, Frame, Stored, store
+from ..temporal.frame import (
+    LARGEST_HALF,
+    SKY_DEPTH,
+    Camera,
+    Frame,
+    Stored,
+    store,
+)
 from ..temporal.halves import Noise
 from ..temporal.motion import centres, pixels_of
 from . import attributes
@@ -31,6 +38,7 @@ radius that its samples were laid out for; 1 where nothing at all moves in the s
 camera's name."""
 _UNTOLD_SAMPLES = 16
 _FITS = 2.0  # pixels by which a Position pass may lie beside its own pixel
+_NEAREST = 1e-30  # depth of a hit, in any unit: float32 bears what is divided by it
 _SPOTS = 4096  # pixels that are asked whether it does
 _CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # stands in where none is needed
 
@@ -58,11 +66,11 @@ class FrameFile:
     """A frame as it lies in a file.
 
     `stored` covers the display window and all that the picture's data window has
-    beyond it, or of a frame that need not lend the data window alone; `inner` cuts the latter out of its arrays.
-    `part` is where the picture lies and `channels` are those that it takes, R, G, B
-    and, where the file has alpha, A. `key`: of equal ones the render settings are the
-    same; "" if untold. `radius`: what the file recommends, or None. `lends` is False
-    where nobody can tell where its pixels were.
+    beyond it, or, as of a frame that need not lend, the data window alone; `inner` cuts
+    the latter out of its arrays. `part` is where the picture lies and `channels` are
+    those that it takes, R, G, B and, where the file has alpha, A. `key`: of equal ones
+    the render settings are the same; "" if untold. `radius`: what the file recommends,
+    or None. `lends` is False where nobody can tell where its pixels were.
     """
 
     stored: Stored
@@ -177,7 +185,9 @@ def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array 
     points[~np.isfinite(points).all(axis=-1)] = 0.0
     if reading.position_space == "camera":
         return _from_depth(points[..., 2])
-    result = camera.depth(points)
+    with np.errstate(over="ignore", invalid="ignore"):  # places beyond all worlds
+        result = camera.depth(points)
+    result[np.abs(result) < _NEAREST] = 0.0
     if camera.sphere is None:
         _check_fit(file, camera, points, result)
     return result
@@ -187,7 +197,7 @@ def _from_depth(depth: Array) -> Array:
     """Renderers write 0, infinity or a huge number where there is no hit."""
     depth = np.abs(depth)
     with np.errstate(invalid="ignore"):
-        hit = (depth > 0.0) & (depth < SKY_DEPTH)
+        hit = (depth > _NEAREST) & (depth < SKY_DEPTH)
     return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
 
 
@@ -220,7 +230,8 @@ def _normal(file: File, found: Found, camera: Camera | None, reading: Reading) -
     if space == "camera" or camera is None:
         return normal
     turn = np.diag([1.0, 1.0, -1.0]) @ camera.view[:3, :3]
-    return normal @ turn.T.astype(np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):  # of no length that normals have
+        return normal @ turn.T.astype(np.float32)
 
 
 def _vector(file: File, found: Found, reading: Reading) -> Array | None:
@@ -239,7 +250,8 @@ def _noise(file: File, found: Found) -> Noise | None:
     if not found.noise:
         return None
     planes = (np.nan_to_num(file.plane(name).ravel()) for name in found.noise)
-    return Noise(*(plane.astype(np.float16) for plane in planes))
+    cut = (np.clip(plane, -LARGEST_HALF, LARGEST_HALF) for plane in planes)
+    return Noise(*(plane.astype(np.float16) for plane in cut))
 
 
 def _samples(part: Part, reading: Reading) -> int:
