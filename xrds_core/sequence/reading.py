@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..exr import File
+from ..exr_limits import is_mostly_empty
 from ..frames import MOST_RADIUS
 from ..temporal.frame import (
     LARGEST_HALF,
@@ -94,7 +95,7 @@ def read_frame(
     found = find(file.names, reading.names)
     number_of_part, channels = _target(file, found)
     part = file.parts[number_of_part]
-    file.window = _window(part) if lends else part.data_window
+    file.window = _window(path, part) if lends else part.data_window
     camera, depth = _geometry(file, part, found, number, reading, lends)
     beauty = _stack(file, found.beauty)
     frame = Frame(
@@ -303,17 +304,31 @@ def _is_half(file: File, names: list[str]) -> bool:
     return any(file.pixels(name).dtype == np.float16 for name in names)
 
 
-def _window(part: Part) -> Window:
+def _window(path: Path, part: Part) -> Window:
     """What the arrays of a frame cover.
 
     Renderers may crop each frame to what it shows, and then the display window is what
-    frames have in common. Ours are all cropped alike.
+    frames have in common. Ours are all cropped alike. Raises NotLending where that
+    would fill the memory with nothing.
     """
     if KEY in part.attributes:
         return part.data_window
     (a, b), (c, d) = part.data_window
     (e, f), (g, h) = part.display_window
-    return (min(a, e), min(b, f)), (max(c, g), max(d, h))
+    whole = (min(a, e), min(b, f)), (max(c, g), max(d, h))
+    if is_mostly_empty(_area(part.data_window), _area(whole)):
+        (left, top), (right, bottom) = whole
+        raise NotLending(
+            f"{path} holds few of the {right - left + 1}x{bottom - top + 1} pixels of "
+            "its windows",
+            "if it is sound give --read-limit, or else --temporal-radius 0",
+        )
+    return whole
+
+
+def _area(window: Window) -> int:
+    (left, top), (right, bottom) = window
+    return (right - left + 1) * (bottom - top + 1)
 
 
 def _inner(whole: Window, part: Window) -> tuple[slice, slice]:

@@ -16,6 +16,7 @@ import json
 import os
 import shutil
 import signal
+import sys
 import tempfile
 import time
 import warnings
@@ -106,9 +107,11 @@ def _denoise(case: Case) -> None:
     os.setsid()
     with (case.folder / "stderr").open("wb") as stream:
         os.dup2(stream.fileno(), 2)
+    sys.stderr = os.fdopen(os.dup(2), "w", errors="backslashreplace", buffering=1)
     nothing = os.open(os.devnull, os.O_RDWR)
     os.dup2(nothing, 1)
     os.dup2(nothing, 0)
+    sys.stdout = os.fdopen(os.dup(1), "w")
     os.chdir(case.folder)
     tempfile.tempdir = str(case.folder)
     warnings.simplefilter("error", RuntimeWarning)
@@ -136,7 +139,7 @@ def _told(status: int, memory: int, errors: str) -> Iterator[str]:
         yield "hang"
     elif status not in _STATUSES:
         yield "crash"
-    if "Traceback" in errors or "unexpected" in errors:
+    if "Traceback" in errors or "a bug in XRDS" in errors:
         yield "traceback"
     elif any(not line.startswith("xrds: ") for line in errors.splitlines()):
         yield "foreign line"

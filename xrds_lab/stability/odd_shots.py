@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core.sequence import cameras
-from xrds_core.temporal.frame import Camera
+from xrds_core.temporal.frame import Camera, Sphere
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
 WIDTH, HEIGHT = 40, 28
+_CAMERAS = ("perspective", "perspective", "orthographic", "panorama")
 _NUMBERS = (0, 1, -1, 2, 16, 33, 0.0, 1.0, -0.5, 1.5, 1e-30, 1e30, 3e38, 2**31 - 1)
 _ODD = (float("nan"), float("inf"), -float("inf"))
 _TEXTS = ("", "0", "1", "4", "-1", "1.5", "nan", "²", "９", "0 0 0 0", "-3 3 1 1", "\n")
@@ -67,7 +68,8 @@ def make_case(folder: Path, seed: int, number: int) -> Case:
     dice = random.Random(f"{seed} {number}")
     (folder / "in").mkdir()
     (folder / "out").mkdir()
-    frames = [_frame(i, dice.choice(("flat", "cycles"))) for i in (1, 2, 3)]
+    style, kind = dice.choice(("flat", "cycles")), dice.choice(_CAMERAS)
+    frames = [_frame(i, style, kind) for i in (1, 2, 3)]
     if dice.random() < 0.85:
         for _ in range(dice.choice((1, 1, 2, 4))):
             odd = dice.choice(_FILES)
@@ -90,13 +92,20 @@ def make_case(folder: Path, seed: int, number: int) -> Case:
 # --- frames ---------------------------------------------------------------------------
 
 
-def _frame(number: int, style: str) -> _File:
-    """A wall before a moving camera, as a renderer writes it."""
+def _eye(number: int, kind: str) -> Camera:
     world = np.eye(4)
     world[0, 3] = 0.1 * number
     project = np.diag([1.5, 1.5 * WIDTH / HEIGHT, -1.0, 0.0])
     project[2, 3], project[3, 2] = -0.2, -1.0
-    camera = Camera(np.linalg.inv(world), project, (WIDTH, HEIGHT))
+    if kind == "orthographic":
+        project = np.diag([0.2, 0.2 * WIDTH / HEIGHT, -0.01, 1.0])
+    sphere = Sphere() if kind == "panorama" else None
+    return Camera(np.linalg.inv(world), project, (WIDTH, HEIGHT), sphere=sphere)
+
+
+def _frame(number: int, style: str, kind: str) -> _File:
+    """A wall before a moving camera, as a renderer writes it."""
+    camera = _eye(number, kind)
     chance = np.random.default_rng(number)
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
     albedo = 0.5 + 0.4 * np.sin((x + 0.3 * number) / 3) * np.cos(y / 4)
@@ -203,7 +212,9 @@ def _kind(frame: _File, dice: random.Random) -> None:
     kind = dice.choice((np.float16, np.uint32))
     some = dice.choice((list(frame.channels), [dice.choice(list(frame.channels))]))
     for name in some:
-        frame.channels[name] = np.clip(frame.channels[name], 0, 60000).astype(kind)
+        frame.channels[name] = np.nan_to_num(
+            np.clip(frame.channels[name], 0, 60000)
+        ).astype(kind)
 
 
 def _poison(frame: _File, dice: random.Random) -> None:
@@ -338,7 +349,8 @@ def _odd_camera(told: dict[str, Any], dice: random.Random) -> None:
         ("to_world", "project", "focal_length", "sensor_width", "ortho_width", "shift")
     )
     rows = told.get("to_world")
-    if name == "to_world" and isinstance(rows, list) and dice.random() < 0.7:
+    whole = isinstance(rows, list) and len(rows) == 4
+    if name == "to_world" and whole and dice.random() < 0.7:
         changed = [list(row) for row in rows]
         changed[dice.randrange(4)][dice.randrange(4)] = dice.choice(values)
         told[name] = changed
