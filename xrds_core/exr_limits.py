@@ -10,6 +10,8 @@ from .errors import PictureError
 _LARGEST_SIDE = 1 << 16  # pixels; more is a damaged header
 _ALWAYS_READ = 1 << 30  # bytes of pixels
 _USUAL_RATIO = 1000  # of pixels to file; ZIP, the default, packs no picture smaller
+_ALWAYS_PADDED = 4096 * 2304  # pixels, of a 4K picture
+_USUAL_PADDING = 16  # times the pixels that a crop holds
 _BYTES = 4  # of a number; the header as read does not tell them apart
 
 _allowed = 0
@@ -19,6 +21,11 @@ def allow(size: int | None) -> None:
     """Let this process read files of `size` bytes of pixels; None: the usual again."""
     global _allowed
     _allowed = size or 0
+
+
+def is_mostly_empty(pixels: int, whole: int) -> bool:
+    """Whether a large window holds so few pixels of a file that it may be a mistake."""
+    return not _allowed and whole > _ALWAYS_PADDED and whole > _USUAL_PADDING * pixels
 
 
 def limit_of(size: int) -> int:

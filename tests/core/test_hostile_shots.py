@@ -318,6 +318,17 @@ def test_windows_far_apart_are_refused_before_memory_is_taken(
         read_frame(path, 1, Reading(), lends=False)
 
 
+def test_a_crop_of_a_huge_picture_lends_where_it_is_asked_to(tmp_path: Path) -> None:
+    path = tmp_path / "1.exr"
+    hostile.write_odd_exr(path, planes(), display=(0, 0, 3999, 3999))
+    with pytest.raises(NotLending, match=r"few of the 4000x4000 .* --read-limit"):
+        read_frame(path, 1, Reading())
+    assert read_frame(path, 1, Reading(), lends=False).stored.shape == (48, 64)
+    hostile.write_odd_exr(path, planes(), display=(0, 0, 2999, 2999))
+    with pytest.raises(NotLending, match="has no camera"):
+        read_frame(path, 1, Reading())
+
+
 def test_deep_files_are_refused_before_they_are_read(tmp_path: Path) -> None:
     path = tmp_path / "1.exr"
     deep = np.empty((4, 4), object)

@@ -191,7 +191,7 @@ def _entries(
             fails = True
             loader.leave_out(number, error)
             continue
-        lenders.heed(own, others, finished.gathered)
+        lenders.heed(others, finished.gathered)
         seconds = {"read": loader.seconds(), **finished.seconds}
         seconds["write"] = time.perf_counter() - started
         yield _entry(number, path, shot.radius, finished, seconds)

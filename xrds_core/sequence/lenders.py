@@ -34,12 +34,10 @@ class Lenders:
             if other.lends and self._fits(number, own, n, other)
         ]
 
-    def heed(
-        self, own: FrameFile, others: Sequence[Stored], gathered: Accumulated
-    ) -> None:
+    def heed(self, others: Sequence[Stored], gathered: Accumulated) -> None:
         """Notice whether anything is ever lent in this shot."""
         self._asked |= bool(others)
-        self._lent |= bool((gathered.samples > own.stored.samples).any())
+        self._lent |= len(gathered.frames) > 1 and gathered.rejected < 1.0
 
     def sum_up(self) -> None:
         """Tell of a shot in which nothing was lent: its cameras may be wrong."""

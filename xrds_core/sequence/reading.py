@@ -9,8 +9,16 @@ import numpy as np
 
 from ..errors import PictureError
 from ..exr import File
+from ..exr_limits import is_mostly_empty
 from ..frames import MOST_RADIUS, frame_path
-from ..temporal.frame import SKY_DEPTH, Camera, Frame, Stored, store
+from ..temporal.frame import (
+    LARGEST_HALF,
+    SKY_DEPTH,
+    Camera,
+    Frame,
+    Stored,
+    store,
+)
 from ..temporal.halves import Halves, Noise
 from ..temporal.motion import centres, pixels_of
 from . import attributes
@@ -32,6 +40,7 @@ radius that its samples were laid out for; 1 where nothing at all moves in the s
 camera's name."""
 _UNTOLD_SAMPLES = 16
 _FITS = 2.0  # pixels by which a Position pass may lie beside its own pixel
+_NEAREST = 1e-30  # depth of a hit, in any unit: float32 bears what is divided by it
 _SPOTS = 4096  # pixels that are asked whether it does
 _CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # stands in where none is needed
 
@@ -61,12 +70,11 @@ class FrameFile:
     """A frame as it lies in a file.
 
     `stored` covers the display window and all that the picture's data window has
-    beyond it, or of a frame that need not lend the data window alone; `inner` cuts the
-    latter out of its arrays.
-    `part` is where the picture lies and `channels` are those that it takes, R, G, B
-    and, where the file has alpha, A. `key`: of equal ones the render settings are the
-    same; "" if untold. `radius`: what the file recommends, or None. `lends` is False
-    where nobody can tell where its pixels were.
+    beyond it, or, as of a frame that need not lend, the data window alone; `inner` cuts
+    the latter out of its arrays. `part` is where the picture lies and `channels` are
+    those that it takes, R, G, B and, where the file has alpha, A. `key`: of equal ones
+    the render settings are the same; "" if untold. `radius`: what the file recommends,
+    or None. `lends` is False where nobody can tell where its pixels were.
     """
 
     stored: Stored
@@ -90,7 +98,7 @@ def read_frame(
     found = find(file.names, reading.names)
     number_of_part, channels = _target(file, found)
     part = file.parts[number_of_part]
-    file.window = _window(part) if lends else part.data_window
+    file.window = _window(path, part) if lends else part.data_window
     camera, depth = _geometry(file, part, found, number, reading, lends)
     beauty = _stack(file, found.beauty)
     frame = Frame(
@@ -132,7 +140,8 @@ def _with_other_half(
     other = File(path)
     found = find(other.names, reading.names)
     part = other.parts[_target(other, found)[0]]
-    if _window(part) != file.window or (found.alpha is None) != (frame.alpha is None):
+    same_size = part.display_window == file.parts[0].display_window
+    if not same_size or (found.alpha is None) != (frame.alpha is None):
         raise Unfit(f"{path} is no half of {file.path}: its size or alpha differs")
     other.window = file.window
     passes = {
@@ -213,7 +222,9 @@ def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array 
     points[~np.isfinite(points).all(axis=-1)] = 0.0
     if reading.position_space == "camera":
         return _from_depth(points[..., 2])
-    result = camera.depth(points)
+    with np.errstate(over="ignore", invalid="ignore"):  # places beyond all worlds
+        result = camera.depth(points)
+    result[np.abs(result) < _NEAREST] = 0.0
     if camera.sphere is None:
         _check_fit(file, camera, points, result)
     return result
@@ -223,7 +234,7 @@ def _from_depth(depth: Array) -> Array:
     """Renderers write 0, infinity or a huge number where there is no hit."""
     depth = np.abs(depth)
     with np.errstate(invalid="ignore"):
-        hit = (depth > 0.0) & (depth < SKY_DEPTH)
+        hit = (depth > _NEAREST) & (depth < SKY_DEPTH)
     return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
 
 
@@ -256,7 +267,8 @@ def _normal(file: File, found: Found, camera: Camera | None, reading: Reading) -
     if space == "camera" or camera is None:
         return normal
     turn = np.diag([1.0, 1.0, -1.0]) @ camera.view[:3, :3]
-    return normal @ turn.T.astype(np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):  # of no length that normals have
+        return normal @ turn.T.astype(np.float32)
 
 
 def _vector(file: File, found: Found, reading: Reading) -> Array | None:
@@ -275,7 +287,8 @@ def _noise(file: File, found: Found) -> Noise | None:
     if not found.noise:
         return None
     planes = (np.nan_to_num(file.plane(name).ravel()) for name in found.noise)
-    return Noise(*(plane.astype(np.float16) for plane in planes))
+    cut = (np.clip(plane, -LARGEST_HALF, LARGEST_HALF) for plane in planes)
+    return Noise(*(plane.astype(np.float16) for plane in cut))
 
 
 def _samples(part: Part, reading: Reading) -> int:
@@ -327,17 +340,31 @@ def _is_half(file: File, names: list[str]) -> bool:
     return any(file.pixels(name).dtype == np.float16 for name in names)
 
 
-def _window(part: Part) -> Window:
+def _window(path: Path, part: Part) -> Window:
     """What the arrays of a frame cover.
 
     Renderers may crop each frame to what it shows, and then the display window is what
-    frames have in common. Ours are all cropped alike.
+    frames have in common. Ours are all cropped alike. Raises NotLending where that
+    would fill the memory with nothing.
     """
     if KEY in part.attributes:
         return part.data_window
     (a, b), (c, d) = part.data_window
     (e, f), (g, h) = part.display_window
-    return (min(a, e), min(b, f)), (max(c, g), max(d, h))
+    whole = (min(a, e), min(b, f)), (max(c, g), max(d, h))
+    if is_mostly_empty(_area(part.data_window), _area(whole)):
+        (left, top), (right, bottom) = whole
+        raise NotLending(
+            f"{path} holds few of the {right - left + 1}x{bottom - top + 1} pixels of "
+            "its windows",
+            "if it is sound give --read-limit, or else --temporal-radius 0",
+        )
+    return whole
+
+
+def _area(window: Window) -> int:
+    (left, top), (right, bottom) = window
+    return (right - left + 1) * (bottom - top + 1)
 
 
 def _inner(whole: Window, part: Window) -> tuple[slice, slice]:
