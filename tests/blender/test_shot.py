@@ -19,6 +19,7 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
+from xrds_blender.shot import animation as engine_shots
 from xrds_blender.shot import shot
 from xrds_core.sequence import finishing
 
@@ -315,6 +316,7 @@ def test_frames_by_number_are_rendered_by_themselves(
 ) -> None:
     """As `blender -b FILE -f 1..5` does: each is a render job of its own there."""
     monkeypatch.setattr("sys.argv", ["blender", "-b", "shot.blend", "-f", "1..5"])
+    monkeypatch.setattr(engine_shots, "_is_program_without_window", lambda: True)
     rendered = []
     monkeypatch.setattr(
         "xrds_blender.shot.method.sample_frame", lambda *_: rendered.append(1)
@@ -323,6 +325,24 @@ def test_frames_by_number_are_rendered_by_themselves(
     bpy.ops.render.render(animation=True)
     assert not rendered
     assert len(list((blend.parent / "f12").iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "alone"),
+    [
+        ("blender -b shot.blend -f 3", True),
+        ("blender -b shot.blend --render-frame 3 -- -a", True),
+        ("blender -b shot.blend -a -- -f out", False),
+        ("blender -b shot.blend -f 3 -a", False),
+    ],
+)
+def test_what_stands_after_two_dashes_decides_nothing(
+    words: str, alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.argv", words.split())
+    assert not engine_shots._renders_single_frames()  # a script with the module
+    monkeypatch.setattr(engine_shots, "_is_program_without_window", lambda: True)
+    assert engine_shots._renders_single_frames() == alone
 
 
 def panorama(kind: str) -> Any:

@@ -126,13 +126,18 @@ def _renders_single_frames() -> bool:
     Each is a render job of its own then, which could keep nothing for the next. What
     stands after -- is a script's, as is everything where Blender is a module.
     """
-    import bpy
-
-    if not (bpy.app.background and bpy.app.binary_path):
+    if not _is_program_without_window():
         return False
     words = set(takewhile(lambda word: word != "--", sys.argv))
     animates = {"-a", "--render-anim"} & words
     return bool({"-f", "--render-frame"} & words) and not animates
+
+
+def _is_program_without_window() -> bool:
+    """Whether this is Blender in the background, not its Python module."""
+    import bpy
+
+    return bpy.app.background and bool(bpy.app.binary_path)
 
 
 def _render_among_neighbours(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
