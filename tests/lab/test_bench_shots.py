@@ -209,7 +209,10 @@ def test_a_window_without_small_objects_says_so(
 
 
 def test_cycles_denoiser_is_cycles_own(still_life: Callable[..., Any]) -> None:
-    """To the bit, in every mode: one render serves them all."""
+    """In every mode: one render serves them all.
+
+    To the bit on most processors; on some OIDN's runs differ in the last digits.
+    """
     scene = still_life()
     ensure_registered()
     made, _ = call_engine(scene, lambda *given: sample_layer(*given, samples=2, seed=5))
@@ -229,7 +232,8 @@ def test_cycles_denoiser_is_cycles_own(still_life: Callable[..., Any]) -> None:
 
     for mode, expected in run_job(scene, render).items():
         ours = rivals.cycles_oidn(frame, mode)
-        assert np.array_equal(ours, expected), mode
+        apart = np.abs(ours - expected).max()
+        assert apart <= 1e-4 * expected.max(), (mode, apart)
 
 
 def frames_of(colours: list[float], shift: int = 0) -> dict[int, Frame]:
