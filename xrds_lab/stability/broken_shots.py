@@ -9,8 +9,8 @@ import numpy as np
 
 from xrds_core.errors import PictureError
 from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.agreement import REACH
 from xrds_core.temporal.frame import Stored
+from xrds_core.temporal.judge import MARGIN
 from xrds_core.temporal.moving import Movement
 from xrds_core.temporal.window import Shot, slide
 
@@ -46,8 +46,8 @@ def spoilt(frames: Frames) -> Iterator[Measured]:
     bad = np.zeros((height, width), bool)
     bad[height // 3, :] = bad[:, width // 4] = True
     near = np.zeros_like(bad)
-    near[height // 3 - REACH : height // 3 + REACH + 1] = True
-    near[:, width // 4 - REACH : width // 4 + REACH + 1] = True
+    near[height // 3 - MARGIN : height // 3 + MARGIN + 1] = True
+    near[:, width // 4 - MARGIN : width // 4 + MARGIN + 1] = True
     wrong, changed = 0, 0.0
     for number in (_MIDDLE, _MIDDLE + 1):
         for value in _BAD:
