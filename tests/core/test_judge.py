@@ -124,3 +124,14 @@ def test_box_is_a_mean() -> None:
         half = size // 2
         expected = x[8 - half : 9 + half, 9 - half : 10 + half].mean()
         assert box(x, size)[8, 9] == pytest.approx(expected, abs=1e-6)
+
+
+def test_pixels_that_hold_nan_are_no_noise() -> None:
+    """An infinite half would make all noise around it, and any neighbour right."""
+    spoilt = frame(1, PLAIN, SPOTS)
+    assert spoilt.halves is not None
+    for array in (spoilt.halves.radiance[1], spoilt.radiance):
+        array[20, 30] = np.inf
+    stored, pixel = store(spoilt), 20 * SHAPE[1] + 30
+    assert stored.noise is not None
+    assert stored.noise.brightness[pixel] == stored.noise.difference[pixel] == 0.0

@@ -251,15 +251,15 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         matrices=frame.matrices,
         still=frame.still,
         counts=None if frame.counts is None else _counts(frame.counts),
-        noise=_noise(frame, dtype),
+        noise=_noise(frame, spoilt, dtype),
     )
 
 
-def _noise(frame: Frame, dtype: DTypeLike) -> Noise | None:
+def _noise(frame: Frame, spoilt: NDArray[np.bool_], dtype: DTypeLike) -> Noise | None:
     """What halves say; of guides alone nothing is asked."""
     if frame.halves is None or frame.radiance is None:
         return None
-    return noise_of(frame.halves, frame.samples, dtype)
+    return noise_of(frame.halves, frame.samples, dtype).without(spoilt)
 
 
 def _counts(counts: Array) -> NDArray[Any]:

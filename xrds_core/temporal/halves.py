@@ -65,6 +65,11 @@ class Noise:
     difference: NDArray[Any]
     guides: NDArray[Any]
 
+    def without(self, spoilt: NDArray[np.bool_]) -> Noise:
+        """Return the same with 0 at `spoilt` pixels (H W), which tell nothing."""
+        kept = ~spoilt
+        return Noise(self.brightness * kept, self.difference * kept, self.guides * kept)
+
 
 def guides_of(picture: Array) -> Array:
     """Return (..., 6 or 7): albedo, normal and alpha, scaled to be compared.

@@ -77,7 +77,7 @@ def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
     with np.errstate(divide="ignore"):
         depth = (1.0 / frame.nearness).reshape(shape)
     vector = None if frame.vector is None else frame.vector.astype(np.float32)
-    return store(
+    spoilt = store(
         Frame(
             frame.number,
             frame.camera,
@@ -91,6 +91,8 @@ def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
         ),
         np.float16,
     )
+    noise = None if frame.noise is None else frame.noise.without(bad.ravel())
+    return replace(spoilt, noise=noise, counts=frame.counts)
 
 
 def missing(frames: Frames) -> Iterator[Measured]:
