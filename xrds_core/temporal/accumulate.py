@@ -17,9 +17,10 @@ import numpy as np
 
 from ..errors import PictureError
 from .agreement import REACH, agreement, brightness, likeness
-from .judge import MARGIN, Judge
+from .judge import MARGIN, Judge, light_for_albedo
 from .motion import grid, pair, places, surroundings
 from .moving import Movement
+from .neighbours import extreme
 from .survey import spread, survey
 from .takes import same_take
 
@@ -84,14 +85,14 @@ def accumulate(
     """
     others = same_take(target, others)
     near, far = _lenders(target, others, movement or Movement())
-    judged = _can_judge(target, others)
-    lenders = [near, far] if judged else [near + far]
+    usual = light_for_albedo(target) if _can_judge(target, others) else None
+    lenders = [near + far] if usual is None else [near, far]
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
     samples = np.empty(height * width, np.float32)
 
     def work(first: int) -> float:
-        block = _Block(target, slice(first, min(first + _ROWS, height)), judged)
+        block = _Block(target, slice(first, min(first + _ROWS, height)), usual)
         groups = [_gathered(block, group) for group in lenders if group]
         means[block.pixels], samples[block.pixels] = _means(target, block, groups)
         return float(sum(group.lent.sum(dtype=np.float64) for group in groups))
@@ -132,11 +133,15 @@ def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
 
 
 class _Block:
-    """Some rows of the target, with a margin that the tests look at."""
+    """Some rows of the target, with a margin that the tests look at.
 
-    def __init__(self, target: Stored, rows: slice, judged: bool) -> None:
+    `usual` is as in `Judge`; None where there is nothing to judge by. `void` (n,) says
+    where a frame with alpha has none; there is no noise to take away then.
+    """
+
+    def __init__(self, target: Stored, rows: slice, usual: float | None) -> None:
         height, width = target.shape
-        margin = MARGIN if judged else REACH
+        margin = REACH if usual is None else MARGIN
         first, last = max(rows.start - margin, 0), min(rows.stop + margin, height)
         self.rows = slice(first, last)
         self.pixels = slice(rows.start * width, rows.stop * width)
@@ -145,18 +150,25 @@ class _Block:
         self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
         self.own = _floats(target.picture[self.wide.pixels])
         self.judge: Judge | None = None
-        if judged:
-            self.judge = _judge(target, self)
+        self.void = self._void()
+        if usual is not None:
+            self.judge = _judge(target, self, usual)
         else:
             light = self.own[:, :3]
             self.brightness = {x: brightness(light, x) for x in (True, False)}
+
+    def _void(self) -> Mask | None:
+        if not self.own.shape[1] % 3:
+            return None
+        most = extreme(self.shaped(self.own[:, -1]), np.fmax)
+        return np.asarray(most.ravel() == 0.0)
 
     def shaped(self, x: NDArray[Any]) -> NDArray[Any]:
         """The rows (n, ...) as (H, W, ...)."""
         return x.reshape(self.rows.stop - self.rows.start, -1, *x.shape[1:])
 
 
-def _judge(target: Stored, block: _Block) -> Judge:
+def _judge(target: Stored, block: _Block, usual: float) -> Judge:
     noise, pixels = target.noise, block.wide.pixels
     assert noise is not None
     known = np.ones(len(block.own), bool)
@@ -170,6 +182,8 @@ def _judge(target: Stored, block: _Block) -> Judge:
         difference,
         np.square(guides),
         block.shaped(known),
+        target.samples,
+        usual,
     )
 
 
@@ -219,6 +233,8 @@ def _gathered(block: _Block, lenders: Sequence[_Same | _Lender]) -> _Sums:
         root = block.shaped(sums.brightness / weights)
         seen = block.shaped(sums.weights > 0.0)
         sums.scale(block.judge.trust(mean, root, seen).ravel())
+    if block.void is not None:
+        sums.scale((~block.void).astype(np.float32))
     sums.cut(block.inner)
     return sums
 

@@ -15,7 +15,7 @@ would lose what smooths them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +43,15 @@ _NEARNESS_SLACK = 0.02
 # distance (squared), up to a pixel. Where all is fine edges, 0.5 cost 0.2 dB and
 # leaving such samples out a decibel.
 _AS_DISTANCE_AT_RIMS, _MOST_AT_RIMS = 0.3, 1.0
+# Cycles' first sample lies at the pixel's centre. Frames of a sample or two that move
+# by whole pixels would all show the same points, and lines thinner than a pixel would
+# break up. So there the pixel taken is off by chance, by up to this much. Moves count
+# as whole where a pixel lands nearer to a centre than this, for each frame between.
+_FEW_SAMPLES = 2.0
+_OFF, _WHOLE = 0.6, 0.02
+# Multiples of these spread evenly over a unit square (M. Roberts, R3 and R2 sequences).
+_SPREAD_X = np.array([0.8191725134, 0.6710436067, 0.5497004779], np.float32)
+_SPREAD_Y = np.array([0.7548776662, 0.5698402910, 0.6180339887], np.float32)
 
 
 @dataclass(frozen=True)
@@ -75,13 +84,16 @@ class Detour:
 
     `pixels`: flat, ascending, those of this frame that show such things; `x` and
     `y`: where they were in the other frame, NaN where motion there and back does not
-    agree. All (m,). `moving` (H W): which pixels of the other frame show such things.
+    agree. All (m,). `moving` (H W): which pixels of the other frame show such things,
+    `beside` (H W), or None: which of this frame show something else, but may hold some
+    of their light.
     """
 
     pixels: NDArray[np.intp]
     x: Array
     y: Array
     moving: NDArray[np.bool_]
+    beside: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -159,7 +171,28 @@ def pair(
     """
     forth = passage(here.camera, there.camera)
     back = passage(there.camera, here.camera)
+    if detour is not None:
+        detour = _with_rims(detour, here, there)
     return Pair(here, there, forth, back, extent or surroundings(here), detour)
+
+
+def _with_rims(detour: Detour, here: Stored, there: Stored) -> Detour:
+    """Return a detour that knows what lies beside things that moved by themselves.
+
+    Edges are pixels of both sides. What stands still takes no part in such a pixel: the
+    share of the thing that moves in it is another one in every frame.
+    """
+    own = np.zeros(here.nearness.shape, bool)
+    own[detour.pixels] = True
+    beside = _beside(own, here)
+    moving = detour.moving | _beside(detour.moving, there)
+    return replace(detour, moving=moving, beside=beside)
+
+
+def _beside(mask: NDArray[np.bool_], frame: Stored) -> NDArray[np.bool_]:
+    """Return the rims (H W) that are not in a mask (H W), but next to it."""
+    wide = extreme(mask.reshape(frame.shape), np.logical_or).ravel()
+    return np.asarray(wide & ~mask & frame.rims)
 
 
 def surroundings(frame: Stored) -> tuple[Array, Array]:
@@ -212,6 +245,7 @@ def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
     near = pair.here.nearness[grid.pixels]
     x, y, _ = carry(pair.forth, grid.x, grid.y, near)
     found = nearest(x, y, pair.there.shape)
+    _loosen(found, pair, grid, x, y)
     centre_x, centre_y = centres(found.pixel, pair.there.shape[1])
     near = pair.there.nearness.take(found.pixel)
     back_x, back_y, near = carry(pair.back, centre_x, centre_y, near)
@@ -224,6 +258,22 @@ def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
     left[~seen] = 0.0
     apart = found.apart + np.float32(_AS_DISTANCE) * left
     return Places(found.pixel, apart, seen), found.seen
+
+
+def _loosen(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
+    """Take another pixel by chance where places (n,) lie at the centres of theirs."""
+    here, there = pair.here, pair.there
+    frames = abs(there.number - here.number)
+    if here.samples > _FEW_SAMPLES or here.camera.same(there.camera) or not frames:
+        return
+    at = np.flatnonzero(found.seen & (found.apart < (_WHOLE * frames) ** 2))
+    pixel = np.stack([grid.x[at], grid.y[at], np.full(len(at), there.number)])
+    off_x, off_y = (
+        np.float32(2 * _OFF) * ((spread @ pixel) % 1.0 - np.float32(0.5))
+        for spread in (_SPREAD_X, _SPREAD_Y)
+    )
+    other = nearest(x[at] + off_x, y[at] + off_y, there.shape)
+    found.pixel[at[other.seen]] = other.pixel[other.seen]
 
 
 def _doubt_rims(found: Places, pair: Pair, grid: Grid) -> None:
@@ -258,6 +308,8 @@ def _detoured(found: Places, pair: Pair, grid: Grid) -> Places:
     assert detour is not None
     assert isinstance(grid.pixels, slice)
     found.seen[...] &= ~detour.moving.take(found.pixel)
+    if detour.beside is not None:
+        found.seen[...] &= ~detour.beside[grid.pixels]
     part = slice(*detour.pixels.searchsorted((grid.pixels.start, grid.pixels.stop)))
     moved = nearest(detour.x[part], detour.y[part], pair.there.shape)
     inside = detour.pixels[part] - grid.pixels.start

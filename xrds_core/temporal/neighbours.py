@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from numpy.typing import NDArray
 
     from ..arrays import Array
 
 
-def extreme(x: Array, smaller: np.ufunc, step: int = 1) -> Array:
+def extreme(x: NDArray[Any], smaller: np.ufunc, step: int = 1) -> NDArray[Any]:
     """Return the least (`np.fmin`) or largest (`np.fmax`) value of 3x3 pixels.
 
-    They lie `step` pixels apart, the middle one at the pixel itself.
+    Of masks `np.logical_or` says whether any pixel is in it. They lie `step` pixels
+    apart, the middle one at the pixel itself.
     """
     wide = np.pad(x, step, "edge")
     end = slice(2 * step, None)
