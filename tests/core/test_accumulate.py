@@ -193,12 +193,26 @@ def test_where_geometry_fits_by_chance_a_cut_lends_nothing() -> None:
 def test_alpha_is_gathered_and_must_be_in_all_frames() -> None:
     frames = [view(k, camera()).frame for k in range(2)]
     ones = np.ones((HEIGHT, WIDTH), np.float32)
-    with_alpha = [store(replace(x, alpha=ones * k)) for k, x in enumerate(frames)]
+    pairs = zip(frames, (0.25, 1.0), strict=True)
+    with_alpha = [store(replace(x, alpha=ones * a)) for x, a in pairs]
     result = accumulate(with_alpha[0], [with_alpha[1]])
     assert result.alpha is not None
-    assert result.alpha == pytest.approx(ones / 2, abs=1e-4)
+    assert result.alpha == pytest.approx(ones * 0.625, abs=1e-4)
     with pytest.raises(PictureError, match="frame 1 and frame 0 hold different passes"):
         accumulate(with_alpha[0], [store(frames[1])])
+
+
+def test_what_is_empty_stays_empty() -> None:
+    alphas = np.zeros((2, HEIGHT, WIDTH), np.float32)
+    alphas[0, :, 30:] = alphas[1] = 0.5
+    here, there = (
+        store(replace(view(k, camera()).frame, alpha=a)) for k, a in enumerate(alphas)
+    )
+    result = accumulate(here, [there])
+    assert (result.alpha[:, :29] == 0.0).all()
+    # the pixel next to what is not empty may hold some of it
+    assert (result.alpha[:, 29] == 0.25).all()
+    assert (result.samples[:, 29:] == 2.0).all()
 
 
 def test_half_floats_lose_little_and_never_overflow() -> None:

@@ -135,6 +135,28 @@ def test_pixels_beside_a_nearer_thing_that_moves_otherwise_count_as_farther(
     assert not added[~mixed].any()
 
 
+@pytest.mark.parametrize(
+    ("samples", "pixels", "loose"),
+    [(2.0, 2.0, True), (2.0, 2.4, False), (4.0, 2.0, False), (2.0, 0.0, False)],
+)
+def test_frames_of_few_samples_do_not_all_show_the_same_points(
+    samples: float, pixels: float, loose: bool
+) -> None:
+    """What moves by whole pixels would: a frame's first samples are pixels' centres."""
+    eye = camera(x=pixels * 10 * PIXEL)
+    here, there = view(0, camera(), samples=samples), view(1, eye, samples=samples)
+    own = grid(here.name.shape)
+    result = found(here, there)
+    straight = np.floor(own.x - pixels) + np.floor(own.y) * WIDTH
+    seen = result.seen & (own.x > pixels + 1)
+    assert seen.mean() > 0.8
+    moved = (result.pixel != straight)[seen]
+    assert 0.2 < moved.mean() < 0.5 if loose else not moved.any()
+    down, right = np.divmod(result.pixel[seen].astype(int), WIDTH)
+    assert np.abs(right + 0.5 - own.x[seen] + pixels).max() < 1.01
+    assert np.abs(down + 0.5 - own.y[seen]).max() < 1.01
+
+
 def beside_card(seen: View) -> NDArray[np.bool_]:
     """Pixels that show no card but have it among the eight around them."""
     card = np.pad(seen.name == CARD, 1)

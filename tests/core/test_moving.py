@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 from shots import CARD, PIXEL, WALL, View, World, camera, project, vector, view
 
 from xrds_core.temporal.accumulate import accumulate
@@ -83,6 +85,24 @@ def test_the_wall_takes_no_samples_of_a_card_that_passes(way, pan: float) -> Non
         assert (took[wall & result.seen] == WALL).all()
         assert result.seen[wall].mean() > 0.6
         assert (took[~wall & result.seen] == CARD).all()
+
+
+def test_what_stands_still_lends_nothing_beside_what_moves() -> None:
+    """Pixels at an edge hold some of both sides, another share in every frame."""
+    shown = views(0.0)
+    card = [x.name == CARD for x in shown]
+    result = find(by_vectors(shown), 2, 3)
+    seen = result.seen.reshape(card[2].shape)
+    took = result.pixel.reshape(card[2].shape)
+    beside = [_around(x) & ~x for x in card]
+    assert beside[2].sum() > 40
+    assert not seen[beside[2]].any()
+    assert not beside[3].ravel()[took[seen & ~card[2]]].any()
+    assert seen[~_around(card[2]) & ~_around(card[3])].all()
+
+
+def _around(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    return sliding_window_view(np.pad(mask, 1), (3, 3)).any((2, 3))
 
 
 def test_without_either_a_card_leaves_ghosts() -> None:

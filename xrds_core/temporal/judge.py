@@ -136,14 +136,23 @@ def _doubted(error: Array, unsure: Array) -> Array:
 
 
 def box(x: Array, size: int) -> Array:
-    """Return the mean over `size` x `size` pixels, an odd number; 0 lies beyond.
+    """Return the mean over `size` x `size` pixels, an odd number, of those inside.
 
     (H, W) -> (H, W).
     """
     wide = np.pad(x, size // 2)
     rows = _sums(wide, x.shape[0], size)
-    columns = _sums(rows.T, x.shape[1], size).T
-    return np.asarray(columns * np.float32(1.0 / size**2))
+    sums = _sums(rows.T, x.shape[1], size).T
+    sums *= _shares(x.shape[0], size)[:, None]
+    sums *= _shares(x.shape[1], size)
+    return np.asarray(sums)
+
+
+def _shares(side: int, size: int) -> Array:
+    """Return 1 / how many of `size` pixels around each of a side are inside."""
+    inside = np.arange(side)
+    first, last = np.maximum(inside - size // 2, 0), inside + size // 2
+    return (1.0 / (np.minimum(last, side - 1) - first + 1)).astype(np.float32)
 
 
 def _sums(x: Array, count: int, size: int) -> Array:

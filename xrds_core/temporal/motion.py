@@ -264,7 +264,8 @@ def _loosen(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
     """Take another pixel by chance where places (n,) lie at the centres of theirs."""
     here, there = pair.here, pair.there
     frames = abs(there.number - here.number)
-    if here.samples > _FEW_SAMPLES or here.camera.same(there.camera) or not frames:
+    stands = here.camera.same(replace(there.camera, window=here.camera.window))
+    if here.samples > _FEW_SAMPLES or stands or not frames:
         return
     at = np.flatnonzero(found.seen & (found.apart < (_WHOLE * frames) ** 2))
     pixel = np.stack([grid.x[at], grid.y[at], np.full(len(at), there.number)])

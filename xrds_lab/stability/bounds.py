@@ -141,7 +141,8 @@ BOUNDS |= {
         0, "faults in the picture after NaN and infinities in one frame"
     ),
     "accumulation.nan.reach": Bound(
-        0.01, "relative change of the light beyond 8 pixels from them, before denoising"
+        0.01,
+        "relative change of the light beyond 13 pixels from it, before denoising",
     ),
     "accumulation.missing.faults": Bound(0, "faults beside a frame that is missing"),
     "accumulation.missing.unfinished": Bound(
