@@ -15,7 +15,8 @@ import pytest
 from xrds_blender.interface.registration import ensure_registered
 from xrds_core.errors import UsageError
 from xrds_core.temporal.frame import Camera, Frame, Sphere
-from xrds_lab.gallery import bench, frames, packing, report
+from xrds_lab import packing
+from xrds_lab.gallery import bench, frames, report
 from xrds_lab.gallery.bench import bench_gallery
 from xrds_lab.gallery.frames import Measure, Store
 from xrds_lab.gallery.judge import (

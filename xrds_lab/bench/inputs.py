@@ -129,8 +129,7 @@ class Folder:
         return path.is_file() and zipfile.is_zipfile(path)
 
     def write(self, name: str, arrays: Arrays, seconds: dict[str, float]) -> None:
-        """Keep arrays (as float32); a reader never sees half a file."""
-        arrays = {key: np.asarray(a, np.float32) for key, a in arrays.items()}
+        """Keep arrays; a reader never sees half a file."""
         note = np.array(json.dumps(seconds))
         with replacing(self.directory / name) as part, part.open("wb") as file:
             np.savez(file, **arrays, seconds=note)

@@ -16,7 +16,7 @@ from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
 from xrds_core.temporal.frame import LARGEST_HALF, Frame
 
-from . import packing
+from .. import packing
 from .stage import SIZE
 from .table import SAMPLES, SHOTS, Shot
 

@@ -177,7 +177,7 @@ class SceneFigures:
         pair = None
         request = self._truth(motion)
         if request is not None:
-            pair = reference, self.frames.picture(request)
+            pair = reference, self.frames.truth(request)
         made: dict[int, Array] = {}
 
         def once(number: int) -> Array:

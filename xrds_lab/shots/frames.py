@@ -9,8 +9,8 @@ import numpy as np
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_core.errors import SceneError
-from xrds_core.temporal.frame import Camera, Frame, Sphere
 
+from .. import packing
 from ..bench.inputs import Arrays, Folder, open_scene
 from .motions import animate
 
@@ -18,18 +18,19 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from xrds_core.arrays import Array
+    from xrds_core.temporal.frame import Frame
 
     from ..bench.journal import Journal
     from ..bench.windows import Shot
 
-GENERATION = 2  # counts up whenever the same request is rendered otherwise
+GENERATION = 3  # counts up whenever the same request is rendered otherwise
 MIDDLE = 9
 """The number of the frame that shows the file's own view."""
 REACH = 4
 """Frames to each side of it in a shot of nine, the standard."""
 _STILL_CAMERA = ("still", "objects")
 _PAIR_SEED = 21
-_OPTIONAL = ("alpha", "vector")
+_EXPOSURE = "view_exposure"
 
 
 @dataclass(frozen=True)
@@ -85,31 +86,15 @@ class ShotFrames:
 
     def frame(self, request: FrameRequest) -> Frame:
         """A noisy frame as the renderer gave it; raises SceneError without one."""
-        arrays = self._read(request)
-        camera = Camera(
-            view=arrays["view"].astype(np.float64),
-            project=arrays["project"].astype(np.float64),
-            size=_pair(arrays["size"]),
-            window=_pair(arrays["corner"]),
-            sphere=_sphere(arrays.get("sphere")),
-        )
-        return Frame(
-            number=request.number,
-            camera=camera,
-            samples=request.samples,
-            **{name: arrays[name] for name in ("radiance", "albedo", "normal")},
-            depth=arrays["depth"],
-            still=request.motion == "still",
-            **{name: arrays.get(name) for name in _OPTIONAL},
-        )
+        return next(iter(packing.unpack(self._read(request)).values()))
 
-    def picture(self, request: FrameRequest) -> Array:
-        """The radiance (H, W, 3) of a frame; raises SceneError without one."""
+    def truth(self, request: FrameRequest) -> Array:
+        """The radiance (H, W, 3) of a reference; raises SceneError without one."""
         return np.asarray(self._read(request)["radiance"])
 
     def stops(self, request: FrameRequest) -> float:
         """The exposure of the scene's view."""
-        return float(self._read(request)["view_exposure"])
+        return float(self._read(request)[_EXPOSURE])
 
     def _read(self, request: FrameRequest) -> Arrays:
         name = request.file_name(self.shot)
@@ -155,7 +140,7 @@ class ShotFrames:
                 scene.frame_set(request.number)
                 made = _truth if request.is_truth else _noisy
                 arrays, seconds = made(scene, request)
-                arrays["view_exposure"] = exposure
+                arrays[_EXPOSURE] = exposure
                 self.folder.write(request.file_name(self.shot), arrays, seconds)
             done(request)
 
@@ -169,17 +154,7 @@ def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]
     job = RenderJob(scale=1, samples=request.samples, temporal_radius=request.reach)
     place = request.number - (MIDDLE - request.reach)
     frames, seconds = call_engine(scene, lambda *given: noisy_frame(*given, job, place))
-    frame = next(iter(frames.values()))
-    arrays = {
-        name: getattr(frame, name)
-        for name in ("radiance", "albedo", "normal", "depth", *_OPTIONAL)
-    }
-    camera = frame.camera
-    arrays |= {"view": camera.view, "project": camera.project}
-    arrays |= {"size": np.array(camera.size), "corner": np.array(camera.window)}
-    if camera.sphere is not None:
-        arrays["sphere"] = np.array((*camera.sphere.longitude, *camera.sphere.latitude))
-    return {name: x for name, x in arrays.items() if x is not None}, seconds
+    return packing.pack(frames), seconds
 
 
 def _truth(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
@@ -192,15 +167,3 @@ def _truth(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]
         ),
     )
     return {"radiance": made.radiance}, made.seconds
-
-
-def _pair(array: Array) -> tuple[int, int]:
-    first, second = array.tolist()
-    return int(first), int(second)
-
-
-def _sphere(array: Array | None) -> Sphere | None:
-    if array is None:
-        return None
-    west, east, south, north = array.tolist()
-    return Sphere((west, east), (south, north))
