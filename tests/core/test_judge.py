@@ -12,7 +12,7 @@ from shots import camera
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Frame, Stored, store
 from xrds_core.temporal.halves import Halves, noise_of
-from xrds_core.temporal.judge import box
+from xrds_core.temporal.neighbours import box
 
 Array = NDArray[np.float32]
 SHAPE = (48, 64)
@@ -96,6 +96,24 @@ def test_one_wrong_neighbour_far_away_spoils_no_near_ones() -> None:
     frames = [store(frame(n, *(wrong if n in (1, 5) else right))) for n in range(1, 6)]
     _, samples = gathered(frames)
     assert 2.5 < samples.mean() < 3.1
+
+
+def test_a_shadow_that_moves_on_stays_in_its_frame() -> None:
+    """No frame by itself shows it for all its noise; the neighbours together do."""
+
+    def shaded(number: int) -> Array:
+        light = PLAIN.copy()
+        light[:, 8 + 6 * number : 14 + 6 * number] *= 0.4
+        return light
+
+    frames = [store(frame(n, shaded(n), SPOTS, 0.1)) for n in range(1, 9)]
+    still = [store(frame(n, PLAIN, SPOTS, 0.1)) for n in range(1, 9)]
+    both = []
+    for shown in (frames, still):
+        result = accumulate(shown[3], shown[:3] + shown[4:])
+        both.append((result.samples / SAMPLES)[:, 20:60].mean())
+    moving, unmoved = both
+    assert moving < 0.4 * unmoved
 
 
 def test_a_pixel_without_samples_takes_those_of_neighbours() -> None:

@@ -87,6 +87,61 @@ def test_chunks_give_the_frames_that_one_go_gives(
         np.testing.assert_array_equal(whole, part)
 
 
+class Counting:
+    """A denoiser that tells what it was called for."""
+
+    def __init__(self, denoiser: Denoiser) -> None:
+        self.denoiser, self.pictures = denoiser, []
+
+    def __call__(self, *passes: Any, progress: Any = None) -> Any:
+        self.pictures.append(passes[0])
+        for done in (0.0, 1.0):
+            if progress is not None:
+                progress(done)
+        return self.denoiser(*passes)
+
+
+def test_where_nothing_is_lent_the_picture_is_that_of_the_frame_alone(
+    denoiser: Denoiser,
+) -> None:
+    """Also beside pixels of many samples, where denoisers keep more of the noise."""
+    own, other = (replace(frame(n), samples=4) for n in (1, 2))
+    half = other.radiance.shape[1] // 2
+    other.radiance[:, half:] = np.nan
+    alone = finish_frame(store(own), [], denoiser, Movement()).picture
+    counting, told = Counting(denoiser), []
+    shot = finish_frame(store(own), [store(other)], counting, Movement(), told.append)
+    assert len(counting.pictures) == 2
+    assert told == [0.0, 0.5, 0.5, 1.0]
+    lent = shot.gathered.samples > 4.0
+    assert lent[:, : half - 4].mean() > 0.5
+    np.testing.assert_array_equal(shot.picture[:, half + 2 :], alone[:, half + 2 :])
+    assert (shot.picture[:, : half - 8] != alone[:, : half - 8]).mean() > 0.5
+
+
+def test_what_is_lent_everywhere_or_nowhere_is_denoised_once(
+    denoiser: Denoiser,
+) -> None:
+    still = [replace(frame(1), number=n, still=True) for n in (1, 2)]
+    nothing = replace(frame(2), radiance=np.full_like(frame(2).radiance, np.nan))
+    for own, other in (still, (frame(1), nothing)):
+        counting = Counting(denoiser)
+        finish_frame(store(own), [store(other)], counting, Movement())
+        assert len(counting.pictures) == 1
+
+
+def test_pixels_without_samples_are_no_holes_in_the_frame_alone(
+    denoiser: Denoiser,
+) -> None:
+    own, other = frame(1), replace(frame(1), number=2)
+    own.radiance[10:14, 20:24] = np.nan
+    other.radiance[:, 50:] = np.nan  # so that both pictures are made
+    counting = Counting(denoiser)
+    finish_frame(store(own), [store(other)], counting, Movement())
+    assert len(counting.pictures) == 2
+    assert all(np.isfinite(x[:20, :40]).all() for x in counting.pictures)
+
+
 # --- passes and their names -----------------------------------------------------------
 
 FLAT = {"radiance": "RGB", "albedo": "albedo.RGB", "normal": "N.XYZ", "depth": "Z"}

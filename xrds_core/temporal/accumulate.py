@@ -85,7 +85,8 @@ def accumulate(
     """
     others = same_take(target, others)
     near, far = _lenders(target, others, movement or Movement())
-    usual = light_for_albedo(target) if _can_judge(target, others) else None
+    judged = bool(others) and _can_judge(target, others)
+    usual = light_for_albedo(target) if judged else None
     lenders = [near + far] if usual is None else [near, far]
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
@@ -94,6 +95,8 @@ def accumulate(
     def work(first: int) -> float:
         block = _Block(target, slice(first, min(first + _ROWS, height)), usual)
         groups = [_gathered(block, group) for group in lenders if group]
+        for group in groups:
+            group.finish()
         means[block.pixels], samples[block.pixels] = _means(target, block, groups)
         return float(sum(group.lent.sum(dtype=np.float64) for group in groups))
 
@@ -195,48 +198,61 @@ class _Sums:
     """
 
     def __init__(self, block: _Block) -> None:
+        self.block = block
         self.values = np.zeros_like(block.own)
         self.weights, self.lent, self.brightness = np.zeros(
             (3, len(block.own)), np.float32
         )
 
     def add(
-        self, values: Array, weight: Array, lent: Array, root: Array | None
+        self, values: Array, weight: Array, lent: Array, noise: tuple[Array, ...]
     ) -> None:
+        """Add a neighbour's; of `noise` see `_noise`."""
+        if self.block.judge is not None:
+            self.brightness += noise[0] * weight
+            self.block.judge.see(*map(self.block.shaped, (values, *noise, weight)))
         values *= weight[:, None]
         self.values += values
         self.weights += weight
         self.lent += lent
-        if root is not None:
-            self.brightness += root * weight
 
-    def scale(self, trust: Array) -> None:
-        """Let all count by weights (n,)."""
+    def finish(self) -> None:
+        """Let all count as far as they are right, on the block's own rows alone."""
+        block = self.block
+        if block.judge is not None:
+            weights = np.maximum(self.weights, _TINY)
+            mean = block.shaped(self.values / weights[:, None])
+            root = block.shaped(self.brightness / weights)
+            seen = block.shaped(self.weights > 0.0)
+            self._scale(block.judge.trust(mean, root, seen).ravel())
+        if block.void is not None:
+            self._scale((~block.void).astype(np.float32))
+        inner = block.inner
+        self.values, self.weights = self.values[inner], self.weights[inner]
+        self.lent = self.lent[inner]
+
+    def _scale(self, trust: Array) -> None:
         self.values *= trust[:, None]
         self.weights *= trust
         self.lent *= trust
 
-    def cut(self, inner: slice) -> None:
-        """Keep a part of the pixels alone."""
-        self.values, self.weights = self.values[inner], self.weights[inner]
-        self.lent = self.lent[inner]
-
 
 def _gathered(block: _Block, lenders: Sequence[_Same | _Lender]) -> _Sums:
-    """Return what a group of neighbours lends to the block's own rows."""
+    """Return what a group of neighbours would lend to a block."""
     sums = _Sums(block)
     for lender in lenders:
         lender.add(block, sums)
-    if block.judge is not None:
-        weights = np.maximum(sums.weights, _TINY)
-        mean = block.shaped(sums.values / weights[:, None])
-        root = block.shaped(sums.brightness / weights)
-        seen = block.shaped(sums.weights > 0.0)
-        sums.scale(block.judge.trust(mean, root, seen).ravel())
-    if block.void is not None:
-        sums.scale((~block.void).astype(np.float32))
-    sums.cut(block.inner)
     return sums
+
+
+def _noise(
+    other: Stored, pixels: slice | NDArray[np.integer], block: _Block
+) -> tuple[Array, ...]:
+    """Return brightness and difference (n,) of flat pixels; nothing unasked."""
+    if block.judge is None or other.noise is None:
+        return ()
+    noise = other.noise
+    return tuple(_floats(x[pixels]) for x in (noise.brightness, noise.difference))
 
 
 class _Same:
@@ -251,11 +267,9 @@ class _Same:
         weight = _samples(other, pixels, len(block.own))
         if other.spoilt is not None:
             weight[other.spoilt[pixels]] = 0.0
-        root = None
-        if block.judge is not None and other.noise is not None:
-            root = _floats(other.noise.brightness[pixels])
         # a copy: NumPy's own float32 pictures are not to be changed
-        sums.add(_floats(other.picture[pixels]).copy(), weight, weight, root)
+        picked = _floats(other.picture[pixels]).copy()
+        sums.add(picked, weight, weight, _noise(other, pixels, block))
 
 
 class _Lender:
@@ -286,17 +300,14 @@ class _Lender:
             normal = slice(6, 9) if other.has_light else slice(3, 6)
             picked[:, normal] = picked[:, normal] @ self._turn.T
         weight = found.seen.astype(np.float32)
-        root = None
         if block.judge is None:
             weight *= self._agreement(block, picked, found.seen)
-        elif other.noise is not None:
-            root = _floats(other.noise.brightness.take(found.pixel))
         self._doubt_moving(weight, block, picked, found.seen)
         weight *= spread(self._tiles, self._pair.here.shape, block.rows).ravel()
         weight *= _samples(other, found.pixel, len(weight))
         lent = weight.copy()
         weight *= np.exp(found.apart * self._fall)
-        sums.add(picked, weight, lent, root)
+        sums.add(picked, weight, lent, _noise(other, found.pixel, block))
 
     def _agreement(self, block: _Block, picked: Array, seen: Mask) -> Array:
         """Return the weights (n,) of the block's pixels by the light of both."""

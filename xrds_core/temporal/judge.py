@@ -9,17 +9,21 @@ squared error. E counts many times, since a denoiser takes away most of V and no
 of E.
 
 Guides have little noise and tell at once. Light that changes where guides do not, as a
-shadow that moves, is asked for in means of 3x3, 7x7 and 15x15 pixels, where its noise
-is less.
+shadow that moves, is hidden by the frame's own noise; there the neighbours are asked
+whether they agree with each other.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .agreement import brightness as root_of_luminance
+from .changes import REACH, Changes
 from .halves import guides_of
+from .neighbours import box
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,17 +33,15 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-MARGIN = 13  # pixels to each side of a pixel that have a say in it
-# How often the error that guides show counts, against the noise of light.
-_GUIDES = 256.0
+# How often errors that guides show, and light that changes, count against the noise of
+# light: divided by the frame's samples, since a denoiser takes away the less of their
+# noise the more there are, but no less than `_LEAST`.
+_GUIDES, _CHANGES, _LEAST = 512.0, 256.0, 4.0
 # Pixels across, over which errors of guides are averaged: by the most samples per
 # pixel that ask for so many. Halves of a sample or two tell little of one pixel.
 _GUIDE_AREAS = ((2.0, 15), (4.0, 9), (np.inf, 5))
-# Means of light: pixels across, over how many of them the error is averaged, and how
-# often it counts. Of the widest ones that falls with the samples: noise that is so wide
-# is what a denoiser takes away the better, the more of it there is.
-_LIGHT_AREAS = ((3, 5, 4.0), (7, 7, 16.0), (15, 9, 1024.0))
-_WIDE = 15
+# The same of light: pixels across whose mean is compared, and how often it counts.
+_MEAN, _LIGHT_AREA, _LIGHT = 3, 5, 4.0
 # What could be noise, counted so often, is doubted.
 _UNSURE = 4.0
 _SMOOTH = 5  # pixels across: weights
@@ -47,6 +49,9 @@ _NOISE_AREA = 7
 # Squared, summed over the channels: an albedo below it is taken to hold as much light
 # for its albedo as the whole frame does.
 _DARKEST_ALBEDO = 0.02
+_DARKEST_ROOT = 0.1  # the root of an albedo's luminance, in the same way
+MARGIN = max(max(a for _, a in _GUIDE_AREAS) // 2, REACH) + _SMOOTH // 2
+"""How many pixels to each side of a pixel have a say in it."""
 _TINY = np.float32(1e-9)
 
 
@@ -64,7 +69,7 @@ def light_for_albedo(frame: Stored) -> float:
 
 
 class Judge:
-    """Knows the frame's own part; asked of the mean of any neighbours.
+    """Knows the frame's own part, is shown each neighbour, then asked of their mean.
 
     `picture` (H, W, 9 or 10) is radiance, albedo, normal, and alpha where there is any.
     `brightness` and `difference` (H, W) are those of `Noise`, `noise` (H, W) is the
@@ -85,15 +90,33 @@ class Judge:
     ) -> None:
         self._guides, self._known = guides_of(picture), known
         self._brightness, self._noise = brightness, noise
-        self._samples = samples
+        self._often = [
+            np.float32(max(x / samples, _LEAST)) for x in (_GUIDES, _CHANGES)
+        ]
         self._area = next(area for most, area in _GUIDE_AREAS if samples <= most)
         self._unsure = np.float32(_UNSURE) * box(noise, max(self._area, _NOISE_AREA))
         self._variance = box(np.square(difference), _NOISE_AREA) + _TINY
-        self._chance = [np.square(box(difference, size)) for size, *_ in _LIGHT_AREAS]
+        self._chance = np.square(box(difference, _MEAN))
         albedo = box(np.square(self._guides[..., :3]).sum(axis=-1), _SMOOTH)
         light = np.square(box(brightness, _SMOOTH)) / 4
         dark = np.float32(_DARKEST_ALBEDO)
         self._light_for_albedo = (light + dark * np.float32(usual)) / (albedo + dark)
+        texture = root_of_luminance(picture[..., 3:6])
+        lit = box(texture, _SMOOTH) + np.float32(_DARKEST_ROOT)
+        self._light = box(brightness, _SMOOTH) / lit
+        self._untextured = brightness - self._light * texture
+        self._changes = Changes((brightness.shape[0], brightness.shape[1]))
+
+    def see(
+        self, picture: Array, brightness: Array, difference: Array, weight: Array
+    ) -> None:
+        """Take note of what a neighbour shows on the frame's pixels.
+
+        All are as the frame's own; `weight` (H, W) is how much each pixel counts.
+        """
+        # a nearest pixel has other texture than this one, and no other light
+        light = brightness - self._light * root_of_luminance(picture[..., 3:6])
+        self._changes.add(light - self._untextured, difference, weight)
 
     def trust(self, mean: Array, brightness: Array, seen: Mask) -> Array:
         """Return the weights (H, W) in [0, 1] of neighbours whose mean is given.
@@ -102,26 +125,25 @@ class Judge:
         they are `seen` (H, W).
         """
         asked = (seen & self._known).astype(np.float32)
-        error = np.float32(_GUIDES) * self._light_for_albedo
-        error *= self._error_of_guides(mean, asked)
-        error += self._error_of_light(brightness, asked)
+        error = self._guides_apart(mean, asked) + self._light_apart(brightness, asked)
+        error += self._unrest
         weight = _mean(self._variance / (self._variance + error), asked, _SMOOTH)
         return np.asarray(np.where(self._known, weight, 1.0) * seen, np.float32)
 
-    def _error_of_guides(self, mean: Array, asked: Array) -> Array:
+    def _guides_apart(self, mean: Array, asked: Array) -> Array:
         apart = np.square(guides_of(mean) - self._guides).sum(axis=-1) - self._noise
-        return _doubted(_mean(apart, asked, self._area), self._unsure)
+        error = _doubted(_mean(apart, asked, self._area), self._unsure)
+        return np.asarray(self._often[0] * self._light_for_albedo * error)
 
-    def _error_of_light(self, brightness: Array, asked: Array) -> Array:
-        """As often as it counts."""
-        apart = (self._brightness - brightness) * asked
-        total = np.zeros_like(apart)
-        for (size, area, often), chance in zip(_LIGHT_AREAS, self._chance, strict=True):
-            error = box(np.square(box(apart, size)) - chance, area)
-            unsure = np.float32(_UNSURE / size**2) * self._variance
-            counts = often / self._samples if size == _WIDE else often
-            total += np.float32(counts) * _doubted(error, unsure)
-        return total
+    def _light_apart(self, brightness: Array, asked: Array) -> Array:
+        apart = np.square(box((self._brightness - brightness) * asked, _MEAN))
+        unsure = np.float32(_UNSURE / _MEAN**2) * self._variance
+        error = _doubted(box(apart - self._chance, _LIGHT_AREA), unsure)
+        return np.asarray(np.float32(_LIGHT) * error)
+
+    @cached_property
+    def _unrest(self) -> Array:
+        return np.asarray(self._often[1] * self._changes.error())
 
 
 def _mean(x: Array, asked: Array, size: int) -> Array:
@@ -133,37 +155,3 @@ def _doubted(error: Array, unsure: Array) -> Array:
     """Return an error, less where it could be chance."""
     error = np.maximum(error, np.float32(0.0))
     return np.asarray(np.square(error) / (error + unsure + _TINY))
-
-
-def box(x: Array, size: int) -> Array:
-    """Return the mean over `size` x `size` pixels, an odd number, of those inside.
-
-    (H, W) -> (H, W).
-    """
-    wide = np.pad(x, size // 2)
-    rows = _sums(wide, x.shape[0], size)
-    sums = _sums(rows.T, x.shape[1], size).T
-    sums *= _shares(x.shape[0], size)[:, None]
-    sums *= _shares(x.shape[1], size)
-    return np.asarray(sums)
-
-
-def _shares(side: int, size: int) -> Array:
-    """Return 1 / how many of `size` pixels around each of a side are inside."""
-    inside = np.arange(side)
-    first, last = np.maximum(inside - size // 2, 0), inside + size // 2
-    return (1.0 / (np.minimum(last, side - 1) - first + 1)).astype(np.float32)
-
-
-def _sums(x: Array, count: int, size: int) -> Array:
-    """Return the sums of `size` rows that follow each other, by thirds where it can."""
-    if size > 3 and size % 3 == 0:
-        third = size // 3
-        part = _sums(x, count + 2 * third, third)
-        return np.asarray(
-            part[:count] + part[third : third + count] + part[2 * third :]
-        )
-    total = x[:count].copy()
-    for i in range(1, size):
-        total += x[i : i + count]
-    return total

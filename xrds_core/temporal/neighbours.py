@@ -40,3 +40,37 @@ def extreme_at(
     rows = [np.clip(row + i, 0, height - 1) * width for i in (-1, 0, 1)]
     columns = [np.clip(column + i, 0, width - 1) for i in (-1, 0, 1)]
     return np.asarray(reduce(smaller, (x.take(i + j) for i in rows for j in columns)))
+
+
+def box(x: Array, size: int) -> Array:
+    """Return the mean over `size` x `size` pixels, an odd number, of those inside.
+
+    (H, W) -> (H, W).
+    """
+    wide = np.pad(x, size // 2)
+    rows = _sums(wide, x.shape[0], size)
+    sums = _sums(rows.T, x.shape[1], size).T
+    sums *= _shares(x.shape[0], size)[:, None]
+    sums *= _shares(x.shape[1], size)
+    return np.asarray(sums)
+
+
+def _shares(side: int, size: int) -> Array:
+    """Return 1 / how many of `size` pixels around each of a side are inside."""
+    inside = np.arange(side)
+    first, last = np.maximum(inside - size // 2, 0), inside + size // 2
+    return (1.0 / (np.minimum(last, side - 1) - first + 1)).astype(np.float32)
+
+
+def _sums(x: Array, count: int, size: int) -> Array:
+    """Return the sums of `size` rows that follow each other, by thirds where it can."""
+    if size > 3 and size % 3 == 0:
+        third = size // 3
+        part = _sums(x, count + 2 * third, third)
+        return np.asarray(
+            part[:count] + part[third : third + count] + part[2 * third :]
+        )
+    total = x[:count].copy()
+    for i in range(1, size):
+        total += x[i : i + count]
+    return total

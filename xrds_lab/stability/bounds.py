@@ -142,7 +142,7 @@ BOUNDS |= {
     ),
     "accumulation.nan.reach": Bound(
         0.01,
-        "relative change of the light beyond 13 pixels from it, before denoising",
+        "relative change of the light beyond 12 pixels from it, before denoising",
     ),
     "accumulation.missing.faults": Bound(0, "faults beside a frame that is missing"),
     "accumulation.missing.unfinished": Bound(
