@@ -221,10 +221,10 @@ class _Sums:
         block = self.block
         if block.judge is not None:
             weights = np.maximum(self.weights, _TINY)
-            mean = block.shaped(self.values / weights[:, None])
+            passes = block.shaped(self.values[:, 3:] / weights[:, None])
             root = block.shaped(self.brightness / weights)
             seen = block.shaped(self.weights > 0.0)
-            self._scale(block.judge.trust(mean, root, seen).ravel())
+            self._scale(block.judge.trust(passes, root, seen).ravel())
         if block.void is not None:
             self._scale((~block.void).astype(np.float32))
         inner = block.inner

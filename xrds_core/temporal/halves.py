@@ -71,21 +71,22 @@ class Noise:
         return Noise(self.brightness * kept, self.difference * kept, self.guides * kept)
 
 
-def guides_of(picture: Array) -> Array:
-    """Return (..., 6 or 7): albedo, normal and alpha, scaled to be compared.
+def guides_of(passes: Array) -> Array:
+    """Return albedo, normal and alpha, scaled to be compared.
 
-    `picture` (..., 9 or 10) is radiance, albedo, normal and perhaps alpha.
+    `passes` (..., 6 or 7) are these; alpha may be missing.
     """
-    guides = picture[..., 3:].copy()
-    np.clip(guides[..., :3], 0.0, _BRIGHTEST, out=guides[..., :3])
-    guides[..., 3:6] *= np.float32(_NORMAL_SHARE**0.5)
+    scale = np.ones(passes.shape[-1], np.float32)
+    scale[3:6] = _NORMAL_SHARE**0.5
+    guides = passes * scale
+    np.clip(guides, -_BRIGHTEST, _BRIGHTEST, out=guides)
     return guides
 
 
 def noise_of(halves: Halves, samples: float, dtype: DTypeLike) -> Noise:
     """Return the noise of a frame of `samples` per pixel; finite everywhere."""
     roots = brightness(halves.radiance)
-    parts = [halves.radiance, halves.albedo, halves.normal]
+    parts = [halves.albedo, halves.normal]
     if halves.alpha is not None:
         parts.append(halves.alpha[..., None])
     one, two = guides_of(np.concatenate(parts, axis=-1))

@@ -63,7 +63,7 @@ def light_for_albedo(frame: Stored) -> float:
     """
     assert frame.noise is not None
     light = float(np.mean(frame.noise.brightness, dtype=np.float64)) ** 2 / 4
-    albedo = guides_of(frame.picture[::7].astype(np.float32))[:, :3]
+    albedo = guides_of(frame.picture[::7, 3:].astype(np.float32))[:, :3]
     squares = float(np.square(albedo).sum(axis=-1).mean(dtype=np.float64))
     return light / (squares + _DARKEST_ALBEDO)
 
@@ -88,7 +88,7 @@ class Judge:
         samples: float,
         usual: float,
     ) -> None:
-        self._guides, self._known = guides_of(picture), known
+        self._guides, self._known = guides_of(picture[..., 3:]), known
         self._brightness, self._noise = brightness, noise
         self._often = [
             np.float32(max(x / samples, _LEAST)) for x in (_GUIDES, _CHANGES)
@@ -118,20 +118,22 @@ class Judge:
         light = brightness - self._light * root_of_luminance(picture[..., 3:6])
         self._changes.add(light - self._untextured, difference, weight)
 
-    def trust(self, mean: Array, brightness: Array, seen: Mask) -> Array:
-        """Return the weights (H, W) in [0, 1] of neighbours whose mean is given.
+    def trust(self, passes: Array, brightness: Array, seen: Mask) -> Array:
+        """Return the weights (H, W) in [0, 1] of neighbours whose means are given.
 
-        `mean` is as the frame's own picture, `brightness` (H, W) as its own, where
-        they are `seen` (H, W).
+        `passes` (H, W, 6 or 7) are albedo, normal and alpha where there is any,
+        `brightness` (H, W) is as the frame's own, where they are `seen` (H, W).
         """
         asked = (seen & self._known).astype(np.float32)
-        error = self._guides_apart(mean, asked) + self._light_apart(brightness, asked)
+        error = self._guides_apart(passes, asked) + self._light_apart(brightness, asked)
         error += self._unrest
         weight = _mean(self._variance / (self._variance + error), asked, _SMOOTH)
         return np.asarray(np.where(self._known, weight, 1.0) * seen, np.float32)
 
-    def _guides_apart(self, mean: Array, asked: Array) -> Array:
-        apart = np.square(guides_of(mean) - self._guides).sum(axis=-1) - self._noise
+    def _guides_apart(self, passes: Array, asked: Array) -> Array:
+        apart = guides_of(passes)
+        apart -= self._guides
+        apart = np.einsum("ijk,ijk->ij", apart, apart) - self._noise
         error = _doubted(_mean(apart, asked, self._area), self._unsure)
         return np.asarray(self._often[0] * self._light_for_albedo * error)
 
