@@ -57,9 +57,11 @@ def test_a_shot_pays_for_what_its_frames_lend_and_for_no_probes() -> None:
     costs = replace(COSTS, fixed=5.0, probes=4.0)
     plain = replace(PLAIN, samples=3)
     lending = 2 * 4 * budget.ACCUMULATION * 2.0  # of the quickest denoiser's seconds
+    alone = COSTS.denoise[plain.denoiser]  # the frame by itself
     assert costs.in_shot(4).seconds(plain) == pytest.approx(
-        COSTS.seconds(plain) + lending
+        COSTS.seconds(plain) + lending + alone
     )
+    assert costs.in_shot(4).seconds(LOW) == pytest.approx(COSTS.seconds(LOW) + lending)
     assert costs.in_shot(0).seconds(plain) == COSTS.seconds(plain)
 
 

@@ -84,7 +84,7 @@ class Costs:
 
     `fixed`: scene sync, BVH, reading and writing, whatever is rendered, and `probes`,
     what has gone into finding all this out; `beauty` and `guide`: one sample; `denoise`
-    by denoiser; `network` by network.
+    by denoiser; `network` by network; `pictures`: how many are denoised at full size.
     """
 
     fixed: float
@@ -93,14 +93,21 @@ class Costs:
     denoise: Mapping[Denoiser, float]
     network: Mapping[Network, float]
     probes: float = 0.0
+    pictures: int = 1
 
     def in_shot(self, radius: int) -> Costs:
         """Those of a frame to which `radius` frames before and after lend samples.
 
-        The probes are the first frame's alone.
+        The probes are the first frame's alone. At full size the frame is denoised by
+        itself as well.
         """
         lending = 2 * radius * ACCUMULATION * min(self.denoise.values())
-        return replace(self, fixed=self.fixed - self.probes + lending, probes=0.0)
+        return replace(
+            self,
+            fixed=self.fixed - self.probes + lending,
+            probes=0.0,
+            pictures=2 if radius else 1,
+        )
 
     def seconds(self, choice: Choice) -> float:
         """Of the whole frame; raises KeyError for an unknown denoiser or network."""
@@ -115,11 +122,12 @@ class Costs:
         return self.beauty / choice.scale**2
 
     def _without_samples(self, choice: Choice) -> float:
-        seconds = self.fixed + self.denoise[choice.denoiser] / choice.scale**2
-        if choice.scale > 1:
-            guide = self.beauty if choice.guides == "full" else self.guide
-            seconds += choice.guide_samples * guide + self.network[choice.network]
-        return seconds
+        denoise = self.denoise[choice.denoiser]
+        if choice.scale == 1:
+            return self.fixed + denoise * self.pictures
+        guide = self.beauty if choice.guides == "full" else self.guide
+        seconds = self.fixed + denoise / choice.scale**2
+        return seconds + choice.guide_samples * guide + self.network[choice.network]
 
 
 @dataclass(frozen=True)
