@@ -55,15 +55,35 @@ def test_one_sample_has_no_halves(scene: Any) -> None:
     assert sampled(scene, samples=1).halves is None
 
 
-def test_a_noise_threshold_is_kept_and_its_samples_are_counted(scene: Any) -> None:
+@pytest.mark.parametrize("threshold", [0.05, 0.2, 0.0])
+def test_a_noise_threshold_is_kept_and_its_samples_are_counted(
+    scene: Any, threshold: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
     cycles = scene.cycles
-    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, 0.2
-    cycles.samples = 64
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, threshold
+    cycles.samples = 128
     frame = sampled(scene)
-    assert frame.halves is None
     assert frame.counts is not None
-    assert 1.0 <= frame.samples <= 64.0
+    assert frame.halves is not None
+    assert frame.halves.counts == pytest.approx(
+        np.stack([frame.halves.counts[0], frame.counts - frame.halves.counts[0]])
+    )
+    share = (frame.halves.counts[0] / frame.counts)[..., None]
+    mean = frame.halves.radiance[0] * share + frame.halves.radiance[1] * (1 - share)
+    assert frame.radiance == pytest.approx(mean, rel=1e-5, abs=1e-6)
     assert frame.samples == pytest.approx(frame.counts.mean(), rel=1e-3)
+    monkeypatch.setattr(sampling, "_has_halves", lambda *_: False)
+    whole = sampled(scene)
+    assert whole.halves is None
+    # Cycles looks after every sixteenth sample of each half whether a pixel may stop
+    assert 0.6 < frame.samples / whole.samples < 1.4
+    assert cycles.adaptive_threshold == pytest.approx(threshold)
+    assert cycles.samples == 128
+
+
+def test_with_a_time_limit_a_frame_has_no_halves(scene: Any) -> None:
+    scene.cycles.time_limit, scene.cycles.samples = 10.0, 8
+    assert sampled(scene).halves is None
 
 
 def test_motion_under_blur_is_told_by_a_render_without(scene: Any) -> None:

@@ -128,9 +128,10 @@ def test_under_a_still_camera_frames_continue_one_sequence(
     gathered = []
     accumulate = finishing.accumulate
 
-    def keep(*given: Any) -> Any:
-        gathered.append(accumulate(*given))
-        return gathered[-1]
+    def keep(own: Any, others: Any, *more: Any) -> Any:
+        found = accumulate(own, others, *more)
+        gathered.extend([found] if others else [])
+        return found
 
     monkeypatch.setattr(finishing, "accumulate", keep)
     job = RenderJob(scale=1, temporal_radius=2, seed=4)
@@ -472,9 +473,10 @@ def test_views_of_a_pair_lend_to_each_other(
     gathered = []
     accumulate = finishing.accumulate
 
-    def keep(own: Any, lenders: Any, movement: Any) -> Any:
-        gathered.append((own, list(lenders), accumulate(own, lenders, movement)))
-        return gathered[-1][2]
+    def keep(own: Any, lenders: Any, *more: Any) -> Any:
+        found = accumulate(own, lenders, *more)
+        gathered.extend([(own, list(lenders), found)] if lenders else [])
+        return found
 
     monkeypatch.setattr(finishing, "accumulate", keep)
     animation.render.use_multiview = True

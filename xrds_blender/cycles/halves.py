@@ -6,7 +6,7 @@ samples gives, and the scene is synced once. The result then holds the means of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,8 +19,8 @@ from xrds_core.temporal.samples import Portion
 from . import session
 from .clock import StageClock
 from .layer_session import LayerSession
-from .pass_names import is_of_first_sample
-from .samples import GEOMETRY, Samples, sample_layer
+from .pass_names import SAMPLE_COUNT, is_of_first_sample
+from .samples import COUNTS, GEOMETRY, Samples, sample_layer
 
 _Passes = dict[tuple[str, str], Array]
 _Geometry = Sequence[tuple[str, str]]
@@ -40,23 +40,35 @@ def sample_halves(
     """Render a part of a sequence, of two samples or more, in two halves.
 
     Returns them by view, and the seconds: sync, beauty. `geometry` is as in
-    `sample_layer`. Raises Cancelled when the user stops it.
+    `sample_layer`; with COUNTS in it the file's noise threshold is kept, and counts
+    are in samples. Raises Cancelled when the user stops it.
     """
+    is_even = COUNTS not in geometry
     with LayerSession(engine, depsgraph) as layer:
         parts, passes, clocks = [], [], []
         for part in portion.halves():
             samples, clock = sample_layer(
-                engine, depsgraph, portion=part, geometry=geometry
+                engine, depsgraph, portion=part, is_even=is_even, geometry=geometry
             )
-            parts.append(samples)
+            parts.append({v: _counted(x, part, clock) for v, x in samples.items()})
             passes.append(layer.all_passes())
             clocks.append(clock)
         shares = portion.shares()
-        layer.put_back(_merged(*passes, shares))
-    found = {
-        view: _joined(first, parts[1][view], shares) for view, first in parts[0].items()
-    }
+        found = {
+            view: _joined(first, parts[1][view], shares)
+            for view, first in parts[0].items()
+        }
+        layer.put_back(_merged(*passes, shares, found))
     return found, _seconds(clocks)
+
+
+def _counted(samples: Samples, part: Portion, clock: StageClock) -> Samples:
+    """With the number of each pixel's samples in the place of its share of the most."""
+    if samples.counts is None:
+        return samples
+    # fewer where Cycles stopped before the most it was allowed
+    most = min(clock.samples, part.length) if clock.samples else part.length
+    return replace(samples, counts=samples.counts * np.float32(most))
 
 
 def sample_motion(
@@ -89,12 +101,16 @@ def _seconds(clocks: Sequence[StageClock]) -> dict[str, float]:
 
 def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Half:
     pictures = np.stack((first.picture, second.picture))
+    counts = None
+    if first.counts is not None and second.counts is not None:
+        counts = np.stack((first.counts, second.counts))
     halves = Halves(
         radiance=pictures[..., :3],
         albedo=np.stack((first.albedo, second.albedo)),
         normal=np.stack((first.normal, second.normal)),
         alpha=pictures[..., 3],
         shares=shares,
+        counts=counts,
     )
     radiance, alpha = halves.mean("radiance"), halves.mean("alpha")
     whole = replace(
@@ -102,16 +118,26 @@ def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Hal
         picture=np.dstack((radiance, alpha)),
         albedo=halves.mean("albedo"),
         normal=halves.mean("normal"),
+        counts=None if counts is None else counts.sum(axis=0),
     )
     return Half(whole, halves)
 
 
-def _merged(first: _Passes, second: _Passes, shares: tuple[float, float]) -> _Passes:
+def _merged(
+    first: _Passes,
+    second: _Passes,
+    shares: tuple[float, float],
+    found: Mapping[str, Half],
+) -> _Passes:
     """Passes of all samples: means, but for what only a first sample writes."""
-    one, two = (np.float32(share) for share in shares)
-    return {
-        key: pixels
-        if is_of_first_sample(key[1]) or key not in second
-        else pixels * one + second[key] * two
-        for key, pixels in first.items()
-    }
+    merged = {}
+    for (view, name), pixels in first.items():
+        if is_of_first_sample(name) or (view, name) not in second:
+            merged[view, name] = pixels
+            continue
+        share = found[view].halves.share()[..., None]
+        if name == SAMPLE_COUNT:  # itself a share, of the most samples
+            share = np.float32(shares[0])
+        other = second[view, name]
+        merged[view, name] = pixels * share + other * (np.float32(1.0) - share)
+    return merged

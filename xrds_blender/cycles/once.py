@@ -23,14 +23,15 @@ def render_once(
     denoiser: Denoiser | None = None,
     noisy: bool = False,
     portion: Portion | None = None,
+    is_even: bool = True,
 ) -> StageClock:
     """Render into the engine's result, exactly as Cycles' own engine would.
 
     `samples`, `seed` and `denoiser` None leave the scene's own. `noisy` switches
     Cycles' denoiser off, adds the passes that guide another one, and takes samples by
     the pattern that suits it. `portion` is of a
-    longer sequence, in the place of samples and seed. Raises Cancelled when the user
-    stops it.
+    longer sequence, in the place of samples and seed; it `is_even` as in `set_samples`.
+    Raises Cancelled when the user stops it.
     """
     keeps_session = engine.path_resolve("render").use_persistent_data
     scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
@@ -38,7 +39,7 @@ def render_once(
         for name, letters, _ in GUIDE_PASSES:
             spare_passes.add(engine, layer.name, name, letters)
     with Borrowed() as borrowed:
-        set_samples(borrowed, scene, samples, seed, portion)
+        set_samples(borrowed, scene, samples, seed, portion, is_even)
         if noisy:
             set_blue_noise(borrowed, scene)
             set_denoising(borrowed, scene, layer, False)

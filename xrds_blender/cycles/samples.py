@@ -60,19 +60,27 @@ def sample_layer(
     samples: int | None = None,
     seed: int | None = None,
     portion: Portion | None = None,
+    is_even: bool = True,
     geometry: Sequence[tuple[str, str]] = (),
 ) -> tuple[dict[str, Samples], session.StageClock]:
     """Render without Cycles' denoiser; samples by view, and what it took.
 
     `geometry` names those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS.
-    `portion` is of a longer sequence, in the place of samples and seed. The result
-    holds Cycles' own passes. Raises Cancelled when the user stops it.
+    `portion` is of a longer sequence, in the place of samples and seed; `is_even` as in
+    `set_samples`. The result holds Cycles' own passes. Raises Cancelled when the user
+    stops it.
     """
     layer_name = depsgraph.view_layer_eval.name
     for name, letters in geometry:
         spare_passes.add(engine, layer_name, name, letters)
     clock = render_once(
-        engine, depsgraph, samples=samples, seed=seed, noisy=True, portion=portion
+        engine,
+        depsgraph,
+        samples=samples,
+        seed=seed,
+        noisy=True,
+        portion=portion,
+        is_even=is_even,
     )
     found = samples_in(engine, layer_name, {name for name, _ in geometry})
     live.show(next(iter(found.values())).picture)

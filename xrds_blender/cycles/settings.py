@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from xrds_core.temporal.samples import Portion
@@ -50,12 +51,25 @@ def set_samples(
     samples: int | None,
     seed: int | None,
     portion: Portion | None,
+    is_even: bool = True,
 ) -> None:
-    """Take samples as `set_sampling`, or in their place a part of a sequence."""
+    """Take samples as `set_sampling`, or in their place a part of a sequence.
+
+    If not `is_even` that is half of one, whose pixels stop where its noise is what the
+    file's threshold leaves when both halves are added up.
+    """
     if portion is None:
         set_sampling(borrowed, scene, samples, seed)
         return
+    threshold, least = _stops_at(scene.cycles, portion.whole)
     set_sampling(borrowed, scene, portion.whole, portion.seed)
+    if not is_even:
+        borrowed.set(
+            scene.cycles,
+            use_adaptive_sampling=True,
+            adaptive_threshold=threshold * math.sqrt(2.0),
+            adaptive_min_samples=max(1, least // 2),
+        )
     if portion.length != portion.whole:
         borrowed.set(
             scene.cycles,
@@ -63,6 +77,16 @@ def set_samples(
             sample_offset=portion.offset,
             sample_subset_length=portion.length,
         )
+
+
+def _stops_at(cycles: Any, samples: int) -> tuple[float, int]:
+    """The noise threshold and the least samples of a pixel, also if Cycles finds them.
+
+    As Cycles' `intern/cycles/scene/integrator.cpp` has it.
+    """
+    threshold = cycles.adaptive_threshold or max(0.001, 1.0 / samples)
+    least = cycles.adaptive_min_samples or math.ceil(16.0 / threshold**0.3)
+    return threshold, max(4, least)
 
 
 def has_subsets(scene: Any) -> bool:

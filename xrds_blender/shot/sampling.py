@@ -120,7 +120,7 @@ def sampling_of(
         place=place,
         radius=job.temporal_radius,
         still=not scene_facts(depsgraph).moving,
-        has_halves=is_even and _has_halves(scene, job, count),
+        has_halves=_has_halves(scene, job, count),
         needs_motion=blurred and shapes_move(depsgraph),
     )
 
@@ -133,9 +133,13 @@ def _is_even(scene: Any, job: RenderJob) -> bool:
 
 
 def _has_halves(scene: Any, job: RenderJob, count: int) -> bool:
-    """Whether a frame's even samples can be had in two halves that add up to all."""
-    is_part = job.samples is None and scene.cycles.use_sample_subset
-    return count > 1 and job.temporal_radius > 0 and has_subsets(scene) and not is_part
+    """Whether a frame's samples can be had in two halves that add up to all."""
+    if count < 2 or not job.temporal_radius or not has_subsets(scene):
+        return False
+    cycles = scene.cycles
+    return job.samples is not None or not (
+        cycles.use_sample_subset or cycles.time_limit
+    )
 
 
 def sample_frame(
@@ -206,6 +210,8 @@ def _frames_of_halves(
         if view in motion:
             still = motion[view]
             samples = replace(samples, depth=still.depth, vector=still.vector)
+        if samples.counts is not None:
+            samples = replace(samples, counts=samples.counts / np.float32(how.count))
         frame = light_of(how, how.cameras[view], samples)
         frames[view] = replace(frame, halves=half.halves)
     return frames, {stage: seconds[stage] + more[stage] for stage in seconds}

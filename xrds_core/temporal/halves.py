@@ -26,6 +26,7 @@ _NORMAL_SHARE = 0.1
 # Parts of one sequence fill each other's gaps, so they differ more than independent
 # halves would: their correlation is about -1/20 for each doubling of the samples.
 _CORRELATION = -1 / 20
+_TINY = np.float32(1e-9)
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,8 @@ class Halves:
 
     `radiance`, `albedo`, `normal` (2, H, W, 3) and `alpha` (2, H, W), or None, are as
     in `Frame`, which holds the means of both. The halves are two parts of one sample
-    sequence, or of two seeds.
+    sequence, or of two seeds. Each has its share of the samples, or by `counts`
+    (2, H, W) as many in each pixel.
     """
 
     radiance: Array
@@ -42,14 +44,24 @@ class Halves:
     normal: Array
     alpha: Array | None = None
     shares: tuple[float, float] = (0.5, 0.5)
+    counts: Array | None = None
+
+    def share(self) -> Array:
+        """Return how much of the samples the first half has: (H, W), or one number."""
+        if self.counts is None:
+            return np.asarray(self.shares[0], np.float32)
+        one, two = self.counts
+        return np.where(one > 0.0, one / np.maximum(one + two, _TINY), 0.0)
 
     def mean(self, name: str) -> Array | None:
         """Return the mean of both halves of a pass by its name."""
         halves = getattr(self, name)
         if halves is None:
             return None
-        one, two = (np.float32(share) for share in self.shares)
-        return np.asarray(halves[0] * one + halves[1] * two)
+        share = self.share()
+        if halves.ndim == 4:
+            share = share[..., None]
+        return np.asarray(halves[0] * share + halves[1] * (np.float32(1.0) - share))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +103,9 @@ def noise_of(halves: Halves, samples: float, dtype: DTypeLike) -> Noise:
         parts.append(halves.alpha[..., None])
     one, two = guides_of(np.concatenate(parts, axis=-1))
     # of the mean: half of what equal halves differ by
-    spread = np.float32((halves.shares[0] * halves.shares[1]) ** 0.5)
-    variance = np.square((one - two) * spread).sum(axis=-1)
+    share = halves.share()
+    spread = np.sqrt(share * (np.float32(1.0) - share))
+    variance = np.square((one - two) * spread[..., None]).sum(axis=-1)
     variance *= np.float32(_independent(samples))
     middle, apart = (roots[0] + roots[1]) / 2, (roots[0] - roots[1]) * spread
     found = (middle, apart, np.sqrt(variance))
