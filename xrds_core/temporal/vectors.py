@@ -102,7 +102,8 @@ class Trails:
         flow_x, flow_y = _flow(here, start.pixel, steps)
         found = nearest(x + flow_x, y + flow_y, there.shape)
         back_x, back_y = _flow(there, found.pixel, -steps)
-        left = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2
+        with np.errstate(invalid="ignore"):  # infinite motion agrees with none
+            left = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2
         was, near = here.nearness[start.pixel], there.nearness[found.pixel]
         agreed = (left < AGREEMENT_OF_MOVING**2) & (np.abs(near - was) < _NEARER * was)
         agreed &= self.moving(there, frames)[found.pixel] & found.seen & start.seen

@@ -48,7 +48,9 @@ class Case:
         from xrds_core import exr
 
         names = exr.File(path).names.names
-        kinds = ("", "Combined.", "V.Combined.")
+        kinds = ["", "Combined.", "V.Combined."]
+        if "--beauty=albedo" in self.words:  # then these are other passes, kept as is
+            kinds = ["albedo."]
         there = [[f"{kind}{x}" for x in "RGB"] for kind in kinds]
         return next((x for x in there if all(name in names for name in x)), [])
 
