@@ -328,6 +328,34 @@ def test_frames_by_number_are_rendered_by_themselves(
     assert len(list((blend.parent / "f12").iterdir())) == 2
 
 
+def test_scripts_see_frames_ahead_as_they_see_their_own(animation: Any) -> None:
+    """Light that a script sets just before a frame is rendered, by its number."""
+    background = animation.world.node_tree.nodes["Background"].inputs["Strength"]
+    seen = []
+
+    def dim(scene: Any) -> None:
+        seen.append(scene.frame_current)
+        background.default_value = 0.2 + 0.3 * scene.frame_current
+
+    def fail(scene: Any, _: Any) -> None:
+        raise ValueError(f"frame {scene.frame_current}")
+
+    bpy.app.handlers.render_pre.extend([dim, fail])
+    try:
+        bpy.ops.render.render(animation=True)
+        assert sorted(set(seen)) == FRAMES
+        job = RenderJob(scale=1, temporal_radius=2)
+        pictures = [p.radiance for _, p in shot.render_shot(animation, job, FRAMES)]
+    finally:
+        bpy.app.handlers.render_pre.remove(dim)
+        bpy.app.handlers.render_pre.remove(fail)
+    folder = Path(animation.render.filepath).parent
+    assert pictures[4].mean() > 1.5 * pictures[0].mean()
+    for number, expected in zip(FRAMES, pictures, strict=True):
+        found = combined(folder / f"{number}.exr")
+        np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-6)
+
+
 @pytest.mark.parametrize(
     ("words", "alone"),
     [

@@ -33,6 +33,7 @@ from ..scene.facts import requested_passes, shapes_move
 from .choosing import ShotJob, choose_for_shot
 from .method import FullSize, method_of
 from .sampling import Sampled, can_continue
+from .visiting import go_to
 
 _Passes = dict[tuple[str, str], Array]
 _First = tuple[int, _Passes]
@@ -243,8 +244,7 @@ def _sample_missing(
     with CyclesPasses(engine, depsgraph) as passes:
         try:
             for each in missing:
-                if each != depsgraph.scene_eval.frame_current:
-                    engine.frame_set(each, 0.0)
+                go_to(engine, depsgraph, each)
                 between = _is_between(scene, each)
                 window.sampled[each] = _sample(
                     engine, depsgraph, window, passes, between
@@ -253,8 +253,7 @@ def _sample_missing(
                 if each >= number and missing[-1] != number:
                     window.passes[each] = passes.all_passes()
         finally:
-            if number != depsgraph.scene_eval.frame_current:
-                engine.frame_set(number, 0.0)
+            go_to(engine, depsgraph, number)
             if number in window.passes:
                 passes.put_back(window.passes.pop(number))
 
