@@ -177,7 +177,10 @@ def _attribute(frame: _File, dice: random.Random) -> None:
 def _bent(frame: _File, dice: random.Random) -> None:
     """One number of a camera's matrix."""
     name = dice.choice(("worldToCamera", "worldToNDC", "xrds/project"))
-    matrix = np.array(frame.header.get(name, np.eye(4).tolist()), np.float64)
+    try:
+        matrix = np.array(frame.header.get(name, np.eye(4).tolist()), np.float64)
+    except (TypeError, ValueError):  # something else stands there by now
+        return
     if matrix.shape == (4, 4):
         place = dice.randrange(4), dice.randrange(4)
         matrix[place] = dice.choice((*_NUMBERS[:12], *_ODD, -matrix[place]))
