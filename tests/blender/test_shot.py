@@ -451,18 +451,31 @@ def test_an_animation_knows_its_cuts(animation: Any, blend: Path) -> None:
 # --- A camera that stands still ------------------------------------------------------
 
 
-@pytest.mark.parametrize("moves", [False, True])
+def moves_by_keys() -> None:
+    cube = bpy.data.objects["Red"]
+    for frame in (1, 5):
+        cube.location.x = -1.0 - 0.2 * frame
+        cube.keyframe_insert("location", frame=frame)
+
+
+def moves_by_a_script() -> None:
+    """Nothing in the file tells that it moves."""
+
+    def place(scene: Any, *_: Any) -> None:
+        bpy.data.objects["Red"].location.x = -1.0 - 0.2 * scene.frame_current
+
+    bpy.app.handlers.frame_change_pre.append(place)
+
+
+@pytest.mark.parametrize("move", [lambda: None, moves_by_keys, moves_by_a_script])
 def test_continued_frames_keep_passes_of_one_sample(
-    animation: Any, blend: Path, moves: bool
+    animation: Any, blend: Path, move: Callable[[], None]
 ) -> None:
     """Depth is the frame's own though most frames begin late in their sequence."""
     animation.camera.animation_data_clear()
+    animation.cycles.use_adaptive_sampling = False
     animation.view_layers[0].use_pass_z = True
-    if moves:
-        cube = bpy.data.objects["Red"]
-        for frame in (1, 5):
-            cube.location.x = -1.0 - 0.2 * frame
-            cube.keyframe_insert("location", frame=frame)
+    move()
     bpy.ops.render.render(animation=True)
     animation.render.engine = "CYCLES"
     for number in (1, 2, 5):

@@ -29,14 +29,13 @@ from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.layer import render_layer
 from ..frame.lending import can_lend
 from ..scene.cuts import cuts
-from ..scene.facts import requested_passes, shapes_move
+from ..scene.facts import requested_passes
 from .choosing import ShotJob, choose_for_shot
 from .method import FullSize, method_of
-from .sampling import Sampled, can_continue
+from .sampling import Sampled, can_continue, first_sample
 from .visiting import go_to
 
 _Passes = dict[tuple[str, str], Array]
-_First = tuple[int, _Passes]
 # Passes that the first sample of a sequence writes alone, and the layer's switches.
 _OF_ONE_SAMPLE = {
     "z": {"Depth"},
@@ -50,16 +49,14 @@ _OF_ONE_SAMPLE = {
 class _Window:
     """The frames of one view layer that are kept, by number.
 
-    `passes` are Cycles' own of frames that were sampled before their turn. `first` is,
-    by camera, the first frame that was sampled, and its passes of one sample; `count`
-    is how many were sampled since `began`. `asked` is the job that `chosen` came from.
+    `passes` are Cycles' own of frames that were sampled before their turn. `count` is
+    how many were sampled since `began`. `asked` is the job that `chosen` came from.
     """
 
     asked: RenderJob
     chosen: ShotJob
     sampled: dict[int, Sampled] = field(default_factory=dict)
     passes: dict[int, _Passes] = field(default_factory=dict)
-    first: dict[str, _First] = field(default_factory=dict)
     began: float = field(default_factory=time.perf_counter)
     count: int = 0
     method: FullSize = field(init=False)
@@ -277,22 +274,19 @@ def _sample(
     """Sample the frame that the dependency graph is at.
 
     Under a camera that stands still frames continue one sequence, as `place_of` says.
-    Where passes are asked for that its first sample writes alone, the first frame
-    begins it, and its passes are all others', too; where things move then, each frame
-    has a seed of its own.
+    Passes that its first sample alone writes are then rendered by themselves, for each
+    frame: that nothing moves in them is seldom sure.
     """
     scene = depsgraph.scene_eval
-    asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
-    if not can_continue(scene, window.job) or (asked and shapes_move(depsgraph)):
+    if not can_continue(scene, window.job):
         return window.method.sample(engine, depsgraph, between=between)
-    number, camera = scene.frame_current, scene.camera.name_full
-    first, kept = window.first.get(camera, (number, {}))
-    place = (number - first if asked else number) // scene.frame_step
+    place = scene.frame_current // scene.frame_step
     sampled = window.method.sample(engine, depsgraph, place)
-    names = set().union(*(_OF_ONE_SAMPLE[each] for each in asked))
-    if camera in window.first:
-        passes.put_back(kept)
-    else:
-        found = passes.all_passes() if names else {}
-        window.first[camera] = number, {k: x for k, x in found.items() if k[1] in names}
+    asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
+    if asked:
+        others = passes.all_passes()
+        first_sample(engine, depsgraph, window.job, place)
+        names = set().union(*(_OF_ONE_SAMPLE[each] for each in asked))
+        own = {k: x for k, x in passes.all_passes().items() if k[1] in names}
+        passes.put_back(others | own)
     return sampled

@@ -217,6 +217,17 @@ def _frames_of_halves(
     return frames, {stage: seconds[stage] + more[stage] for stage in seconds}
 
 
+def first_sample(engine: Any, depsgraph: Any, job: RenderJob, place: int) -> None:
+    """Render the first sample of the sequence that a frame continues.
+
+    The result then holds its passes. `place` is as in `sampling_of`.
+    """
+    how = sampling_of(engine, depsgraph, job, place)
+    portion = how.portion(how.count)
+    assert portion is not None
+    sample_layer(engine, depsgraph, portion=replace(portion, offset=0, length=1))
+
+
 def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
     """One view's samples as accumulation takes them."""
     assert samples.depth is not None
