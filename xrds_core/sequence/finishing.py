@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 
 
 # Samples lent for each of the frame's own, from which on the shot's picture counts in
-# full; what is least in 3x3 pixels decides, and changes softly.
-_ENOUGH = 1.0
+# full, and how many must be lent in all: few samples tell little of what is right. What
+# is least in 3x3 pixels decides, and changes softly.
+_ENOUGH, _IN_ALL = 1.0, 3.0
 _SMOOTH = 3  # pixels across
 
 
@@ -63,7 +64,7 @@ def finish_frame(
     started = time.perf_counter()
     gathered = accumulate(own, lenders, movement)
     alone = accumulate(own, [])
-    share = _share(gathered, alone)
+    share = _share(gathered, alone, own.samples)
     accumulated = time.perf_counter()
     region = region or (slice(None), slice(None))
     share = share[region]
@@ -81,11 +82,15 @@ def finish_frame(
     return Finished(denoised, gathered, seconds)
 
 
-def _share(gathered: Accumulated, alone: Accumulated) -> Array:
-    """Return (H, W) in [0, 1]: how much the shot's picture counts, by what is lent."""
+def _share(gathered: Accumulated, alone: Accumulated, samples: float) -> Array:
+    """Return (H, W) in [0, 1]: how much the shot's picture counts, by what is lent.
+
+    The frame has so many `samples` on the mean.
+    """
+    enough = max(_ENOUGH, _IN_ALL / samples)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the frame has none
         lent = gathered.samples / alone.samples - np.float32(1.0)
-    lent = np.where(alone.samples > 0.0, np.clip(lent / _ENOUGH, 0.0, 1.0), 1.0)
+    lent = np.where(alone.samples > 0.0, np.clip(lent / enough, 0.0, 1.0), 1.0)
     least = extreme(lent.astype(np.float32), np.fmin)
     return np.clip(box(least, _SMOOTH), 0.0, 1.0)
 
