@@ -122,11 +122,12 @@ def test_where_nothing_is_lent_the_picture_is_that_of_the_frame_alone(
 def test_what_is_lent_everywhere_or_nowhere_is_denoised_once(
     denoiser: Denoiser,
 ) -> None:
-    still = [replace(frame(1), number=n, still=True) for n in (1, 2)]
+    still = [replace(frame(1), number=n, still=True) for n in NUMBERS]
     nothing = replace(frame(2), radiance=np.full_like(frame(2).radiance, np.nan))
-    for own, other in (still, (frame(1), nothing)):
+    for own, *others in (still, (frame(1), nothing)):
         counting = Counting(denoiser)
-        finish_frame(store(own), [store(other)], counting, Movement())
+        lenders = [store(other) for other in others]
+        finish_frame(store(own), lenders, counting, Movement())
         assert len(counting.pictures) == 1
 
 
