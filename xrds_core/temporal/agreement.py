@@ -54,7 +54,8 @@ def agreement(difference: Array) -> Array:
     wide = np.pad(difference, REACH)
     square = np.square(_box(wide))
     spread = _box(np.square(wide)) - square / count
-    z2 = square / np.maximum(spread, _TINY)
+    with np.errstate(over="ignore"):  # light beyond all measure agrees with none
+        z2 = square / np.maximum(spread, _TINY)
     return np.float32(1.0) / (
         np.float32(1.0) + np.maximum(z2 - np.float32(_NOISE), 0.0) / np.float32(_FALL)
     )
