@@ -64,6 +64,7 @@ def test_a_noise_threshold_is_kept_and_its_samples_are_counted(
     cycles.samples = 128
     frame = sampled(scene)
     assert frame.counts is not None
+    assert 1.0 <= frame.samples <= 128.0
     assert frame.halves is not None
     assert frame.halves.counts == pytest.approx(
         np.stack([frame.halves.counts[0], frame.counts - frame.halves.counts[0]])

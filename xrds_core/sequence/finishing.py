@@ -63,7 +63,7 @@ def finish_frame(
     """
     started = time.perf_counter()
     gathered = accumulate(own, lenders, movement)
-    alone = accumulate(own, [])
+    alone = accumulate(own, []) if lenders else gathered
     share = _share(gathered, alone, own.samples)
     accumulated = time.perf_counter()
     region = region or (slice(None), slice(None))
