@@ -67,7 +67,7 @@ def error(picture: Array, truth: Array) -> float:
 
 def test_neighbours_that_agree_all_count() -> None:
     _, samples = gathered(shot(PLAIN, SPOTS, (PLAIN, SPOTS)))
-    assert samples.mean() > 4.2  # halves are taken for parts of one sequence
+    assert samples.mean() > 4.1  # halves are taken for parts of one sequence
 
 
 def test_a_pattern_that_differs_is_seen_though_its_mean_is_the_same() -> None:

@@ -302,7 +302,7 @@ class _Lender:
         weight = found.seen.astype(np.float32)
         if block.judge is None:
             weight *= self._agreement(block, picked, found.seen)
-        self._doubt_moving(weight, block, picked, found.seen)
+            self._doubt_moving(weight, block, picked, found.seen)
         weight *= spread(self._tiles, self._pair.here.shape, block.rows).ravel()
         weight *= _samples(other, found.pixel, len(weight))
         lent = weight.copy()

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from ..arrays import Array
 
 TILE = 2  # pixels across: light is compared tile by tile
-REACH = 10  # pixels to each side of one that have a say in it
-_AREAS = (1, 2, 4)  # tiles across, over which light is averaged before it is compared
+REACH = 11  # pixels to each side of one that have a say in it
+_AREAS = (1, 2, 4, 8)  # tiles across: light is averaged before it is compared
 _NEAR = 3  # tiles across, over which variances are averaged
 _TINY = np.float32(1e-9)
 

@@ -38,13 +38,13 @@ if TYPE_CHECKING:
 # noise the more there are, but no less than `_LEAST`.
 _GUIDES, _CHANGES, _LEAST = 512.0, 256.0, 4.0
 # Pixels across, over which errors of guides are averaged: by the most samples per
-# pixel that ask for so many. Halves of a sample or two tell little of one pixel.
-_GUIDE_AREAS = ((2.0, 15), (4.0, 9), (np.inf, 5))
+# pixel that ask for so many. Halves of few samples tell little of one pixel.
+_GUIDE_AREAS = ((4.0, 9), (np.inf, 5))
 # The same of light: pixels across whose mean is compared, and how often it counts.
 _MEAN, _LIGHT_AREA, _LIGHT = 3, 5, 4.0
 # What could be noise, counted so often, is doubted.
-_UNSURE = 4.0
-_SMOOTH = 5  # pixels across: weights
+_UNSURE = 6.0
+_SMOOTH = 3  # pixels across: weights
 _NOISE_AREA = 7
 # Squared, summed over the channels: an albedo below it is taken to hold as much light
 # for its albedo as the whole frame does.
@@ -95,13 +95,13 @@ class Judge:
         ]
         self._area = next(area for most, area in _GUIDE_AREAS if samples <= most)
         self._unsure = np.float32(_UNSURE) * box(noise, max(self._area, _NOISE_AREA))
-        self._variance = box(np.square(difference), _NOISE_AREA) + _TINY
+        texture = root_of_luminance(picture[..., 3:6])
+        self._variance = _variance(difference, texture)
         self._chance = np.square(box(difference, _MEAN))
         albedo = box(np.square(self._guides[..., :3]).sum(axis=-1), _SMOOTH)
         light = np.square(box(brightness, _SMOOTH)) / 4
         dark = np.float32(_DARKEST_ALBEDO)
         self._light_for_albedo = (light + dark * np.float32(usual)) / (albedo + dark)
-        texture = root_of_luminance(picture[..., 3:6])
         lit = box(texture, _SMOOTH) + np.float32(_DARKEST_ROOT)
         self._light = box(brightness, _SMOOTH) / lit
         self._untextured = brightness - self._light * texture
@@ -146,6 +146,17 @@ class Judge:
     @cached_property
     def _unrest(self) -> Array:
         return np.asarray(self._often[1] * self._changes.error())
+
+
+def _variance(difference: Array, texture: Array) -> Array:
+    """Return the variance (H, W) of the root of light, from one of a few pixels.
+
+    The root of a light's noise is as dark as the albedo's, so a dark joint between
+    bright stones has little noise, whatever there is around it.
+    """
+    share = np.square(texture) + np.float32(_DARKEST_ROOT)
+    near = box(np.square(difference), _NOISE_AREA) / box(share, _NOISE_AREA)
+    return np.asarray(near * share + _TINY)
 
 
 def _mean(x: Array, asked: Array, size: int) -> Array:
