@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from shots import camera
 
 from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import Frame, Stored, store
-from xrds_core.temporal.halves import Halves, noise_of
+from xrds_core.temporal.frame import Frame, Stored, noise_in, store
+from xrds_core.temporal.halves import Halves
 from xrds_core.temporal.neighbours import box
 
 Array = NDArray[np.float32]
@@ -126,12 +126,13 @@ def test_a_pixel_without_samples_takes_those_of_neighbours() -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, 3e38, -1e6])
 def test_noise_is_finite_whatever_the_halves_hold(bad: float) -> None:
-    halves = frame(1, PLAIN, SPOTS).halves
-    assert halves is not None
-    halves.radiance[0, 3, 4] = bad
-    halves.albedo[1, 5, 6] = bad
+    noisy = frame(1, PLAIN, SPOTS)
+    assert noisy.halves is not None
+    noisy.halves.radiance[0, 3, 4] = bad
+    noisy.albedo[5, 6] = bad
     with np.errstate(all="raise"):
-        noise = noise_of(halves, SAMPLES, np.float16)
+        noise = noise_in(noisy, np.float16)
+    assert noise is not None
     for array in (noise.brightness, noise.difference, noise.guides):
         assert np.isfinite(array).all()
 

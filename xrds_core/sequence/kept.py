@@ -14,8 +14,7 @@ import numpy as np
 
 from .. import exr
 from ..exr_library import Part
-from ..temporal.frame import LARGEST_HALF
-from ..temporal.halves import noise_of
+from ..temporal.frame import LARGEST_HALF, noise_in
 from .cameras import to_header
 from .names import CAMERA_NORMAL, NOISE, NOISY
 from .reading import KEY, NAME, RADIUS, SAMPLES, STILL
@@ -88,8 +87,8 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
 
 def _noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
-    assert frame.halves is not None
-    noise = noise_of(frame.halves, frame.samples, np.float16)
+    noise = noise_in(frame, np.float16)
+    assert noise is not None
     parts = (noise.brightness, noise.difference, noise.guides)
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 

@@ -19,8 +19,9 @@ from ..temporal.frame import (
     Stored,
     store,
 )
-from ..temporal.halves import Halves, Noise
+from ..temporal.halves import Halves
 from ..temporal.motion import centres, pixels_of
+from ..temporal.noise import Noise
 from . import attributes
 from .cameras import from_header, told_camera
 from .errors import NotLending, Unfit

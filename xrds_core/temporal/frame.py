@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import PictureError
-from .halves import Halves, Noise, noise_of
+from .halves import Halves
 from .neighbours import extreme
+from .noise import Noise, noise_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -169,7 +170,7 @@ class Stored:
     without a hit; the depth itself for an orthographic camera; NaN where it is not
     known. `spoilt` (H W) says which pixels held NaN or infinities and are 0 now; None
     if none did. `counts` (H W): samples of each pixel where they differ. `noise` is
-    what its halves say.
+    what `noise_in` says.
     """
 
     number: int
@@ -238,6 +239,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
     picture[spoilt] = 0.0
     if np.dtype(dtype) == np.float16:
         np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
+    noise = noise_in(frame, dtype)
     return Stored(
         number=frame.number,
         camera=frame.camera,
@@ -251,15 +253,19 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         matrices=frame.matrices,
         still=frame.still,
         counts=None if frame.counts is None else _counts(frame.counts),
-        noise=_noise(frame, spoilt, dtype),
+        noise=None if noise is None else noise.without(spoilt),
     )
 
 
-def _noise(frame: Frame, spoilt: NDArray[np.bool_], dtype: DTypeLike) -> Noise | None:
-    """What halves say; of guides alone nothing is asked."""
+def noise_in(frame: Frame, dtype: DTypeLike) -> Noise | None:
+    """Return the noise of a frame; None without halves, and of guides alone."""
     if frame.halves is None or frame.radiance is None:
         return None
-    return noise_of(frame.halves, frame.samples, dtype).without(spoilt)
+    parts = [frame.albedo, frame.normal]
+    if frame.alpha is not None:
+        parts.append(frame.alpha[..., None])
+    guides = np.concatenate(parts, axis=-1)
+    return noise_of(frame.halves, guides, frame.samples, dtype)
 
 
 def _counts(counts: Array) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Two halves of a frame's samples, and what they say of its noise.
+"""Two halves of a frame's samples.
 
 The mean of a frame lies off the truth by noise that the frame alone cannot tell from
 texture. Two halves of its samples can: what they share is the picture, what they differ
@@ -8,24 +8,13 @@ in is noise, pixel by pixel.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .agreement import brightness
-
 if TYPE_CHECKING:
-    from numpy.typing import DTypeLike, NDArray
-
     from ..arrays import Array
 
-# Albedo beyond this is a lamp; it must not outvote the pixels around it.
-_BRIGHTEST = 4.0
-# Normals turn where nothing else changes, so they count less than albedo.
-_NORMAL_SHARE = 0.1
-# Parts of one sequence fill each other's gaps, so they differ more than independent
-# halves would: their correlation is about -1/20 for each doubling of the samples.
-_CORRELATION = -1 / 20
 _TINY = np.float32(1e-9)
 
 
@@ -62,63 +51,3 @@ class Halves:
         if halves.ndim == 4:
             share = share[..., None]
         return np.asarray(halves[0] * share + halves[1] * (np.float32(1.0) - share))
-
-
-@dataclass(frozen=True, eq=False)
-class Noise:
-    """What the halves of a frame say of its noise, flat, (H W).
-
-    `brightness` is the mean of the roots of both halves' luminance, `difference` half
-    of what these roots differ by. `guides` is the standard deviation of the
-    frame's guides.
-    """
-
-    brightness: NDArray[Any]
-    difference: NDArray[Any]
-    guides: NDArray[Any]
-
-    def without(self, spoilt: NDArray[np.bool_]) -> Noise:
-        """Return the same with 0 at `spoilt` pixels (H W), which tell nothing."""
-        kept = ~spoilt
-        return Noise(self.brightness * kept, self.difference * kept, self.guides * kept)
-
-
-def guides_of(passes: Array) -> Array:
-    """Return albedo, normal and alpha, scaled to be compared.
-
-    `passes` (..., 6 or 7) are these; alpha may be missing.
-    """
-    scale = np.ones(passes.shape[-1], np.float32)
-    scale[3:6] = _NORMAL_SHARE**0.5
-    guides = passes * scale
-    np.clip(guides, -_BRIGHTEST, _BRIGHTEST, out=guides)
-    return guides
-
-
-def noise_of(halves: Halves, samples: float, dtype: DTypeLike) -> Noise:
-    """Return the noise of a frame of `samples` per pixel; finite everywhere."""
-    roots = brightness(halves.radiance)
-    parts = [halves.albedo, halves.normal]
-    if halves.alpha is not None:
-        parts.append(halves.alpha[..., None])
-    one, two = guides_of(np.concatenate(parts, axis=-1))
-    # of the mean: half of what equal halves differ by
-    share = halves.share()
-    spread = np.sqrt(share * (np.float32(1.0) - share))
-    variance = np.square((one - two) * spread[..., None]).sum(axis=-1)
-    variance *= np.float32(_independent(samples))
-    middle, apart = (roots[0] + roots[1]) / 2, (roots[0] - roots[1]) * spread
-    found = (middle, apart, np.sqrt(variance))
-    return Noise(*(_packed(x, dtype) for x in found))
-
-
-def _packed(x: Array, dtype: DTypeLike) -> NDArray[Any]:
-    largest = float(np.finfo(np.dtype(dtype).name).max)
-    finite = np.nan_to_num(x.ravel(), nan=0.0, posinf=largest, neginf=-largest)
-    return np.clip(finite, -largest, largest).astype(dtype)
-
-
-def _independent(samples: float) -> float:
-    """Return the variance of a mean over that of halves taken to be independent."""
-    r = max(_CORRELATION * np.log2(max(samples, 1.0)), -0.5)
-    return float((1 + r) / (1 - r))

@@ -22,8 +22,8 @@ import numpy as np
 
 from .agreement import brightness as root_of_luminance
 from .changes import REACH, Changes
-from .halves import guides_of
 from .neighbours import box
+from .noise import guides_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
