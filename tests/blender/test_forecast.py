@@ -27,8 +27,7 @@ def test_memory_stays_under_a_limit() -> None:
     assert 0 < held - (1 << 28) < free
 
 
-def test_rays_are_those_of_every_full_size_pixel() -> None:
-    assert forecast.rays(64, 4, 4) == (4.0, 4.0)
+def test_the_small_render_covers_the_whole_picture() -> None:
     assert forecast.low_size(1366, 768, 8) == (171, 96)
 
 

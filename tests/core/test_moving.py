@@ -1,4 +1,4 @@
-"""The places of things that move by themselves, by Vector passes and by matrices."""
+"""The places of things that move by themselves, by Vector passes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from shots import CARD, PIXEL, WALL, View, World, camera, project, vector, view
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Stored, store
 from xrds_core.temporal.motion import Places, grid, pair, places
-from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.vectors import Movement
 
 STEP = 3.3 * 5 * PIXEL  # of the card in a frame: 3.3 pixels
 FRAMES = range(5)
@@ -37,17 +37,6 @@ def by_vectors(shown: list[View]) -> list[Stored]:
     ]
 
 
-def by_matrices(shown: list[View]) -> list[Stored]:
-    stored = []
-    for each, world in zip(shown, worlds(), strict=True):
-        assert world.card is not None
-        matrix = np.eye(4)
-        matrix[:2, 3] = world.card
-        matrices = {WALL: np.eye(4), CARD: matrix}
-        stored.append(store(replace(each.frame, index=each.name, matrices=matrices)))
-    return stored
-
-
 def find(stored: list[Stored], here: int, there: int) -> Places:
     others = [x for k, x in enumerate(stored) if k != here]
     detours = Movement().detours(stored[here], others)
@@ -56,12 +45,11 @@ def find(stored: list[Stored], here: int, there: int) -> Places:
     return places(together, grid(stored[here].shape))
 
 
-@pytest.mark.parametrize("way", [by_vectors, by_matrices])
 @pytest.mark.parametrize("pan", [0.0, 0.21])
 @pytest.mark.parametrize("there", [0, 1, 3, 4])
-def test_a_moving_card_is_followed(way, pan: float, there: int) -> None:  # noqa: ANN001
+def test_a_moving_card_is_followed(pan: float, there: int) -> None:
     shown = views(pan)
-    result = find(way(shown), 2, there)
+    result = find(by_vectors(shown), 2, there)
     card = shown[2].name == CARD
     point = shown[2].point[card] + [STEP * (there - 2), 0, 0]
     expected = project(shown[there].frame.camera, point)
@@ -73,11 +61,10 @@ def test_a_moving_card_is_followed(way, pan: float, there: int) -> None:  # noqa
     assert seen.mean() > 0.9
 
 
-@pytest.mark.parametrize("way", [by_vectors, by_matrices])
 @pytest.mark.parametrize("pan", [0.0, 0.21])
-def test_the_wall_takes_no_samples_of_a_card_that_passes(way, pan: float) -> None:  # noqa: ANN001
+def test_the_wall_takes_no_samples_of_a_card_that_passes(pan: float) -> None:
     shown = views(pan)
-    stored = way(shown)
+    stored = by_vectors(shown)
     for there in (0, 1, 3, 4):
         result = find(stored, 2, there)
         wall = (shown[2].name == WALL).ravel()
@@ -105,7 +92,7 @@ def _around(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return sliding_window_view(np.pad(mask, 1), (3, 3)).any((2, 3))
 
 
-def test_without_either_a_card_leaves_ghosts() -> None:
+def test_without_them_a_card_leaves_ghosts() -> None:
     # so that the tests above are known to be able to fail
     shown = views(0.0)
     result = find([store(x.frame) for x in shown], 2, 3)
@@ -128,16 +115,6 @@ def test_in_a_shot_in_steps_motion_is_taken_to_be_even() -> None:
     got = np.stack(np.divmod(pixel, card.shape[1])[::-1], -1) + 0.5
     assert np.abs(got - expected)[seen].max() < 0.6
     assert seen.mean() > 0.9
-
-
-def test_an_object_that_appears_lends_nothing() -> None:
-    stored = by_matrices(views(0.0))
-    gone = replace(stored[3], matrices={WALL: np.eye(4)})
-    result = find([*stored[:3], gone, stored[4]], 2, 3)
-    assert gone.index is not None
-    card = stored[2].index == CARD
-    assert not result.seen[card].any()
-    assert (gone.index[result.pixel[~card & result.seen]] == WALL).all()
 
 
 def test_one_movement_serves_a_whole_shot() -> None:

@@ -26,7 +26,7 @@ from xrds_core.sequence.finishing import finish_frame
 from xrds_core.sequence.names import PassNames
 from xrds_core.sequence.reading import Reading, read_frame
 from xrds_core.temporal.frame import store
-from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.vectors import Movement
 
 NUMBERS = range(1, 6)
 

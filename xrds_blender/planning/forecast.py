@@ -1,4 +1,4 @@
-"""What a render will take, before it begins: sizes, rays and memory.
+"""What a render will take, before it begins: sizes and memory.
 
 Pure functions of numbers; neither Blender nor torch is needed here.
 """
@@ -35,11 +35,6 @@ AHEAD_CHANNELS = 15
 def low_size(width: int, height: int, scale: int) -> tuple[int, int]:
     """Width and height of the small render."""
     return -(-width // scale), -(-height // scale)
-
-
-def rays(samples: int, guide_samples: int, scale: int) -> tuple[float, float]:
-    """Camera rays per full-size pixel of the small render and of the guides."""
-    return samples / scale**2, float(guide_samples)
 
 
 def memory(

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.moving import Movement
 from xrds_core.temporal.stand_in import stand_in
 from xrds_core.temporal.takes import same_take
+from xrds_core.temporal.vectors import Movement
 
 from ..cycles.rendered import Beauty, Guides
 from ..frame.enlarging import enlarge

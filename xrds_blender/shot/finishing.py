@@ -10,7 +10,7 @@ import numpy as np
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.frame import Stored
-from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.vectors import Movement
 
 from ..frame.full_size import prefilter
 from ..frame.job import Picture, RenderJob, Temporal

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from xrds_core.arrays import Array
-from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.vectors import Movement
 
 from ..frame import progress
 from ..frame.denoisers import load_denoiser

@@ -15,7 +15,7 @@ from .. import exr
 from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
 from ..frames import RADIUS, frame_numbers, frame_path
-from ..temporal.moving import Movement
+from ..temporal.vectors import Movement
 from ..temporal.window import Shot, slide
 from ..time_left import Clock
 from .finishing import Finished, finish_frame

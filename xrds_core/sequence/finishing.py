@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from ..arrays import Array
     from ..denoising import Denoised, Denoiser
     from ..temporal.frame import Stored
-    from ..temporal.moving import Movement
+    from ..temporal.vectors import Movement
 
 
 # Samples lent for each of the frame's own, from which on the shot's picture counts in

@@ -1,8 +1,9 @@
 """Accumulation: the noisy samples of neighbouring frames on the pixels of one.
 
 `frame.Frame` holds what a renderer gives of one frame and `frame.store` packs it;
-`samples.portions` says which samples each frame takes; `window.slide` brings each frame
-of a shot with its neighbours; `accumulate.accumulate` gathers their samples from the
-places that `motion`, `vectors` and `rigid` find, as far as `survey` and `agreement` see
-the same light in them. NumPy alone: no renderer, no denoiser.
+`samples` says which samples a frame takes under a still camera; `window.slide` brings
+each frame of a shot with its neighbours; `accumulate.accumulate` gathers their samples
+from the places that `motion` and `vectors` find, as far as `judge` (`agreement`, where
+there are no halves) and `survey` see the same light in them. NumPy alone: no renderer,
+no denoiser.
 """

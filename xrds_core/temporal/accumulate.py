@@ -19,10 +19,10 @@ from ..errors import PictureError
 from .agreement import REACH, agreement, brightness, likeness
 from .judge import MARGIN, Judge, light_for_albedo
 from .motion import grid, pair, places, surroundings
-from .moving import Movement
 from .neighbours import extreme
 from .survey import spread, survey
 from .takes import same_take
+from .vectors import Movement
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

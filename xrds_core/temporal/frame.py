@@ -8,7 +8,7 @@ lies at (0.5, 0.5); y grows downwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +20,6 @@ from .neighbours import extreme
 from .noise import Noise, noise_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from numpy.typing import DTypeLike, NDArray
 
     from ..arrays import Array
@@ -34,7 +32,7 @@ LARGEST_HALF = 65504.0
 # Share of itself by which nearness differs between neighbours on one surface.
 _SURFACE = 0.02
 _PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
-_OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "index": (), "counts": ()}
+_OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "counts": ()}
 
 
 @dataclass(frozen=True)
@@ -117,12 +115,10 @@ class Frame:
 
     Optional: `alpha` (H, W); `vector` (H, W, 4), Cycles' Vector pass: where the
     surface was one frame before minus where it is, then where it is minus where it will
-    be one frame later, in pixels, y upwards; `index` (H, W), integers that name the
-    object at each pixel, and `matrices`, from such an integer to the object's (4, 4)
-    matrix to world. Without these, whatever is hit is taken to stand still. `counts`
-    (H, W): samples of each pixel, where they differ; `samples` is their mean. `halves`
-    of the samples tell what is noise: with them no neighbour is believed that shows
-    something else.
+    be one frame later, in pixels, y upwards; without it, whatever is hit is taken to
+    stand still. `counts` (H, W): samples of each pixel, where they differ; `samples` is
+    their mean. `halves` of the samples tell what is noise: with them no neighbour is
+    believed that shows something else.
     """
 
     number: int
@@ -134,8 +130,6 @@ class Frame:
     samples: float = 1.0
     alpha: Array | None = None
     vector: Array | None = None
-    index: NDArray[Any] | None = None
-    matrices: Mapping[int, Matrix] = field(default_factory=dict)
     still: bool = False
     counts: Array | None = None
     halves: Halves | None = None
@@ -181,8 +175,6 @@ class Stored:
     nearness: Array
     spoilt: NDArray[np.bool_] | None = None
     vector: NDArray[Any] | None = None
-    index: NDArray[Any] | None = None
-    matrices: Mapping[int, Matrix] = field(default_factory=dict)
     still: bool = False
     counts: NDArray[Any] | None = None
     noise: Noise | None = None
@@ -214,14 +206,6 @@ class Stored:
         """Whether two frames differ in their noise alone."""
         return self.still and other.still and self.camera.same(other.camera)
 
-    @property
-    def bytes(self) -> int:
-        """What this frame takes of the memory."""
-        arrays = [self.picture, self.nearness, self.vector, self.index, self.counts]
-        if self.noise is not None:
-            arrays += vars(self.noise).values()
-        return sum(0 if x is None else x.nbytes for x in arrays)
-
 
 def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
     """Pack a frame; pixels with NaN or infinities in any pass lend nothing.
@@ -249,8 +233,6 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         nearness=_nearness(frame),
         spoilt=spoilt if spoilt.any() else None,
         vector=_half(frame.vector),
-        index=None if frame.index is None else np.ravel(frame.index),
-        matrices=frame.matrices,
         still=frame.still,
         counts=None if frame.counts is None else _counts(frame.counts),
         noise=None if noise is None else noise.without(spoilt),

@@ -10,12 +10,6 @@ and gain nothing there.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from .frame import Camera
 
 _SEEDS = 2**31  # Cycles takes a signed 32-bit integer
 
@@ -47,22 +41,6 @@ class Portion:
         return first.length / self.length, second.length / self.length
 
 
-def portions(
-    cameras: Sequence[Camera], samples: int, radius: int, seed: int = 0
-) -> list[Portion]:
-    """Return the part of each frame of a shot, from the cameras in order of time.
-
-    `samples` per pixel and frame; frames up to `radius` apart meet. A frame belongs
-    to a still run if the camera before or after it is the same. `seed` is the shot's.
-    """
-    return [
-        continued(place, samples, radius, seed)
-        if radius and _stands_still(cameras, place)
-        else Portion((seed + 1 + place) % _SEEDS, samples, 0, samples)
-        for place in range(len(cameras))
-    ]
-
-
 def continued(place: int, samples: int, radius: int, seed: int = 0) -> Portion:
     """Return the part of one frame of a still run: no other within `radius` takes it.
 
@@ -71,8 +49,3 @@ def continued(place: int, samples: int, radius: int, seed: int = 0) -> Portion:
     frames = 2 * radius + 1
     offset = samples * (place % frames)
     return Portion(seed % _SEEDS, samples * frames, offset, samples)
-
-
-def _stands_still(cameras: Sequence[Camera], place: int) -> bool:
-    beside = [x for x in (place - 1, place + 1) if 0 <= x < len(cameras)]
-    return any(cameras[place].same(cameras[x]) for x in beside)

@@ -39,18 +39,19 @@ if TYPE_CHECKING:
 _NEARER = 0.1
 
 
-class Trails:
-    """Follows the Vector passes of a shot's frames; keeps each frame's moving pixels.
+class Movement:
+    """Finds what moved by itself between the frames of a shot, by their Vector passes.
 
     One object serves a whole shot: what is known of a frame is kept while the frame is.
+    Without Vector passes nothing is taken to move but the camera.
     """
 
     def __init__(self) -> None:
         self._moving: WeakKeyDictionary[Stored, dict[int, Mask]]
         self._moving = WeakKeyDictionary()
 
-    def detours(self, here: Stored, others: Sequence[Stored]) -> dict[int, Detour]:
-        """Return, by position in `others`, the places of what moved by itself.
+    def detours(self, here: Stored, others: Sequence[Stored]) -> list[Detour | None]:
+        """Return for each of `others` the places of what moved by itself.
 
         Frames of one number as `here` show the same moment and need none. The way leads
         from each frame to the nearest that is there.
@@ -60,10 +61,10 @@ class Trails:
         if here.vector is not None:
             for step in (-1, 1):
                 trails |= self._trail(here, frames, step)
-        places = {x: i for i, x in enumerate(others) if x.number != here.number}
-        return {
-            i: self._detour(here, other, frames, trails) for other, i in places.items()
-        }
+        return [
+            None if x.number == here.number else self._detour(here, x, frames, trails)
+            for x in others
+        ]
 
     def _detour(
         self,

@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 Kept = TypeVar("Kept")
 
 # Of albedo and normal, in half floats, and nearness; then of radiance and its noise, a
-# Vector pass and an alpha, in half floats, and an index.
+# Vector pass and an alpha, in half floats.
 _BYTES = 2 * 3 * 2 + 4
-_LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES, _INDEX_BYTES = 12, 8, 2, 4
+_LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES = 12, 8, 2
 
 
 @dataclass(frozen=True)
@@ -70,11 +70,6 @@ class Shot:
         """Return between which cuts a frame lies."""
         return sum(cut <= frame for cut in self.cuts)
 
-    @property
-    def most_kept(self) -> int:
-        """The most frames that `slide` ever keeps at once."""
-        return min(2 * self.radius + 1, len(self.order))
-
 
 def place_of(frame: int, frames: Sequence[int]) -> int:
     """Return a frame's place in its shot, of which `frames` may be any part.
@@ -94,7 +89,7 @@ def slide(
 
     `load` gives one frame and is called once for each, in order, and not before it is
     needed; None where a frame is missing or damaged: it lends nothing and is left out.
-    At most `shot.most_kept` frames are kept; what is yielded is dropped when the next
+    At most a frame and its lenders are kept; what is yielded is dropped when the next
     one is asked for.
     """
     kept: dict[int, Kept | None] = {}
@@ -118,7 +113,6 @@ def bytes_needed(
     frames: int,
     alpha: bool = False,
     vector: bool = False,
-    index: bool = False,
     light: bool = True,
 ) -> int:
     """Return the bytes that `frames` frames of half floats take in a window.
@@ -126,5 +120,5 @@ def bytes_needed(
     Guides alone have no `light`.
     """
     each = _BYTES + _LIGHT_BYTES * light
-    each += _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha + _INDEX_BYTES * index
+    each += _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha
     return width * height * each * frames

@@ -25,7 +25,7 @@ from xrds_core.arrays import Array
 from xrds_core.atomic import write_json
 from xrds_core.metrics import to_srgb
 from xrds_core.temporal.frame import Frame, Stored, store
-from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.vectors import Movement
 from xrds_core.temporal.window import Shot as Window
 
 from ..checksum import checksum

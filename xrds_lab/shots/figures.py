@@ -20,7 +20,7 @@ from xrds_blender.shot import finishing
 from xrds_core.atomic import write_json
 from xrds_core.metrics import all_metrics, to_srgb
 from xrds_core.temporal.frame import Stored, store
-from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.vectors import Movement
 from xrds_core.temporal.window import Shot
 
 from ..checksum import checksum

@@ -99,7 +99,7 @@ def _finished(
     """Seconds of the middle frame's accumulation and denoising."""
     from xrds_blender.frame.denoisers import load_denoiser
     from xrds_blender.shot.finishing import finish
-    from xrds_core.temporal.moving import Movement
+    from xrds_core.temporal.vectors import Movement
     from xrds_core.temporal.window import Shot as Window
 
     numbers = Window(tuple(sampled), job.temporal_radius).lenders(MIDDLE)

@@ -122,7 +122,7 @@ def finished(frames: dict[int, Stored], number: int, radius: int) -> Array:
     from xrds_blender.frame.denoisers import load_denoiser
     from xrds_blender.frame.job import RenderJob
     from xrds_blender.shot.finishing import finish
-    from xrds_core.temporal.moving import Movement
+    from xrds_core.temporal.vectors import Movement
     from xrds_core.temporal.window import Shot
 
     job = RenderJob(scale=1, samples=SAMPLES, temporal_radius=radius, device="cpu")

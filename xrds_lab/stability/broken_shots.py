@@ -11,7 +11,7 @@ from xrds_core.errors import PictureError
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Stored
 from xrds_core.temporal.judge import MARGIN
-from xrds_core.temporal.moving import Movement
+from xrds_core.temporal.vectors import Movement
 from xrds_core.temporal.window import Shot, slide
 
 from .accumulation import RADIUS, SAMPLES, film, finished
