@@ -1,12 +1,11 @@
-"""Whether neighbours show what the frame itself shows: asked of the frame's own halves.
+"""Whether neighbours show what the frame itself shows, asked of its own samples.
 
 The neighbours' mean L and the frame's own mean m differ by what is wrong with L and by
-the noise of m. Halves of the frame's samples say how much of (m - L) squared is noise,
-so the rest, over a few pixels, is the squared error of L, patterns included. No list of
-things that may move or change is needed. The less of the noise V of the frame's light
-that error E is, the more the neighbours count: by V / (V + E), which has the least
-squared error. E counts many times, since a denoiser takes away most of V and nothing
-of E.
+the noise of m. How much of (m - L) squared is noise, `noise` says; the rest, over a few
+pixels, is the squared error of L, patterns included. No list of things that may move or
+change is needed. The less of the noise V of the frame's light that error E is, the more
+the neighbours count: by V / (V + E), which has the least squared error. E counts many
+times, since a denoiser takes away most of V and nothing of E.
 
 Guides have little noise and tell at once. Light that changes where guides do not, as a
 shadow that moves, is hidden by the frame's own noise; there the neighbours are asked
@@ -50,6 +49,7 @@ _NOISE_AREA = 7
 # for its albedo as the whole frame does.
 _DARKEST_ALBEDO = 0.02
 _DARKEST_ROOT = 0.1  # the root of an albedo's luminance, in the same way
+_EVEN_NOISE = 0.1  # albedo's luminance, added to it: noise is more even than albedo
 MARGIN = max(max(a for _, a in _GUIDE_AREAS) // 2, REACH) + _SMOOTH // 2
 """How many pixels to each side of a pixel have a say in it."""
 _TINY = np.float32(1e-9)
@@ -154,7 +154,7 @@ def _variance(difference: Array, texture: Array) -> Array:
     The root of a light's noise is as dark as the albedo's, so a dark joint between
     bright stones has little noise, whatever there is around it.
     """
-    share = np.square(texture) + np.float32(_DARKEST_ROOT)
+    share = np.square(texture) + np.float32(_EVEN_NOISE)
     near = box(np.square(difference), _NOISE_AREA) / box(share, _NOISE_AREA)
     return np.asarray(near * share + _TINY)
 

@@ -147,16 +147,14 @@ def pixels_of(camera: Camera) -> Matrix:
     return np.vstack([screen @ camera.project @ camera.view, near])
 
 
-def passage(here: Camera, there: Camera, moved: Matrix | None = None) -> Passage:
+def passage(here: Camera, there: Camera) -> Passage:
     """Return (4, 4): (x, y, 1, nearness) here -> (x w, y w, w, nearness w) there.
 
-    `moved` (4, 4) is what the object did to world points in between. Panoramas have a
-    passage of their own.
+    Panoramas have a passage of their own.
     """
-    between = np.eye(4) if moved is None else moved
     if here.sphere is not None and there.sphere is not None:
-        return around(here, there, between)
-    return (pixels_of(there) @ between @ world_of(here)).astype(np.float32)
+        return around(here, there)
+    return (pixels_of(there) @ world_of(here)).astype(np.float32)
 
 
 def pair(

@@ -38,9 +38,9 @@ class Around:
             return across, down, nearness / length
 
 
-def around(here: Camera, there: Camera, moved: Matrix) -> Around:
-    """Return the passage between two panoramas; `moved` is as in `motion.passage`."""
-    return Around(here, there, there.view @ moved @ np.linalg.inv(here.view))
+def around(here: Camera, there: Camera) -> Around:
+    """Return the passage between two panoramas."""
+    return Around(here, there, there.view @ np.linalg.inv(here.view))
 
 
 def _directions(camera: Camera, x: Array, y: Array) -> Array:
