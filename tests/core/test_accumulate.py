@@ -209,10 +209,10 @@ def test_what_is_empty_stays_empty() -> None:
         store(replace(view(k, camera()).frame, alpha=a)) for k, a in enumerate(alphas)
     )
     result = accumulate(here, [there])
-    assert (result.alpha[:, :29] == 0.0).all()
-    # the pixel next to what is not empty may hold some of it
-    assert (result.alpha[:, 29] == 0.25).all()
-    assert (result.samples[:, 29:] == 2.0).all()
+    assert (result.alpha[:, :30] == 0.0).all()
+    # nor does the pixel beside what is empty take any
+    assert (result.samples[:, :31] == 1.0).all()
+    assert (result.samples[:, 31:] == 2.0).all()
 
 
 def test_half_floats_lose_little_and_never_overflow() -> None:

@@ -190,12 +190,7 @@ def _is_animated(owner: Any) -> bool:
 
 
 def stands_still(camera: Any) -> bool:
-    """Whether no frame can show another view: nothing moves the camera or its lens."""
-    import bpy
-
-    handlers = bpy.app.handlers
-    if handlers.frame_change_pre or handlers.frame_change_post:
-        return False
+    """Whether nothing in the file moves the camera or its lens; a handler still may."""
     owners = [camera.data]
     while camera is not None:
         owners.append(camera)

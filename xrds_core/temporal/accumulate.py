@@ -139,7 +139,8 @@ class _Block:
     """Some rows of the target, with a margin that the tests look at.
 
     `usual` is as in `Judge`; None where there is nothing to judge by. `void` (n,) says
-    where a frame with alpha has none; there is no noise to take away then.
+    where a frame with alpha has none, in a pixel or beside it: there is no noise to
+    take away, and a rim that several frames draw is wider than that of one.
     """
 
     def __init__(self, target: Stored, rows: slice, usual: float | None) -> None:
@@ -163,8 +164,8 @@ class _Block:
     def _void(self) -> Mask | None:
         if not self.own.shape[1] % 3:
             return None
-        most = extreme(self.shaped(self.own[:, -1]), np.fmax)
-        return np.asarray(most.ravel() == 0.0)
+        least = extreme(self.shaped(self.own[:, -1]), np.fmin)
+        return np.asarray(least.ravel() == 0.0)
 
     def shaped(self, x: NDArray[Any]) -> NDArray[Any]:
         """The rows (n, ...) as (H, W, ...)."""
