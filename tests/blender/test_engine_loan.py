@@ -11,7 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender.frame import engine_loan
-from xrds_blender.shot import animation
+from xrds_blender.shot import render
 from xrds_core.errors import SceneError
 
 
@@ -19,13 +19,13 @@ from xrds_core.errors import SceneError
 def renders(life: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The engine that the scene has during each render by XRDS."""
     seen: list[str] = []
-    real = animation.render_frame
+    real = render.render_frame
 
     def render_frame(*arguments: Any) -> Any:
         seen.append(life.render.engine)
         return real(*arguments)
 
-    monkeypatch.setattr(animation, "render_frame", render_frame)
+    monkeypatch.setattr(render, "render_frame", render_frame)
     life.xrds.way = "full_size"
     return seen
 

@@ -1,8 +1,7 @@
-"""The one path from a scene to a picture; every button and command ends here."""
+"""Work inside of Blender's render: what Blender asks for, or what a caller asks for."""
 
 from __future__ import annotations
 
-import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -13,8 +12,6 @@ from xrds_core.errors import Cancelled, SceneError, XRDSError
 from ..cycles import live, spare_passes
 from ..cycles.borrowed import Borrowed
 from ..cycles.passes import CyclesPasses
-from .job import Picture, RenderJob
-from .layer import render_layer
 
 T = TypeVar("T")
 
@@ -29,18 +26,6 @@ class _Task:
 
 
 _task: _Task | None = None
-
-
-def render(
-    scene: Any, scale: int = 2, *, layer: str | None = None, **choices: Any
-) -> Picture:
-    """As `xrds_blender.render`; the engine must be registered."""
-    job, start = RenderJob(scale=scale, **choices), time.perf_counter()
-
-    def work(engine: Any, depsgraph: Any) -> Picture:
-        return render_layer(engine, depsgraph, job, start)
-
-    return call_engine(scene, work, layer)
 
 
 def run_job(

@@ -61,7 +61,7 @@ class XRDSRender(bpy.types.RenderEngine):
     def _render_asked(self, depsgraph: Any) -> None:
         """Render what the scene's settings describe, and tell what was done."""
         from ..frame import record
-        from ..shot.animation import render_frame
+        from ..shot.render import render_frame
         from .properties import job_of
 
         scene, job = depsgraph.scene_eval, job_of(depsgraph.scene_eval.xrds)

@@ -63,10 +63,10 @@ def unregister() -> None:
 
 @bpy.app.handlers.persistent
 def _forget_frames(*_: Any) -> None:
-    """What frames lend each other lasts for one render job."""
-    animation = sys.modules.get(f"{_ADD_ON}.shot.animation")
-    if animation is not None:
-        animation.forget()
+    """Samples of an animation last for one render job."""
+    render = sys.modules.get(f"{_ADD_ON}.shot.render")
+    if render is not None:
+        render.forget()
 
 
 def _render_jobs() -> tuple[Any, ...]:
