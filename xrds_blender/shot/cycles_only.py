@@ -24,7 +24,8 @@ class CyclesOnly(Method):
         place: int | None = None,
         between: bool = False,
     ) -> Sampled:
-        name, number = depsgraph.view_layer_eval.name, depsgraph.scene_eval.frame_current
+        name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
+        number = depsgraph.scene_eval.frame_current
         clock = render_once(
             engine,
             depsgraph,
