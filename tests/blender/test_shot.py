@@ -19,6 +19,7 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
+from xrds_blender.internals.lifetimes import RENDER_JOB
 from xrds_blender.shot import full_size, shot
 from xrds_blender.shot import render as engine_shots
 from xrds_blender.shot.choosing import ChosenJob
@@ -299,7 +300,7 @@ def test_frames_in_steps_lend_in_steps(animation: Any, blend: Path) -> None:
     finally:
         full_size.finish_frame = finish
     assert seen == [[1, 3, 5]] * 3
-    assert not engine_shots._animations
+    assert not RENDER_JOB.of(engine_shots.Animations).by_layer
 
 
 def test_a_still_has_no_neighbours(animation: Any, blend: Path) -> None:

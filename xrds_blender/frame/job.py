@@ -14,8 +14,6 @@ from ..planning.plan import SAVINGS, Decision, Facts, Plan, decide, full_size, p
 if TYPE_CHECKING:
     from xrds_core.arrays import Array
 
-ENGINE = "XRDS"
-"""Blender's name for the render engine."""
 SCALES = (1, 2, 4, 8)
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")

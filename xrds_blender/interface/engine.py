@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 
 from ..cycles import session
-from ..frame.job import ENGINE
-from . import support, write_lock
+from ..internals.engine_override import ENGINE
+from . import support, thread_guard
 
 
 class XRDSRender(bpy.types.RenderEngine):
@@ -53,7 +53,7 @@ class XRDSRender(bpy.types.RenderEngine):
         if self.is_preview:
             session.functions().render(self, depsgraph)
         else:
-            with write_lock.shared():
+            with thread_guard.shared():
                 from ..frame.rendering import render_in
 
                 render_in(self, depsgraph, lambda: self._render_asked(depsgraph))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import takewhile
 from typing import Any
 
@@ -22,6 +22,7 @@ from ..cycles import session
 from ..frame import history, progress, torch_folder
 from ..frame.job import NetworkFailed, Picture, RenderJob
 from ..frame.rendering import call_engine
+from ..internals.lifetimes import RENDER_JOB
 from .choosing import ChosenJob, choose_for_shot, chosen
 from .cycles_only import CyclesOnly
 from .engine_frames import EngineFrames
@@ -40,13 +41,11 @@ class _Animation:
     frames: EngineFrames
 
 
-_animations: dict[tuple[str, str], _Animation] = {}
-"""By scene and view layer, for one render job: no edit of the file comes between."""
+@dataclass
+class Animations:
+    """Those of one render job, by scene and view layer: no edit comes between."""
 
-
-def forget(*_: Any) -> None:
-    """For Blender's handlers: a render job begins or ends."""
-    _animations.clear()
+    by_layer: dict[tuple[str, str], _Animation] = field(default_factory=dict)
 
 
 def method_of(chosen: ChosenJob, keep: Keep | None = None) -> Method:
@@ -119,11 +118,12 @@ def _render_in_animation(engine: Any, depsgraph: Any, job: RenderJob) -> Picture
     key = depsgraph.scene_eval.name, depsgraph.view_layer_eval.name
     number = depsgraph.scene_eval.frame_current
     try:
-        animation = _animations.get(key)
+        animations = RENDER_JOB.of(Animations).by_layer
+        animation = animations.get(key)
         if animation is None or animation.asked != job:
             choice = choose_for_shot(engine, depsgraph, job)
             frames = EngineFrames.of(depsgraph.scene_eval, method_of(choice))
-            animation = _animations[key] = _Animation(job, choice, frames)
+            animation = animations[key] = _Animation(job, choice, frames)
         frames = animation.frames
         try:
             found = frames.neighbourhood(engine, depsgraph)
