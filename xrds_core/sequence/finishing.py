@@ -21,9 +21,12 @@ if TYPE_CHECKING:
 
 
 # Samples lent for each of the frame's own, from which on the shot's picture counts in
-# full, and how many must be lent in all: few samples tell little of what is right. The
-# mean of 3x3 pixels decides: that single pixels have few is what denoisers are good at.
+# full, and how many must be lent in all: few samples tell little of what is right.
 _ENOUGH, _IN_ALL = 1.0, 3.0
+# What is missing in the 3x3 pixels around one counts against it as often as half of the
+# frame's samples, but between these: the less noise there is, the more a few noisy
+# pixels are seen.
+_LEAST_OFTEN, _MOST_OFTEN = 1.0, 2.0
 _SMOOTH = 3  # pixels across
 
 
@@ -91,7 +94,10 @@ def _share(gathered: Accumulated, alone: Accumulated, samples: float) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):  # where the frame has none
         lent = gathered.samples / alone.samples - np.float32(1.0)
     lent = np.where(alone.samples > 0.0, np.clip(lent / enough, 0.0, 1.0), 1.0)
-    return np.clip(box(lent.astype(np.float32), _SMOOTH), 0.0, 1.0)
+    lent = lent.astype(np.float32)
+    often = np.float32(np.clip(samples / 2.0, _LEAST_OFTEN, _MOST_OFTEN))
+    around = 1.0 - often * (1.0 - box(lent, _SMOOTH))
+    return np.clip(box(np.clip(np.minimum(lent, around), 0.0, 1.0), _SMOOTH), 0.0, 1.0)
 
 
 def _is_even(share: Array) -> bool:
