@@ -14,7 +14,8 @@ import numpy as np
 
 from .. import exr
 from ..exr_library import Part
-from ..temporal.frame import LARGEST_HALF, noise_in
+from ..temporal.frame import LARGEST_HALF
+from ..temporal.noise import noise_of
 from .cameras import to_header
 from .names import CAMERA_NORMAL, NOISE, NOISY
 from .reading import KEY, NAME, RADIUS, SAMPLES, STILL
@@ -87,7 +88,7 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
 
 def _noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
-    noise = noise_in(frame, np.float16)
+    noise = noise_of(frame, np.float16)
     assert noise is not None
     parts = (noise.brightness, noise.difference, noise.guides)
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
