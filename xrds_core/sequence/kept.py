@@ -89,7 +89,6 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
 def _noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
     noise = noise_of(frame, np.float16)
-    assert noise is not None
     parts = (noise.brightness, noise.difference, noise.guides)
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 
