@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from shots import camera
 
 from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import Frame, Stored, store
+from xrds_core.temporal.frame import Frame, Stored, noise_in, store
 from xrds_core.temporal.halves import Halves
 from xrds_core.temporal.neighbours import box
-from xrds_core.temporal.noise import noise_of
 
 Array = NDArray[np.float32]
 SHAPE = (48, 64)
@@ -173,7 +172,7 @@ def test_noise_is_finite_whatever_the_halves_hold(bad: float) -> None:
     noisy.halves.radiance[0, 3, 4] = bad
     noisy.albedo[5, 6] = bad
     with np.errstate(all="raise"):
-        noise = noise_of(noisy, np.float16)
+        noise = noise_in(noisy, np.float16)
     for array in (noise.brightness, noise.difference, noise.guides):
         assert np.isfinite(array).all()
 

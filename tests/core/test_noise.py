@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from shots import camera
 
-from xrds_core.temporal.frame import Frame
 from xrds_core.temporal.noise import noise_of, noise_of_guides
 
 SHAPE = 64, 96
@@ -47,12 +45,12 @@ def test_edges_and_lines_are_no_noise(slope: tuple[int, int]) -> None:
 
 def noise_of_light(radiance: NDArray[np.float32], albedo: NDArray[np.float32]) -> float:
     """The same of the light of a frame of 16 samples without halves."""
-    rgb = np.repeat(albedo[..., None], 3, axis=-1)
+    guides = np.zeros((*SHAPE, 6), np.float32)
+    guides[..., :3] = albedo[..., None]
     light = np.repeat(radiance[..., None], 3, axis=-1)
-    depth = np.ones(SHAPE, np.float32)
-    frame = Frame(1, camera(), light, rgb, np.zeros_like(rgb), depth, samples=16.0)
-    found = noise_of(frame, np.float32).difference.reshape(SHAPE)[4:-4, 4:-4]
-    return float(np.sqrt(np.square(found).mean()))
+    found = noise_of(light, guides, 16.0, np.float32).difference
+    inner = found.reshape(SHAPE)[4:-4, 4:-4]
+    return float(np.sqrt(np.square(inner).mean()))
 
 
 TEXTURE = RNG.choice(np.float32([0.2, 0.8]), SHAPE)

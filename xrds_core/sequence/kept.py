@@ -14,8 +14,7 @@ import numpy as np
 
 from .. import exr
 from ..exr_library import Part
-from ..temporal.frame import LARGEST_HALF
-from ..temporal.noise import noise_of
+from ..temporal.frame import LARGEST_HALF, noise_in
 from .cameras import to_header
 from .names import CAMERA_NORMAL, NOISE, NOISY
 from .reading import KEY, NAME, RADIUS, SAMPLES, STILL
@@ -71,13 +70,13 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
         (NOISY, "RGB", frame.radiance),
         ("Denoising Albedo", "RGB", frame.albedo),
         (CAMERA_NORMAL, "XYZ", frame.normal),
+        # always: half floats of the rest would tell another noise when read
+        (NOISE, "XYZ", _noise(frame)),
     ]
     if frame.alpha is not None:
         passes.append((NOISY, "A", frame.alpha[..., None]))
     if frame.vector is not None:
         passes.append(("Vector", "XYZW", frame.vector))
-    if frame.halves is not None:
-        passes.append((NOISE, "XYZ", _noise(frame)))
     channels: dict[str, NDArray[Any]] = {
         f"{layer}{name}.{letter}": _half(array[..., i])
         for name, letters, array in passes
@@ -88,7 +87,7 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
 
 def _noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
-    noise = noise_of(frame, np.float16)
+    noise = noise_in(frame, np.float16)
     parts = (noise.brightness, noise.difference, noise.guides)
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 

@@ -284,7 +284,7 @@ def _vector(file: File, found: Found, reading: Reading) -> Array | None:
 
 
 def _noise(file: File, found: Found) -> Noise:
-    """What halves said of a frame that XRDS kept."""
+    """What was known of the noise of a frame that XRDS kept."""
     planes = (np.nan_to_num(file.plane(name).ravel()) for name in found.noise)
     cut = (np.clip(plane, -LARGEST_HALF, LARGEST_HALF) for plane in planes)
     return Noise(*(plane.astype(np.float16) for plane in cut))

@@ -164,7 +164,7 @@ class Stored:
     without a hit; the depth itself for an orthographic camera; NaN where it is not
     known. `spoilt` (H W) says which pixels held NaN or infinities and are 0 now; None
     if none did. `counts` (H W): samples of each pixel where they differ. `noise` is
-    what `noise_of` says, None of guides alone.
+    what `noise_in` says, None of guides alone.
     """
 
     number: int
@@ -223,7 +223,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
     picture[spoilt] = 0.0
     if np.dtype(dtype) == np.float16:
         np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
-    noise = None if frame.radiance is None else noise_of(frame, dtype)
+    noise = None if frame.radiance is None else noise_in(frame, dtype)
     return Stored(
         number=frame.number,
         camera=frame.camera,
@@ -237,6 +237,16 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         counts=None if frame.counts is None else _counts(frame.counts),
         noise=None if noise is None else noise.without(spoilt),
     )
+
+
+def noise_in(frame: Frame, dtype: DTypeLike) -> Noise:
+    """Return the noise of a frame with radiance."""
+    assert frame.radiance is not None
+    parts = [frame.albedo, frame.normal]
+    if frame.alpha is not None:
+        parts.append(frame.alpha[..., None])
+    guides = np.concatenate(parts, axis=-1)
+    return noise_of(frame.halves or frame.radiance, guides, frame.samples, dtype)
 
 
 def _counts(counts: Array) -> NDArray[Any]:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import DTypeLike, NDArray
 
     from ..arrays import Array
-    from .frame import Frame
     from .halves import Halves
 
 # Albedo beyond this is a lamp; it must not outvote the pixels around it.
@@ -84,20 +83,21 @@ def guides_of(passes: Array) -> Array:
     return guides
 
 
-def noise_of(frame: Frame, dtype: DTypeLike) -> Noise:
-    """Return the noise of a frame with radiance; finite everywhere."""
-    assert frame.radiance is not None
-    parts = [frame.albedo, frame.normal]
-    if frame.alpha is not None:
-        parts.append(frame.alpha[..., None])
+def noise_of(
+    light: Halves | Array, guides: Array, samples: float, dtype: DTypeLike
+) -> Noise:
+    """Return the noise of a frame of `samples` per pixel; finite everywhere.
+
+    `light` is two halves or, where there are none, radiance (H, W, 3). `guides`
+    (H, W, 6 or 7) are albedo, normal and alpha, which may be missing.
+    """
     with np.errstate(all="ignore"):  # of infinities
-        passes = guides_of(np.concatenate(parts, axis=-1))
-        guides = noise_of_guides(passes, frame.samples)
-        if frame.halves is None:
-            light = _apart_from_around(frame.radiance, frame.albedo, frame.samples)
+        if isinstance(light, np.ndarray):
+            parts = _apart_from_around(light, guides[..., :3], samples)
         else:
-            light = _apart_in_halves(frame.halves)
-    return Noise(*(_packed(x, dtype) for x in (*light, guides)))
+            parts = _apart_in_halves(light)
+        found = (*parts, noise_of_guides(guides_of(guides), samples))
+    return Noise(*(_packed(x, dtype) for x in found))
 
 
 def noise_of_guides(guides: Array, samples: float) -> Array:
