@@ -26,6 +26,7 @@ ORDER = (
     "xrds_blender.cycles",
     "xrds_blender.scene",
     "xrds_blender.planning",
+    "xrds_blender.internals",
     "xrds_core",
 )
 VAGUE = {"utils", "util", "helpers", "helper", "common", "misc"}

@@ -49,11 +49,11 @@ def render(scene: Any, scale: int = 2, **choices: Any) -> Picture:
     Raises SceneError without a camera, WeightsError without the weights, UsageError
     for values out of range, Cancelled when the user stops the render.
     """
-    from .frame import rendering
     from .interface.registration import ensure_registered
+    from .shot import render
 
     ensure_registered()
-    return rendering.render(scene, scale, **choices)
+    return render.render(scene, scale, **choices)
 
 
 def run_job(

@@ -35,7 +35,7 @@ MODULES = (
     "borrowed",
     "cover",
     "engine",
-    "engine_loan",
+    "engine_override",
     "features",
     "full_size",
     "guide_cache",

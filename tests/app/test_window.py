@@ -231,8 +231,10 @@ bpy.data.scenes[0].cycles.use_adaptive_sampling = False
 SAMPLES_ARE_TAKEN = """
 import sys
 progress = sys.modules.get('xrds_blender.frame.progress')
-run = progress and progress._run
-run and (sys.modules['xrds_blender.cycles.status'].fraction(run.engine) or 0) > 0
+lifetimes = sys.modules.get('xrds_blender.internals.lifetimes')
+run = progress and lifetimes.RENDER_JOB.of(progress.Current).run
+status = sys.modules.get('xrds_blender.internals.status')
+run and (status.fraction(run.engine) or 0) > 0
 """
 
 

@@ -11,7 +11,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.cycles.borrowed import Borrowed
+from xrds_blender.internals.borrowed import Borrowed
 
 
 class XRDS_OT_draws(bpy.types.Operator):  # noqa: N801  # as Blender names them

@@ -29,7 +29,6 @@ from xrds_blender.frame import (
     guide_cache,
     networks,
     progress,
-    super_resolution,
 )
 from xrds_blender.frame.job import NetworkFailed, RenderJob
 from xrds_core import exr
@@ -77,8 +76,7 @@ def test_cancelling_a_stage_writes_nothing(
         patch.setattr(
             session, "is_stopped", lambda _: stage in (progress.current() or "")
         )
-        enlargement = super_resolution._Enlargement
-        patch.setattr(enlargement, "write", lambda *_: written.append(1))
+        patch.setattr(session, "write_combined", lambda *_: written.append(1))
         with pytest.raises(Cancelled):
             render(life, 2, seed=1)
     assert not written

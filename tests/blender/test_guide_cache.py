@@ -115,17 +115,17 @@ def test_the_result_holds_data_passes_of_kept_guides(written: Any) -> None:
         depth.rect.foreach_get(pixels)
         seen.append(pixels)
 
-    from xrds_blender.frame.super_resolution import _Enlargement
+    from xrds_blender.shot import render as rendering
 
     scene.view_layers[0].use_pass_z = True
-    old = _Enlargement.write
+    old = rendering._write
     try:
-        _Enlargement.write = lambda part, *rest: (old(part, *rest), look(part.engine))
+        rendering._write = lambda engine, *rest: (old(engine, *rest), look(engine))
         written(scene)
         bpy.data.objects["Lamp"].data.energy *= 2
         written(scene)
     finally:
-        _Enlargement.write = old
+        rendering._write = old
     np.testing.assert_array_equal(seen[0], seen[1])
     assert seen[0].min() > 1.0
 

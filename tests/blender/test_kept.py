@@ -21,7 +21,7 @@ from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.command.scene_file import SceneChoice
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.shot import method
+from xrds_blender.shot import full_size
 from xrds_core import exr
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError, UsageError
@@ -100,7 +100,7 @@ def test_parts_of_a_shot_make_the_whole(
     for chunk in CHUNKS:
         told = keep(blend, chunk)["samples"]
         assert told["rendered"] == list(chunk)
-    monkeypatch.setattr(method, "sample_frame", None)  # nothing is rendered any more
+    monkeypatch.setattr(full_size, "sample_frame", None)  # nothing is rendered any more
     assert keep(blend, FRAMES)["samples"]["read"] == list(FRAMES)
     render(blend, "read", FRAMES, keep_samples=folder / "samples")
     denoise(blend, "denoised")

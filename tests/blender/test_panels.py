@@ -28,6 +28,7 @@ from xrds_blender.interface import (
     summary,
     translations,
 )
+from xrds_blender.internals.lifetimes import FILE, PROCESS
 from xrds_blender.planning import ways
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.ways import Means, Way
@@ -206,7 +207,7 @@ def test_the_table_tells_seconds_after_a_render() -> None:
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 64, 48
     scene.cycles.samples = 1
-    history.forget()
+    FILE.end()
     scene.render.engine = "XRDS"
     bpy.ops.render.render()
     told = drawn(panels.XRDS_PT_settings)
@@ -382,7 +383,9 @@ def test_self_test_tells_what_is_wrong(
 
 
 def test_status_bar_tells_the_stage(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(progress, "_seconds", {})  # measured by no render before
+    monkeypatch.setattr(
+        PROCESS.of(progress.Speeds), "seconds", {}
+    )  # measured by no render before
     told: list[str] = []
     shown: list[float] = []
 
@@ -458,7 +461,7 @@ def running_engine(text: object, shown: list[float]) -> SimpleNamespace:
 
 
 def test_the_status_bar_tells_the_frames_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(progress, "_seconds", {})
+    monkeypatch.setattr(PROCESS.of(progress.Speeds), "seconds", {})
     engine = running_engine(ctypes.create_string_buffer(1024), [])
     progress.begin_frame(12, 36, 754.0)
     progress.begin(engine, "Samples", 1, 2)

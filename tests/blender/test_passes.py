@@ -12,9 +12,9 @@ bpy = pytest.importorskip("bpy")
 
 from xrds_blender import run_job
 from xrds_blender.cycles import clock, session  # bpy is asked for first
-from xrds_blender.cycles.borrowed import Borrowed, PipelineSettings
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
+from xrds_blender.internals.borrowed import Borrowed, PipelineSettings
 from xrds_core.errors import Cancelled, SceneError
 
 Build = Callable[..., Any]

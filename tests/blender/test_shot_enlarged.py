@@ -19,7 +19,7 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.shot import enlarged_finishing
+from xrds_blender.shot import super_resolution
 from xrds_core.errors import XRDSError
 from xrds_core.upscaler import Upscaler
 
@@ -109,7 +109,7 @@ def test_guides_of_what_stands_still_are_rendered_a_few_times(
     rendered = []
     samples = []
     guides = CyclesPasses.guides_by_view
-    gather = enlarged_finishing._gathered_guides
+    gather = super_resolution.gathered_guides
 
     def count(passes: CyclesPasses, *given: Any, **named: Any) -> Any:
         rendered.append(named["portion"].offset)
@@ -121,7 +121,7 @@ def test_guides_of_what_stands_still_are_rendered_a_few_times(
         return found
 
     monkeypatch.setattr(CyclesPasses, "guides_by_view", count)
-    monkeypatch.setattr(enlarged_finishing, "_gathered_guides", look)
+    monkeypatch.setattr(super_resolution, "gathered_guides", look)
     render(lit, "shot", job={"temporal_radius": 1}, frames=[1, 2, 3, 4, 5, 6])
     assert sorted(rendered) == [0, 1, 2]  # and frames 4 to 6 take what is there
     assert samples == [2, 3, 3, 3, 3, 3]

@@ -12,7 +12,7 @@ from channels import read_channels
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.cycles import spare_passes
+from xrds_blender.internals import spare_passes
 
 
 @pytest.fixture(params=[False, True])

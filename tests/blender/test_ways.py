@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from xrds_blender.internals.lifetimes import FILE
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import Denoiser
@@ -167,7 +168,7 @@ def test_layers_of_a_scene_add_up() -> None:
     from xrds_blender.frame import history
     from xrds_blender.frame.job import Picture, RenderJob
 
-    history.forget()
+    FILE.end()
     picture = Picture(None, None, seconds=FULL)
     job = RenderJob(1)
     for layer in ("fore", "back"):
@@ -189,4 +190,4 @@ def test_layers_of_a_scene_add_up() -> None:
     assert history.seconds(scene, Way.FULL_SIZE, asked) == pytest.approx(one / 2)
     layers[2].use = True  # never rendered
     assert history.seconds(scene, Way.FULL_SIZE, asked) is None
-    history.forget()
+    FILE.end()

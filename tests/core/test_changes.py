@@ -28,7 +28,7 @@ def error(lights: list[Array], noise: float, weight: float = 4.0) -> Array:
 def test_noise_alone_is_no_change() -> None:
     still = error([np.zeros(SHAPE, np.float32)] * NEIGHBOURS, 0.2)
     assert still.shape == SHAPE
-    assert still.mean() < 0.1 * 0.2**2
+    assert still.mean() < 0.005 * 0.2**2
 
 
 def test_neighbours_without_noise_show_how_much_light_varies() -> None:
@@ -37,15 +37,17 @@ def test_neighbours_without_noise_show_how_much_light_varies() -> None:
     assert found == pytest.approx(np.var(range(NEIGHBOURS), ddof=1), rel=1e-3)
 
 
-@pytest.mark.parametrize("noise", [0.02, 0.2])
-def test_a_shadow_that_moves_is_found_where_it_passes(noise: float) -> None:
+@pytest.mark.parametrize(("noise", "least"), [(0.02, 0.2), (0.2, 0.05)])
+def test_a_shadow_that_moves_is_found_where_it_passes(
+    noise: float, least: float
+) -> None:
     lights = [np.full(SHAPE, 0.7, np.float32) for _ in range(NEIGHBOURS)]
     for n, light in enumerate(lights):
         light[:, 20 + 3 * n : 23 + 3 * n] -= 0.3
     found = error(lights, noise)
     passed, spared = found[:, 22:42].mean(), found[:, :8].mean()
     assert passed > 20 * spared
-    assert passed > 0.2 * SIZES * np.var([-0.3] + [0.0] * (NEIGHBOURS - 1), ddof=1)
+    assert passed > least * SIZES * np.var([-0.3] + [0.0] * (NEIGHBOURS - 1), ddof=1)
 
 
 def test_what_no_neighbour_shows_is_no_change() -> None:

@@ -446,7 +446,7 @@ def test_many_frames_of_which_few_are_there_take_no_time(
     assert time.process_time() - started < 20
     order = Shot(tuple(range(200_000)), 4)
     started = time.process_time()
-    assert all(len(order.lenders(x)) == 8 for x in range(190_000, 190_500))
+    assert all(len(order.neighbours(x)) == 8 for x in range(190_000, 190_500))
     assert time.process_time() - started < 2
 
 

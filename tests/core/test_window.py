@@ -11,33 +11,33 @@ from shots import HEIGHT, WIDTH, camera, view
 from xrds_core.errors import UsageError
 from xrds_core.temporal.frame import Stored, store
 from xrds_core.temporal.halves import Halves
-from xrds_core.temporal.window import Shot, bytes_needed, slide
+from xrds_core.temporal.window import Shot, Window, bytes_needed
 
 
-def test_lenders_lie_on_both_sides_and_end_with_the_shot() -> None:
+def test_neighbours_lie_on_both_sides_and_end_with_the_shot() -> None:
     shot = Shot(tuple(range(1, 8)), radius=2)
-    assert shot.lenders(4) == (3, 5, 2, 6)
-    assert shot.lenders(1) == (2, 3)
-    assert shot.lenders(7) == (6, 5)
-    assert Shot((5,), radius=3).lenders(5) == ()
-    assert Shot((1, 2, 3), radius=0).lenders(2) == ()
+    assert shot.neighbours(4) == (3, 5, 2, 6)
+    assert shot.neighbours(1) == (2, 3)
+    assert shot.neighbours(7) == (6, 5)
+    assert Shot((5,), radius=3).neighbours(5) == ()
+    assert Shot((1, 2, 3), radius=0).neighbours(2) == ()
 
 
 def test_steps_count_as_one_frame_each() -> None:
-    assert Shot((1, 11, 21, 31), radius=1).lenders(21) == (11, 31)
+    assert Shot((1, 11, 21, 31), radius=1).neighbours(21) == (11, 31)
 
 
-def test_nothing_is_lent_across_a_cut() -> None:
+def test_no_frame_has_neighbours_across_a_cut() -> None:
     shot = Shot(tuple(range(1, 9)), radius=3, cuts=frozenset({4, 6}))
-    assert shot.lenders(3) == (2, 1)
-    assert shot.lenders(4) == (5,)
-    assert shot.lenders(6) == (7, 8)
+    assert shot.neighbours(3) == (2, 1)
+    assert shot.neighbours(4) == (5,)
+    assert shot.neighbours(6) == (7, 8)
 
 
-def test_frames_of_other_machines_only_lend() -> None:
-    shot = Shot((5, 6), radius=2, lending=(1, 2, 3, 4, 7, 8, 9))
+def test_frames_of_other_machines_are_neighbours_alone() -> None:
+    shot = Shot((5, 6), radius=2, others=(1, 2, 3, 4, 7, 8, 9))
     loaded = []
-    done = [x for x, _, _ in slide(shot, lambda n: loaded.append(n) or n)]
+    done = [x.number for x in Window(shot, lambda n: loaded.append(n) or n)]
     assert done == [5, 6]
     assert loaded == [3, 4, 5, 6, 7, 8]  # and no frame that nobody needs
 
@@ -65,23 +65,26 @@ def test_each_frame_is_loaded_once_and_few_are_kept(
         return Picture(number)
 
     done = []
-    for number, frame, others in slide(shot, load):
-        assert frame.number == number
-        assert tuple(others) == shot.lenders(number)
-        assert all(x.number == n for n, x in others.items())
+    for found in Window(shot, load):
+        number = found.number
+        assert found.own.number == number
+        assert tuple(found.neighbours) == shot.neighbours(number)
+        assert all(x.number == n for n, x in found.neighbours.items())
         done.append(number)
         most = max(most, len(alive))
         # no later than it must be: the last neighbour is there, and nothing beyond
-        assert max(loads) == max((number, *others))
-        del frame, others
+        assert max(loads) == max((number, *found.neighbours))
+        del found
     assert done == loads == list(range(12))
     assert most <= min(2 * radius + 1, len(shot.order))
 
 
-def test_missing_frames_lend_nothing_and_are_left_out() -> None:
+def test_missing_frames_are_left_out_and_nobodys_neighbours() -> None:
     shot = Shot((1, 2, 3, 4), radius=1)
-    found = list(slide(shot, lambda n: None if n == 2 else n))
+    window = Window(shot, lambda n: None if n == 2 else n)
+    found = [(x.number, x.own, x.neighbours) for x in window]
     assert found == [(1, 1, {}), (3, 3, {4: 4}), (4, 4, {3: 3})]
+    assert window.neighbourhood(2) is None
 
 
 def test_a_negative_radius_is_refused() -> None:

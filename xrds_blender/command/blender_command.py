@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
-_handle: Any = None
+from ..internals.lifetimes import PROCESS
+
+
+@dataclass
+class _Registered:
+    """Blender's handle of the command, while it is known."""
+
+    handle: Any = None
 
 
 def register() -> None:
     """Make the command known to Blender."""
-    global _handle
-    _handle = bpy.utils.register_cli_command("xrds", _run)
+    PROCESS.of(_Registered).handle = bpy.utils.register_cli_command("xrds", _run)
 
 
 def unregister() -> None:
     """Take it back, where it was registered."""
-    global _handle
-    if _handle is not None:
-        bpy.utils.unregister_cli_command(_handle)
-        _handle = None
+    state = PROCESS.of(_Registered)
+    if state.handle is not None:
+        bpy.utils.unregister_cli_command(state.handle)
+        state.handle = None
 
 
 def _run(argv: list[str]) -> int:

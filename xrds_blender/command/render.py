@@ -77,7 +77,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("plan")
-    from ..frame.explain import explain
+    from ..shot.explain import explain
     from .scene_file import open_scene
 
     job, frames = job_of(options), getattr(options, "frames", None)

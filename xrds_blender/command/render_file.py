@@ -19,11 +19,11 @@ from ..cycles.size import picture_size
 from ..frame import record
 from ..frame.denoisers import load_denoiser
 from ..frame.job import NetworkFailed, Picture, RenderJob
-from ..frame.lending import can_lend
 from ..frame.networks import known_networks, load_upscaler
-from ..frame.rendering import render
-from ..shot.keeping import Keeper, keeper_of
-from ..shot.shot import keep_shot, render_shot
+from ..shot.cache import SampleCache, cache_of
+from ..shot.render import render
+from ..shot.sampling import has_neighbours
+from ..shot.shot import cache_samples, render_shot
 from . import picture_file
 from .scene_file import AS_SAVED, SceneChoice, open_scene
 from .whole_file import is_whole
@@ -68,7 +68,7 @@ def render_file(
     _check_libraries(job)
     numbers = list(frames or [scene.frame_current])
     size = picture_size(scene.render)
-    keeper = keep_samples and _keeper(scene, job, keep_samples)
+    cache = keep_samples and _cache(scene, job, keep_samples)
 
     def is_done(number: int) -> bool:
         # asked anew for each: another render may be writing the same frames
@@ -76,10 +76,10 @@ def render_file(
 
     written, last = [], None
     if output is not None:
-        for number, last in _pictures(scene, job, output, numbers, is_done, keeper):
+        for number, last in _pictures(scene, job, output, numbers, is_done, cache):
             written.append(_write(scene, output, number, last, job, encoding))
-    if keeper:
-        _keep_others(scene, job, numbers, keeper)
+    if cache:
+        _keep_others(scene, job, numbers, cache)
     job = (last and last.job) or job
     rendered = {entry["frame"] for entry in written}
     return {
@@ -90,7 +90,7 @@ def render_file(
         "device": last.device if last else "",
         "frames": written,
         "kept": [n for n in numbers if n not in rendered] if output else [],
-        "samples": keeper and keeper.told(numbers),
+        "samples": cache and cache.told(numbers),
         "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
     }
 
@@ -111,13 +111,13 @@ def _pictures(
     output: str,
     numbers: Sequence[int],
     is_done: Callable[[int], bool],
-    keeper: Keeper | None,
+    cache: SampleCache | None,
 ) -> Iterator[tuple[int, Picture]]:
     """Number and picture of every frame that is not done."""
-    is_shot = len(numbers) > 1 and can_lend(scene, job)
-    if is_shot or keeper:
+    is_shot = len(numbers) > 1 and has_neighbours(scene, job)
+    if is_shot or cache:
         try:
-            yield from render_shot(scene, job, numbers, is_done, keeper)
+            yield from render_shot(scene, job, numbers, is_done, cache)
         except NetworkFailed as error:
             raise _kept(error, scene, output, error.number or 0) from error
         return
@@ -137,22 +137,22 @@ def _check_keeping(job: RenderJob) -> None:
         raise UsageError("--keep-samples needs a --temporal-radius of 1 or more")
 
 
-def _keeper(scene: Any, job: RenderJob, folder: Path) -> Keeper:
-    """What keeps samples; raises UsageError where they could lend nothing."""
-    if not can_lend(scene, job):
+def _cache(scene: Any, job: RenderJob, folder: Path) -> SampleCache:
+    """The cache of samples; raises UsageError where no frame could use them."""
+    if not has_neighbours(scene, job):
         raise UsageError(
             "frames of such a panoramic camera lend nothing to each other: leave out "
             "--keep-samples"
         )
-    return keeper_of(scene, job, folder, warn)
+    return cache_of(scene, job, folder, warn)
 
 
 def _keep_others(
-    scene: Any, job: RenderJob, numbers: Sequence[int], keeper: Keeper
+    scene: Any, job: RenderJob, numbers: Sequence[int], cache: SampleCache
 ) -> None:
     """Render the samples of frames that no picture has asked for."""
     clock = Clock()
-    for number in keep_shot(scene, job, numbers, keeper):
+    for number in cache_samples(scene, job, numbers, cache):
         left = sum(n > number for n in numbers)
         warn(f"frame {number}: samples kept, {clock.lap(left)}")
 

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from ..internals.borrowed import Borrowed
 from ..planning.plan import GuideRender, guide_bounces
 from ..scene.closures import of_tree
-from .borrowed import Borrowed
 
 
 @contextmanager

@@ -13,8 +13,9 @@ from typing import Any, Self
 
 from xrds_core.arrays import Array
 
-from . import session, spare_passes
-from .borrowed import Borrowed, PipelineSettings
+from ..internals import spare_passes
+from ..internals.borrowed import Borrowed, PipelineSettings
+from . import session
 from .low_camera import Frame, LowGrid, Region, is_exact, widen
 from .pass_names import COMBINED, DEPTH, GUIDE_PASSES, NOISY, is_light
 from .samples import Reader, read_geometry

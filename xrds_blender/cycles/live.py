@@ -10,6 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from ..internals.lifetimes import RENDER_JOB
+
 if TYPE_CHECKING:
     from xrds_core.arrays import Array
 
@@ -28,33 +30,38 @@ class Live:
     offset: tuple[int, int] = (0, 0)
 
 
-_now = Live()
+@dataclass
+class _Now:
+    """What is drawn now."""
+
+    live: Live = Live()
 
 
 def now() -> Live:
     """What is to be drawn."""
-    return _now
+    return RENDER_JOB.of(_Now).live
+
+
+def _draw(live: Live) -> None:
+    RENDER_JOB.of(_Now).live = live
 
 
 def samples(scale: int = 1) -> None:
     """From now on Cycles draws its samples, of a picture to come."""
-    global _now
-    _now = Live(scale=scale)
+    _draw(Live(scale=scale))
 
 
 def guides() -> None:
     """From now on Cycles renders guides, which are drawn where there is no picture."""
-    if _now.picture is None:
+    if now().picture is None:
         samples()
 
 
 def show(picture: Array, scale: int = 1, offset: tuple[int, int] = (0, 0)) -> None:
     """From now on a picture is drawn; it must not be changed any more."""
-    global _now
-    _now = Live(picture, scale, offset)
+    _draw(Live(picture, scale, offset))
 
 
 def clear() -> None:
     """Show nothing of what was before."""
-    global _now
-    _now = Live()
+    _draw(Live())

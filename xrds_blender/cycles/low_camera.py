@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from xrds_core.arrays import Array
 
+from ..internals.borrowed import Borrowed
 from ..planning.forecast import low_size
-from .borrowed import Borrowed
 
 
 @dataclass(frozen=True)

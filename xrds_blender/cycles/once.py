@@ -6,9 +6,10 @@ from typing import Any
 
 from xrds_core.temporal.samples import Portion
 
+from ..internals import spare_passes
+from ..internals.borrowed import Borrowed
 from ..planning.denoiser import Denoiser
-from . import live, session, spare_passes
-from .borrowed import Borrowed
+from . import live, session
 from .clock import StageClock
 from .pass_names import GUIDE_PASSES
 from .settings import set_blue_noise, set_denoising, set_samples

@@ -13,10 +13,10 @@ import numpy as np
 
 from xrds_core.temporal.samples import Portion
 
+from ..internals.borrowed import Borrowed
 from ..planning.denoiser import Denoiser
 from ..planning.plan import GuideRender
 from . import live, session
-from .borrowed import Borrowed
 from .guide_settings import guide_settings
 from .layer_session import LayerSession
 from .low_camera import LowGrid, Region

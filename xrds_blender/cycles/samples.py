@@ -11,7 +11,8 @@ import numpy as np
 from xrds_core.arrays import Array
 from xrds_core.temporal.samples import Portion
 
-from . import live, session, spare_passes
+from ..internals import spare_passes
+from . import live, session
 from .once import render_once
 from .pass_names import (
     ALBEDO,

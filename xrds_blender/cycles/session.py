@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import Cancelled
 
-from . import spare_passes
+from ..internals import spare_passes
 from .clock import StageClock
 from .pass_names import COMBINED, NOISY
 

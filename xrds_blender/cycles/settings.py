@@ -7,8 +7,8 @@ from typing import Any
 
 from xrds_core.temporal.samples import Portion
 
+from ..internals.borrowed import Borrowed
 from ..planning.denoiser import Denoiser
-from .borrowed import Borrowed
 
 
 def set_sampling(

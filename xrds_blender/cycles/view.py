@@ -9,8 +9,8 @@ import numpy as np
 
 from xrds_core.temporal.frame import Camera, Sphere
 
+from ..internals.borrowed import Borrowed
 from ..planning.forecast import low_size
-from .borrowed import Borrowed
 from .size import border_start, frame_size, picture_size
 
 

@@ -6,11 +6,12 @@ Kept for as long as Blender runs and the file is open, for the panel to show.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..cycles import session
 from ..cycles.size import picture_size
+from ..internals.lifetimes import FILE
 from ..planning import budget
 from ..planning.budget import Costs
 from ..planning.denoiser import Denoiser
@@ -39,9 +40,12 @@ class LastRender:
     seconds: Mapping[str, float]
 
 
-# By name of the scene and of the view layer.
-_last: dict[str, dict[str, LastRender]] = {}
-_measured: dict[str, dict[str, Measured]] = {}
+@dataclass
+class _Known:
+    """Of all scenes of a file, by name of the scene and of the view layer."""
+
+    last: dict[str, dict[str, LastRender]] = field(default_factory=dict)
+    measured: dict[str, dict[str, Measured]] = field(default_factory=dict)
 
 
 def place_of(depsgraph: Any) -> Place:
@@ -87,8 +91,9 @@ def keep(place: Place, job: RenderJob, picture: Picture) -> None:
     asked = asked_of(job, place.samples, place.plain_denoiser)
     seconds = dict(picture.seconds)
     done = LastRender(way, asked.samples, seconds)
-    _last.setdefault(place.scene, {})[place.layer] = done
-    layers = _measured.setdefault(place.scene, {})
+    known = FILE.of(_Known)
+    known.last.setdefault(place.scene, {})[place.layer] = done
+    layers = known.measured.setdefault(place.scene, {})
     layers[place.layer] = learn(
         layers.get(place.layer), way, asked, place.pixels, seconds, budget.shipped()
     )
@@ -96,7 +101,7 @@ def keep(place: Place, job: RenderJob, picture: Picture) -> None:
 
 def last(scene: Any) -> LastRender | None:
     """The scene's last render since the file was opened: all its layers together."""
-    layers = _last.get(scene.name, {})
+    layers = FILE.of(_Known).last.get(scene.name, {})
     done = [layers[x.name] for x in scene.view_layers if x.use and x.name in layers]
     if not done:
         return None
@@ -108,7 +113,7 @@ def last(scene: Any) -> LastRender | None:
 def seconds(scene: Any, way: Way, asked: Asked) -> float | None:
     """What a frame of the scene will about take; None where nothing is known."""
     width, height = picture_size(scene.render)
-    known = _measured.get(scene.name, {})
+    known = FILE.of(_Known).measured.get(scene.name, {})
     total = 0.0
     for layer in scene.view_layers:
         if not layer.use:
@@ -125,14 +130,8 @@ def seconds(scene: Any, way: Way, asked: Asked) -> float | None:
 def costs(scene: Any) -> Costs | None:
     """Costs of a frame's parts; None where unknown, or for several layers."""
     names = [layer.name for layer in scene.view_layers if layer.use]
-    known = _measured.get(scene.name, {})
+    known = FILE.of(_Known).measured.get(scene.name, {})
     if len(names) != 1 or names[0] not in known:
         return None
     width, height = picture_size(scene.render)
     return known[names[0]].costs(width * height, budget.shipped())
-
-
-def forget(*_: Any) -> None:
-    """For Blender's handlers: another file."""
-    _last.clear()
-    _measured.clear()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import UsageError, XRDSError
 
@@ -14,8 +14,6 @@ from ..planning.plan import SAVINGS, Decision, Facts, Plan, decide, full_size, p
 if TYPE_CHECKING:
     from xrds_core.arrays import Array
 
-ENGINE = "XRDS"
-"""Blender's name for the render engine."""
 SCALES = (1, 2, 4, 8)
 PRESETS = ("fast", "balanced", "paper")
 GUIDES = ("fast", "full")
@@ -185,3 +183,11 @@ class Picture:
     device: str = ""
     job: RenderJob | None = None
     temporal: Temporal | None = None
+
+    @classmethod
+    def of(cls, pixels: Array, **rest: Any) -> Picture:
+        """The picture of radiance and alpha in one array (H, W, 4)."""
+        import numpy as np  # here: Blender starts faster without it
+
+        radiance, alpha = pixels[..., :3], pixels[..., 3]
+        return cls(np.ascontiguousarray(radiance), np.ascontiguousarray(alpha), **rest)

@@ -116,14 +116,6 @@ def report_pick(engine: Any, picked: Pick) -> None:
     engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
 
 
-def picked_decisions(picked: Pick, rest: tuple[Decision, ...]) -> tuple[Decision, ...]:
-    """The decisions of a job that was picked: why it was, and what it then leaves out.
-
-    Of plain Cycles the choice says all.
-    """
-    return (picked.decision,) if picked.job.plain else (picked.decision, *rest)
-
-
 def _denoisers() -> tuple[Denoiser, ...]:
     """Those to choose from: ours, or Cycles' where ours is missing.
 

@@ -14,7 +14,9 @@ from typing import Any
 
 from xrds_core.time_left import duration
 
-from ..cycles import session, status
+from ..cycles import session
+from ..internals import status
+from ..internals.lifetimes import PROCESS, RENDER_JOB
 
 LOADING = "Loading PyTorch"
 LOW, GUIDES, NETWORK = "Low resolution", "Guides", "Network"
@@ -32,8 +34,6 @@ STAGES = (
 _KINDS = (LOW, GUIDES, NETWORK)
 _LEAST = 0.02  # of a stage, before its seconds can be told from what is done
 _LARGE = 0.1  # megapixels; of less, seconds do not tell what more would take
-# Seconds per megapixel until a stage has been measured: two cores of a desktop.
-_seconds = {DENOISE: 2.5, NETWORK: 1.5}
 
 
 @dataclass
@@ -55,8 +55,24 @@ class _Run:
         return self.stage.partition(" of frame")[0]
 
 
-_run: _Run | None = None
-_frames_left: str = ""
+@dataclass
+class Current:
+    """The render that goes on, if any, and what of an animation is left after it."""
+
+    run: _Run | None = None
+    frames_left: str = ""
+
+
+@dataclass
+class Speeds:
+    """Seconds per megapixel of each kind of stage.
+
+    Until a stage has been measured they are those of two cores of a desktop.
+    """
+
+    seconds: dict[str, float] = field(
+        default_factory=lambda: {DENOISE: 2.5, NETWORK: 1.5}
+    )
 
 
 def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
@@ -64,16 +80,16 @@ def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
 
     At scale 1 the last one is the denoiser, and all before are samples.
     """
-    global _run
-    now = time.perf_counter()
-    if _run is None:
+    state, now = RENDER_JOB.of(Current), time.perf_counter()
+    if state.run is None:
         result = engine.get_result()
         pixels = result.resolution_x * result.resolution_y
-        _run = _Run(engine, max(pixels, 1) / 1e6, now)
+        state.run = _Run(engine, max(pixels, 1) / 1e6, now)
     else:
-        _learn(_run, now)
-    _run.engine, _run.stage, _run.number, _run.of = engine, stage, number, of
-    _run.since, _run.reported = now, 0.0
+        _learn(state.run, now)
+    run = state.run
+    run.engine, run.stage, run.number, run.of = engine, stage, number, of
+    run.since, run.reported = now, 0.0
     engine.update_stats("XRDS", stage)
 
 
@@ -82,19 +98,19 @@ def begin_frame(number: int, left: int, seconds: float | None = None) -> None:
 
     `seconds`: an estimate for this frame and those after it; None without one.
     """
-    global _frames_left
     rest = "the last one" if not left else f"{left} left"
     if seconds is not None:
         rest += f", about {duration(seconds)}"
-    _frames_left = f"Frame {number} ({rest}). "
+    RENDER_JOB.of(Current).frames_left = f"Frame {number} ({rest}). "
 
 
 def reporter(engine: Any) -> Callable[[float], bool]:
     """Notes how far a stage is, from 0 to 1; False once the user has stopped it."""
 
     def report(done: float) -> bool:
-        if _run is not None:
-            _run.reported = done
+        run = RENDER_JOB.of(Current).run
+        if run is not None:
+            run.reported = done
         engine.update_progress(done)
         return not session.is_stopped(engine)
 
@@ -103,20 +119,21 @@ def reporter(engine: Any) -> Callable[[float], bool]:
 
 def end() -> None:
     """Note that the render is over, however it ended."""
-    global _run, _frames_left
-    if _run is not None and _run.reported >= 1.0:
-        _learn(_run, time.perf_counter())
-    _run, _frames_left = None, ""
+    state = RENDER_JOB.of(Current)
+    if state.run is not None and state.run.reported >= 1.0:
+        _learn(state.run, time.perf_counter())
+    state.run, state.frames_left = None, ""
 
 
 def current() -> str | None:
     """What is being done and how long it will take, None between renders."""
-    run = _run
+    state = RENDER_JOB.of(Current)
+    run = state.run
     if run is None:
         return None
     left = _left(run)
     told = "" if left is None else f", {_clock(left)} left"
-    return f"{_frames_left}XRDS {run.number}/{run.of}: {run.stage}{told}"
+    return f"{state.frames_left}XRDS {run.number}/{run.of}: {run.stage}{told}"
 
 
 def show() -> None:
@@ -124,7 +141,7 @@ def show() -> None:
 
     For the main thread, while the engine renders.
     """
-    run = _run
+    run = RENDER_JOB.of(Current).run
     if run is None:
         return
     spent, left = time.perf_counter() - run.start, _left(run)
@@ -136,7 +153,7 @@ def _learn(run: _Run, now: float) -> None:
     """Keep what a stage has taken, for the next ones of its kind."""
     run.done.add(run.kind)
     if run.megapixels > _LARGE:
-        _seconds[run.kind] = (now - run.since) / run.megapixels
+        PROCESS.of(Speeds).seconds[run.kind] = (now - run.since) / run.megapixels
 
 
 def _left(run: _Run) -> float | None:
@@ -145,8 +162,8 @@ def _left(run: _Run) -> float | None:
     part = run.reported or status.fraction(run.engine) or 0.0
     if part > _LEAST:
         whole = spent / part
-    elif run.kind in _seconds:
-        whole = max(_seconds[run.kind] * run.megapixels, spent)
+    elif run.kind in (known := PROCESS.of(Speeds).seconds):
+        whole = max(known[run.kind] * run.megapixels, spent)
     else:
         return None
     later = [_expected(run, kind, whole) for kind in _later(run)]
@@ -162,7 +179,7 @@ def _later(run: _Run) -> list[str]:
 
 def _expected(run: _Run, kind: str, this: float) -> float:
     """Seconds of a stage to come; where none was measured as many as this one takes."""
-    known = _seconds.get(kind)
+    known = PROCESS.of(Speeds).seconds.get(kind)
     return this if known is None else known * run.megapixels
 
 

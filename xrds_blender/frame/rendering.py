@@ -1,8 +1,7 @@
-"""The one path from a scene to a picture; every button and command ends here."""
+"""Work inside of Blender's render: what Blender asks for, or what a caller asks for."""
 
 from __future__ import annotations
 
-import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -10,11 +9,11 @@ from typing import Any, TypeVar
 
 from xrds_core.errors import Cancelled, SceneError, XRDSError
 
-from ..cycles import live, spare_passes
-from ..cycles.borrowed import Borrowed
+from ..cycles import live
 from ..cycles.passes import CyclesPasses
-from .job import Picture, RenderJob
-from .layer import render_layer
+from ..internals import engine_override, spare_passes
+from ..internals.borrowed import Borrowed
+from ..internals.lifetimes import PROCESS
 
 T = TypeVar("T")
 
@@ -28,19 +27,11 @@ class _Task:
     error: BaseException | None = None
 
 
-_task: _Task | None = None
+@dataclass
+class _Waiting:
+    """The work that Blender's next call of the engine is for, if there is any."""
 
-
-def render(
-    scene: Any, scale: int = 2, *, layer: str | None = None, **choices: Any
-) -> Picture:
-    """As `xrds_blender.render`; the engine must be registered."""
-    job, start = RenderJob(scale=scale, **choices), time.perf_counter()
-
-    def work(engine: Any, depsgraph: Any) -> Picture:
-        return render_layer(engine, depsgraph, job, start)
-
-    return call_engine(scene, work, layer)
+    task: _Task | None = None
 
 
 def run_job(
@@ -68,11 +59,12 @@ def render_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
 
 
 def _work_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
-    if _task is not None:
+    task = PROCESS.of(_Waiting).task
+    if task is not None:
         try:
-            _task.results.append(_task.work(engine, depsgraph))
+            task.results.append(task.work(engine, depsgraph))
         except BaseException as error:  # Blender would print it; the caller gets it
-            _task.error = error
+            task.error = error
         return
     try:
         asked()
@@ -100,19 +92,17 @@ def call_engine(
     """
     import bpy
 
-    from . import engine_loan
-
-    global _task
-    if _task is not None:
+    waiting = PROCESS.of(_Waiting)
+    if waiting.task is not None:
         raise SceneError("a render is already running; wait until it has finished")
     if not hasattr(bpy.types.Scene, "xrds"):
         raise SceneError("the engine is not registered; call xrds_blender.register()")
     name = _layer_name(scene, layer)
-    task = _task = _Task(work)
+    task = waiting.task = _Task(work)
     try:
         with Borrowed() as borrowed:
             borrowed.set(scene.render, use_compositing=False, use_sequencer=False)
-            engine_loan.lend(scene)
+            engine_override.begin(scene)
             bpy.ops.render.render(scene=scene.name, layer=name)
     except RuntimeError as error:
         # Blender says the same once for each report
@@ -120,8 +110,8 @@ def call_engine(
         message = "; ".join(dict.fromkeys(filter(None, lines)))
         task.error = task.error or SceneError(message)
     finally:
-        _task = None
-        engine_loan.withdraw()
+        waiting.task = None
+        engine_override.withdraw()
     if task.error is not None:
         raise task.error
     if not task.results:

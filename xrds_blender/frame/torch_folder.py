@@ -17,6 +17,8 @@ from typing import Any
 
 from xrds_core.errors import UsageError, XRDSError
 
+from ..internals.lifetimes import PROCESS
+
 NEEDED = {"torch": "PyTorch", "safetensors": "safetensors"}
 CPU_INDEX = (
     "--index-url https://download.pytorch.org/whl/cpu "
@@ -31,6 +33,13 @@ class Torch:
     version: str
     build: str
     folder: Path
+
+
+@dataclass
+class _Chosen:
+    """The folder that is looked into first, if any."""
+
+    folder: Path | None = None
 
 
 def inspect(folder: Path) -> Torch:
@@ -97,19 +106,16 @@ def use(folder: Path | None) -> None:
     numpy stays Blender's own: it is loaded before the folder is in sight. Raises
     UsageError, with nothing changed, where the folder's torch does not fit.
     """
-    global _folder
+    chosen = PROCESS.of(_Chosen)
     if folder is not None:
         inspect(folder)
         importlib.import_module("numpy")
-    if _folder is not None and str(_folder) in sys.path:
-        sys.path.remove(str(_folder))
+    if chosen.folder is not None and str(chosen.folder) in sys.path:
+        sys.path.remove(str(chosen.folder))
     if folder is not None:
         sys.path.insert(0, str(folder))
     importlib.invalidate_caches()
-    _folder = folder
-
-
-_folder: Path | None = None
+    chosen.folder = folder
 
 
 def loaded() -> Path | None:

@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 
 from ..cycles import session
-from ..frame.job import ENGINE
-from . import support, write_lock
+from ..internals.engine_override import ENGINE
+from . import support, thread_guard
 
 
 class XRDSRender(bpy.types.RenderEngine):
@@ -53,7 +53,7 @@ class XRDSRender(bpy.types.RenderEngine):
         if self.is_preview:
             session.functions().render(self, depsgraph)
         else:
-            with write_lock.shared():
+            with thread_guard.shared():
                 from ..frame.rendering import render_in
 
                 render_in(self, depsgraph, lambda: self._render_asked(depsgraph))
@@ -61,7 +61,7 @@ class XRDSRender(bpy.types.RenderEngine):
     def _render_asked(self, depsgraph: Any) -> None:
         """Render what the scene's settings describe, and tell what was done."""
         from ..frame import record
-        from ..shot.animation import render_frame
+        from ..shot.render import render_frame
         from .properties import job_of
 
         scene, job = depsgraph.scene_eval, job_of(depsgraph.scene_eval.xrds)

@@ -6,6 +6,7 @@ An add-on may not download by itself, so the user runs the command, in a termina
 from __future__ import annotations
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -13,13 +14,19 @@ import bpy
 from xrds_core.errors import UsageError
 
 from ..frame import torch_folder
+from ..internals.lifetimes import PROCESS
 from . import machine
 
 LOOK_AGAIN = 2.0  # seconds between two looks for the result
 NEEDED = "Super-resolution needs PyTorch: 0.2 GB to download, 0.9 GB on the disk"
 WAITING = "Paste it into a terminal; XRDS takes PyTorch as soon as it is there"
 
-_looking = False
+
+@dataclass
+class _Search:
+    """Whether the folder is looked at again and again."""
+
+    goes_on: bool = False
 
 
 def folder() -> Path:
@@ -59,7 +66,7 @@ def remembered() -> str:
 
 def is_looking() -> bool:
     """Whether the command has been copied and its result is waited for."""
-    return _looking
+    return PROCESS.of(_Search).goes_on
 
 
 def _home() -> Path:
@@ -80,14 +87,14 @@ def _fits(path: Path) -> bool:
 
 
 def _look() -> float | None:
-    global _looking
+    search = PROCESS.of(_Search)
     entry = bpy.context.preferences.addons.get(machine.package)
-    if entry is None or not _looking:
-        _looking = False
+    if entry is None or not search.goes_on:
+        search.goes_on = False
         return None
     if not _fits(folder()):
         return LOOK_AGAIN
-    _looking = False
+    search.goes_on = False
     entry.preferences.torch = str(folder())
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
@@ -106,11 +113,11 @@ class XRDS_OT_get_torch(bpy.types.Operator):
     )
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        global _looking
         folder().parent.mkdir(parents=True, exist_ok=True)
         context.window_manager.clipboard = command()
-        if not _looking:
-            _looking = True
+        search = PROCESS.of(_Search)
+        if not search.goes_on:
+            search.goes_on = True
             bpy.app.timers.register(_look, first_interval=LOOK_AGAIN)
         self.report({"INFO"}, "Copied: paste it into a terminal and press Enter")
         return {"FINISHED"}

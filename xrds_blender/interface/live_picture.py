@@ -5,14 +5,21 @@ The image editor draws scene-linear colours and gives them the scene's look by i
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
 from ..cycles import live, session
+from ..internals.lifetimes import PROCESS
 
-_kept: tuple[Any, Any] = None, None
-"""A picture and its texture; made and freed while drawing, where Blender may."""
+
+@dataclass
+class _Drawn:
+    """A picture and its texture; made and freed while drawing, where Blender may."""
+
+    picture: Any = None
+    texture: Any = None
 
 
 def draw(engine: Any, depsgraph: Any, space: Any) -> None:
@@ -51,14 +58,14 @@ def _texture(picture: Any) -> Any:
     import gpu
     import numpy as np
 
-    global _kept
-    if _kept[0] is not picture:
+    drawn = PROCESS.of(_Drawn)
+    if drawn.picture is not picture:
         rows = np.ascontiguousarray(picture[::-1], np.float32)  # the lowest one first
         height, width = rows.shape[:2]
         data = gpu.types.Buffer("FLOAT", rows.size, rows.ravel())
         texture = gpu.types.GPUTexture((width, height), format="RGBA16F", data=data)
-        _kept = picture, texture
-    return _kept[1]
+        drawn.picture, drawn.texture = picture, texture
+    return drawn.texture
 
 
 def _height(engine: Any) -> int:
@@ -67,8 +74,8 @@ def _height(engine: Any) -> int:
 
 def forget() -> None:
     """Free the texture; on the main thread."""
-    global _kept
-    _kept = None, None
+    drawn = PROCESS.of(_Drawn)
+    drawn.picture = drawn.texture = None
 
 
 @bpy.app.handlers.persistent

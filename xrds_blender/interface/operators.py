@@ -6,7 +6,7 @@ import bpy
 
 from xrds_core.errors import SceneError
 
-from ..frame import engine_loan
+from ..internals import engine_override
 
 
 class XRDS_OT_render(bpy.types.Operator):
@@ -32,7 +32,7 @@ class XRDS_OT_render(bpy.types.Operator):
     def _render(self, context: bpy.types.Context, how: str) -> set[str]:
         running = False
         try:
-            engine_loan.lend(context.scene)
+            engine_override.begin(context.scene)
             done = bpy.ops.render.render(how, animation=self.animation)
             running = "RUNNING_MODAL" in done
         except SceneError as error:
@@ -43,7 +43,7 @@ class XRDS_OT_render(bpy.types.Operator):
             return {"CANCELLED"}
         finally:
             if not running:
-                engine_loan.withdraw()
+                engine_override.withdraw()
         return {"FINISHED"}
 
 

@@ -8,9 +8,11 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..frame import history
-from ..frame.job import ENGINE, GUIDES, PRESETS, RenderJob
+from ..frame.job import GUIDES, PRESETS, RenderJob
 from ..frame.means import means
 from ..frame.ways import best_way, outlooks
+from ..internals.engine_override import ENGINE
+from ..internals.lifetimes import FILE
 from ..planning.budget import Network
 from ..planning.ways import Means, Way
 from . import (
@@ -207,7 +209,7 @@ def _forget_facts(*_: object) -> None:
 @persistent
 def _forget_file(*_: object) -> None:
     summary.forget()
-    history.forget()
+    FILE.end()
 
 
 @persistent

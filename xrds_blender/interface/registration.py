@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import sys
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
 from ..cycles import session
-from ..frame import engine_loan
+from ..internals import engine_override
+from ..internals.lifetimes import PROCESS, RENDER_JOB
 from . import (
     engine,
     live_picture,
@@ -16,11 +17,13 @@ from . import (
     panels,
     preferences,
     properties,
-    write_lock,
+    thread_guard,
 )
 
-_ADD_ON = __name__.partition(".")[0]
-_registered = False
+
+@dataclass
+class _State:
+    is_registered: bool = False
 
 
 def register(package: str = "xrds_blender") -> None:
@@ -28,45 +31,41 @@ def register(package: str = "xrds_blender") -> None:
 
     `package` is the add-on's module name, under which Blender keeps its preferences.
     """
-    global _registered
     session.functions()
     bpy.utils.register_class(properties.XRDSSettings)
     bpy.types.Scene.xrds = bpy.props.PointerProperty(type=properties.XRDSSettings)
     bpy.utils.register_class(engine.XRDSRender)
-    engine_loan.register()  # before those who ask for a scene's engine
-    write_lock.register()
+    engine_override.register()  # before those who ask for a scene's engine
+    thread_guard.register()
     live_picture.register()
     preferences.register(package)
     operators.register()
     panels.register()
     for handlers in _render_jobs():
         handlers.append(_forget_frames)
-    _registered = True
+    PROCESS.of(_State).is_registered = True
 
 
 def unregister() -> None:
     """Take back everything that `register` did."""
-    global _registered
     for handlers in _render_jobs():
         handlers.remove(_forget_frames)
     panels.unregister()
     operators.unregister()
     preferences.unregister()
     live_picture.unregister()
-    write_lock.unregister()
-    engine_loan.unregister()
+    thread_guard.unregister()
+    engine_override.unregister()
     bpy.utils.unregister_class(engine.XRDSRender)
     del bpy.types.Scene.xrds
     bpy.utils.unregister_class(properties.XRDSSettings)
-    _registered = False
+    PROCESS.of(_State).is_registered = False
 
 
 @bpy.app.handlers.persistent
 def _forget_frames(*_: Any) -> None:
-    """What frames lend each other lasts for one render job."""
-    animation = sys.modules.get(f"{_ADD_ON}.shot.animation")
-    if animation is not None:
-        animation.forget()
+    """Samples of an animation last for one render job."""
+    RENDER_JOB.end()
 
 
 def _render_jobs() -> tuple[Any, ...]:
@@ -77,5 +76,5 @@ def _render_jobs() -> tuple[Any, ...]:
 
 def ensure_registered() -> None:
     """Register once, for scripts that use the bpy module."""
-    if not _registered:
+    if not PROCESS.of(_State).is_registered:
         register()

@@ -48,7 +48,7 @@ def self_test() -> list[str]:
 
     Raises XRDSError where no picture, or a wrong one, comes out.
     """
-    from ..frame.rendering import render
+    from ..shot.render import render
     from .machine import machine
 
     here = machine()

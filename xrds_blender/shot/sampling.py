@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,11 +16,11 @@ from ..cycles import session
 from ..cycles.halves import sample_halves, sample_motion
 from ..cycles.samples import COUNTS, GEOMETRY, LATE_DEPTH, Samples, sample_layer
 from ..cycles.settings import has_subsets
-from ..cycles.view import cameras_of
-from ..frame import progress
+from ..cycles.view import cameras_of, can_track
+from ..frame import denoisers, progress
 from ..frame.job import RenderJob
-from ..frame.stopping import keep_samples
 from ..scene.facts import scene_facts, shapes_move, stands_still
+from .stopping import keep_samples
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
@@ -34,40 +34,52 @@ Keep = Callable[[Mapping[str, Frame]], object]
 
 @dataclass(frozen=True)
 class Sampled:
-    """One frame as the window keeps it, by view, and the seconds that it took.
+    """One frame before it is finished, by view, and the seconds that it took.
 
-    Views are `Stored` at full size, `enlarged.View` above scale 1.
+    At full size views are `Stored`, of a still `Samples`; above scale 1 they are a
+    `View` or `Inputs` of `super_resolution`; of Cycles alone finished pictures.
     """
 
+    number: int
     views: dict[str, Any]
     seconds: dict[str, float]
 
-    def lenders(self, view: str, frames: Sequence[Sampled]) -> list[Any]:
-        """What lends to a view: that view of other frames, and this frame's others."""
+    def neighbours(self, view: str, frames: Sequence[Sampled]) -> list[Any]:
+        """That view of other frames, and this frame's other views."""
         beside = [each for name, each in self.views.items() if name != view]
         return [each.views[view] for each in frames if view in each.views] + beside
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """How a frame of a shot is sampled, and the cameras that see it, by view.
+    """How a frame is sampled, and the cameras that see it, by view.
 
     `count` samples per pixel; `geometry` names passes. `place` is the frame's in the
     shot where frames continue one sequence, None where each begins its own. `still`
     is as in `Frame`. A frame that `has_halves` is sampled in two; one that
-    `needs_motion` is rendered once more without motion blur, to tell it.
+    `needs_motion` is rendered once more without motion blur, to tell it. One that
+    `is_alone` has no neighbours: it is sampled as its file has it.
     """
 
     number: int
-    cameras: dict[str, Camera]
-    count: int
-    seed: int
-    geometry: Sequence[tuple[str, str]] = GEOMETRY
+    cameras: dict[str, Camera] = field(default_factory=dict)
+    count: int = 0
+    seed: int = 0
+    geometry: Sequence[tuple[str, str]] = ()
     place: int | None = None
     radius: int = 0
     still: bool = False
     has_halves: bool = False
     needs_motion: bool = False
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether the frame has no neighbours."""
+        return not self.radius
+
+    def named(self, stage: str) -> str:
+        """A stage's name in the status bar, with the frame's number in a shot."""
+        return stage if self.is_alone else f"{stage} of frame {self.number}"
 
     def portion(self, count: int, other: int = 0) -> Portion | None:
         """The frame's part, of `count` samples, of the sequence it continues.
@@ -84,6 +96,21 @@ class Sampling:
         return (self.seed + self.number * SEED_STEP) % LARGEST_SEED
 
 
+def has_neighbours(scene: Any, job: RenderJob) -> bool:
+    """Whether frames of a shot are to use, and can use, each other's samples.
+
+    Not under most panoramic cameras. What a time budget will choose can where it may
+    choose our denoiser.
+    """
+    if job.plain or not job.temporal_radius:
+        return False
+    if job.is_picked and not denoisers.is_there():
+        return False
+    if job.is_enlarged and job.guides != "fast" and not job.is_picked:
+        return False
+    return scene.camera is not None and can_track(scene)
+
+
 def can_continue(scene: Any, job: RenderJob) -> bool:
     """Whether frames can take parts of one sequence: where pixels stand still.
 
@@ -97,16 +124,19 @@ def sampling_of(
 ) -> Sampling:
     """How the frame that the dependency graph is at is to be sampled.
 
-    `place`, the frame's in the shot, lets frames under a camera that stands still
-    continue one sequence; passes of its first sample alone, as Depth, are empty in the
-    result then. Raises SceneError under a camera that no matrix describes.
+    Without a temporal radius it has no neighbours. `place`, the frame's in the shot,
+    lets frames under a camera that stands still continue one sequence; passes of its
+    first sample alone, as Depth, are empty in the result then. Raises SceneError under
+    a camera that no matrix describes.
     """
     scene = depsgraph.scene_eval
+    if not job.temporal_radius:
+        return Sampling(scene.frame_current)
     cameras = cameras_of(engine, depsgraph)
     if not cameras:
         raise SceneError("such panoramas lend nothing; set the temporal radius to 0")
     is_even = _is_even(scene, job)
-    if not job.temporal_radius or not can_continue(scene, job):
+    if not can_continue(scene, job):
         place = None
     geometry = [*_geometry(depsgraph), *([] if is_even else [COUNTS])]
     count = job.samples or session.samples_of(depsgraph)
@@ -134,7 +164,7 @@ def _is_even(scene: Any, job: RenderJob) -> bool:
 
 def _has_halves(scene: Any, job: RenderJob, count: int) -> bool:
     """Whether a frame's samples can be had in two halves that add up to all."""
-    if count < 2 or not job.temporal_radius or not has_subsets(scene):
+    if count < 2 or not has_subsets(scene):
         return False
     cycles = scene.cycles
     return job.samples is not None or not (
@@ -149,15 +179,36 @@ def sample_frame(
     place: int | None = None,
     keep: Keep | None = None,
 ) -> Sampled:
-    """Render a frame as `noisy_frame` does and pack it for the window.
+    """Render the frame that the dependency graph is at; the result holds its passes.
 
-    `keep` takes its views before that.
+    A frame with neighbours is rendered as `noisy_frame` does it and packed for the
+    window; `keep` takes its views before that. Raises what `noisy_frame` does.
     """
+    number = depsgraph.scene_eval.frame_current
+    if not job.temporal_radius:
+        samples, seconds = _alone(engine, depsgraph, job)
+        return Sampled(number, dict(samples), seconds)
     frames, seconds = noisy_frame(engine, depsgraph, job, place)
     if keep is not None:
         keep(frames)
     views = {view: store(frame, np.float16) for view, frame in frames.items()}
-    return Sampled(views, dict.fromkeys(progress.STAGES, 0.0) | seconds)
+    return Sampled(number, views, seconds)
+
+
+def _alone(
+    engine: Any, depsgraph: Any, job: RenderJob
+) -> tuple[dict[str, Samples], dict[str, float]]:
+    """Render a frame without neighbours, as `noisy_frame` does; seed as in the file."""
+    layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
+    progress.begin(engine, progress.SAMPLES, 1, 2)
+    try:
+        found, clock = sample_layer(
+            engine, depsgraph, samples=job.samples, seed=job.seed
+        )
+    except Cancelled:
+        keep_samples(engine, layer_name, job)
+        raise
+    return found, {"sync": clock.sync, "beauty": clock.render}
 
 
 def noisy_frame(
@@ -171,7 +222,7 @@ def noisy_frame(
     """
     how = sampling_of(engine, depsgraph, job, place)
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
-    progress.begin(engine, f"{progress.SAMPLES} of frame {how.number}", 1, 2)
+    progress.begin(engine, how.named(progress.SAMPLES), 1, 2)
     try:
         if how.has_halves:
             return _frames_of_halves(engine, depsgraph, how)

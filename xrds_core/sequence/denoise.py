@@ -16,7 +16,7 @@ from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
 from ..frames import RADIUS, frame_numbers, frame_path
 from ..temporal.vectors import Movement
-from ..temporal.window import Shot, slide
+from ..temporal.window import Shot, Window
 from ..time_left import Clock
 from .finishing import Finished, finish_frame
 from .lenders import Lenders
@@ -136,14 +136,14 @@ def denoise_sequence(
     first = loader.first(readable)
     if radius is None:
         radius = RADIUS if first is None or first.radius is None else first.radius
-    lending = (*numbers, *there)
-    shot = Shot((), radius, lending=lending)
+    beside = (*numbers, *there)
+    shot = Shot((), radius, others=beside)
     written = set(_there(files.output, numbers) if resume else ())
-    done = {n for n in numbers if n in written and files.is_done(n, shot.lenders(n))}
+    done = {n for n in numbers if n in written and files.is_done(n, shot.neighbours(n))}
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     todo = [n for n in readable if n not in done]
-    shot = Shot(tuple(todo), radius, lending=lending)
+    shot = Shot(tuple(todo), radius, others=beside)
     entries = []
     clock = Clock()
     for entry in _entries(files, denoiser, shot, loader, resume, say):
@@ -174,11 +174,12 @@ def _entries(
     A frame that cannot be written is left out; two of them in a row end the work.
     """
     lenders, movement, fails = Lenders(say), Movement(), False
-    for number, own, beside in slide(shot, loader.load):
+    for found in Window(shot, loader.load):
+        number, own = found.number, found.own
         # another machine may have been quicker
-        if resume and files.is_done(number, shot.lenders(number)):
+        if resume and files.is_done(number, shot.neighbours(number)):
             continue
-        others = lenders.of(number, own, beside)
+        others = lenders.of(number, own, found.neighbours)
         finished = finish_frame(
             own.stored, others, denoiser, movement, region=own.inner
         )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..temporal.accumulate import Accumulated, accumulate
-from ..temporal.neighbours import box, extreme
+from ..temporal.neighbours import box
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 
 # Samples lent for each of the frame's own, from which on the shot's picture counts in
-# full, and how many must be lent in all: few samples tell little of what is right. What
-# is least in 3x3 pixels decides, and changes softly.
+# full, and how many must be lent in all: few samples tell little of what is right. The
+# mean of 3x3 pixels decides: that single pixels have few is what denoisers are good at.
 _ENOUGH, _IN_ALL = 1.0, 3.0
 _SMOOTH = 3  # pixels across
 
@@ -91,8 +91,7 @@ def _share(gathered: Accumulated, alone: Accumulated, samples: float) -> Array:
     with np.errstate(divide="ignore", invalid="ignore"):  # where the frame has none
         lent = gathered.samples / alone.samples - np.float32(1.0)
     lent = np.where(alone.samples > 0.0, np.clip(lent / enough, 0.0, 1.0), 1.0)
-    least = extreme(lent.astype(np.float32), np.fmin)
-    return np.clip(box(least, _SMOOTH), 0.0, 1.0)
+    return np.clip(box(lent.astype(np.float32), _SMOOTH), 0.0, 1.0)
 
 
 def _is_even(share: Array) -> bool:

@@ -20,6 +20,10 @@ TILE = 2  # pixels across: light is compared tile by tile
 REACH = 11  # pixels to each side of one that have a say in it
 _AREAS = (1, 2, 4, 8)  # tiles across: light is averaged before it is compared
 _NEAR = 3  # tiles across, over which variances are averaged
+# How often chance is counted against what varies beyond it. The variance of nine frames
+# is off by a third, and that must not cost what they add; what does change is many
+# times the noise of an area.
+_CHANCE = 10.0
 _TINY = np.float32(1e-9)
 
 
@@ -81,6 +85,7 @@ class _Sums:
         free = np.maximum(_pooled(free, _NEAR), _TINY)
         variance = np.maximum(_pooled(varies - chance, _NEAR) / free, np.float32(0.0))
         chance = np.maximum(_pooled(chance, _NEAR) / free, np.float32(0.0))
+        chance *= np.float32(_CHANCE)
         return np.asarray(np.square(variance) / (variance + chance + _TINY))
 
 

@@ -1,7 +1,7 @@
-"""Which frames lend to which, in what order they are needed, and what they cost.
+"""Which frames are neighbours, in what order they are needed, and what they cost.
 
-A frame takes samples from those up to `radius` frames before and after it, within
-one cut of the shot; at the ends it takes what there is. Frames go by in order: each is
+A frame takes samples from those up to `radius` frames before and after it, between two
+cuts of the shot; at the ends it takes what there is. Frames go by in order: each is
 loaded once, kept while a frame to come needs it, and finished when its last neighbour
 is there.
 """
@@ -11,14 +11,14 @@ from __future__ import annotations
 from bisect import bisect_left
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 from ..errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-Kept = TypeVar("Kept")
+Loaded = TypeVar("Loaded")
 
 # Of albedo and normal, in half floats, and nearness; then of radiance and its noise, a
 # Vector pass and an alpha, in half floats.
@@ -28,28 +28,28 @@ _LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES = 12, 8, 2
 
 @dataclass(frozen=True)
 class Shot:
-    """The frames of a shot in order of time, and how far they lend to each other.
+    """The frames of a shot in order of time, and how far neighbours reach.
 
     `frames` are frame numbers, those that are to be finished; `radius` counts in
-    them, so that a shot rendered in steps lends as far. `cuts` are the frames that
-    begin something new: nothing is lent across. `lending` are frames that only lend,
+    them, so that a shot rendered in steps reaches as far. `cuts` are the frames that
+    begin something new: no frame has neighbours across. `others` are neighbours alone,
     as those that another machine finishes. Raises UsageError for what cannot be.
     """
 
     frames: tuple[int, ...]
     radius: int
     cuts: frozenset[int] = frozenset()
-    lending: tuple[int, ...] = ()
+    others: tuple[int, ...] = ()
     order: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         if self.radius < 0:
             raise UsageError(f"temporal radius {self.radius}: give 0 or more frames")
-        order = tuple(sorted({*self.frames, *self.lending}))
+        order = tuple(sorted({*self.frames, *self.others}))
         object.__setattr__(self, "order", order)
 
-    def lenders(self, frame: int) -> tuple[int, ...]:
-        """Return the frames that lend to `frame`, the nearest ones first."""
+    def neighbours(self, frame: int) -> tuple[int, ...]:
+        """Return the neighbour frames of `frame`, the nearest ones first."""
         place = bisect_left(self.order, frame)
         around = self.order[max(0, place - self.radius) : place + self.radius + 1]
         take = self._take(frame)
@@ -61,10 +61,11 @@ class Shot:
         )
 
     def is_between(self, frame: int) -> bool:
-        """Return whether it lies between two lenders that themselves do not."""
+        """Return whether it lies between two neighbours that themselves do not."""
         place = bisect_left(self.order, frame)
         beside = {*self.order[place - 1 : place], *self.order[place + 1 : place + 2]}
-        return place % 2 == 1 and len(beside) == 2 and beside <= {*self.lenders(frame)}
+        found = {*self.neighbours(frame)}
+        return place % 2 == 1 and len(beside) == 2 and beside <= found
 
     def _take(self, frame: int) -> int:
         """Return between which cuts a frame lies."""
@@ -82,29 +83,71 @@ def place_of(frame: int, frames: Sequence[int]) -> int:
     return frame // max(steps, default=1) if len(steps) < 2 else order.index(frame)
 
 
-def slide(
-    shot: Shot, load: Callable[[int], Kept | None]
-) -> Iterator[tuple[int, Kept, dict[int, Kept]]]:
-    """Yield (number, frame, lenders by number) for each frame of a shot, in order.
+@dataclass(frozen=True)
+class Neighbourhood(Generic[Loaded]):
+    """A frame of a shot and the neighbour frames whose samples it takes, by number."""
+
+    number: int
+    own: Loaded
+    neighbours: dict[int, Loaded]
+
+
+class Window(Generic[Loaded]):
+    """The part of a shot that is in memory, moved along from frame to frame.
 
     `load` gives one frame and is called once for each, in order, and not before it is
-    needed; None where a frame is missing or damaged: it lends nothing and is left out.
-    At most a frame and its lenders are kept; what is yielded is dropped when the next
-    one is asked for.
+    needed; None where a frame is missing or damaged: it is left out, and is nobody's
+    neighbour. Of the frames at most one and its neighbours are kept.
     """
-    kept: dict[int, Kept | None] = {}
-    for number in sorted(set(shot.frames)):
-        lenders = shot.lenders(number)
-        needed = sorted((number, *lenders))
-        for old in [x for x in kept if x < needed[0]]:
-            del kept[old]
-        for new in needed:
-            if new not in kept:
-                kept[new] = load(new)
-        frame = kept[number]
-        if frame is not None:
-            there = {x: kept[x] for x in lenders}
-            yield number, frame, {x: y for x, y in there.items() if y is not None}
+
+    def __init__(self, shot: Shot, load: Callable[[int], Loaded | None]) -> None:
+        self.shot = shot
+        self._load = load
+        self._loaded: dict[int, Loaded | None] = {}
+
+    @property
+    def newest(self) -> int | None:
+        """The last frame that is in memory."""
+        return max(self._loaded, default=None)
+
+    def missing(self, number: int) -> list[int]:
+        """Return what is to be loaded for the neighbourhood of a frame, in order."""
+        needed = (number, *self.shot.neighbours(number))
+        return sorted(x for x in needed if x not in self._loaded)
+
+    def neighbourhood(self, number: int) -> Neighbourhood[Loaded] | None:
+        """Return a frame and its neighbours; None where the frame itself is missing."""
+        numbers = self.shot.neighbours(number)
+        first = min(number, *numbers, number)
+        for old in [x for x in self._loaded if x < first]:
+            del self._loaded[old]
+        for new in self.missing(number):
+            self._loaded[new] = self._load(new)
+        own = self._loaded[number]
+        if own is None:
+            return None
+        found = {x: self._loaded[x] for x in numbers}
+        neighbours = {x: frame for x, frame in found.items() if frame is not None}
+        return Neighbourhood(number, own, neighbours)
+
+    def get(self, number: int) -> Loaded | None:
+        """Return a frame if it is in memory."""
+        return self._loaded.get(number)
+
+    def replace(self, number: int, frame: Loaded) -> None:
+        """Keep another in the place of a frame."""
+        self._loaded[number] = frame
+
+    def __iter__(self) -> Iterator[Neighbourhood[Loaded]]:
+        """Yield the neighbourhood of each frame of the shot that is there, in order.
+
+        What is yielded is dropped when the next one is asked for.
+        """
+        for number in sorted(set(self.shot.frames)):
+            found = self.neighbourhood(number)
+            if found is not None:
+                yield found
+            del found
 
 
 def bytes_needed(

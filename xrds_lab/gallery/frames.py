@@ -138,13 +138,10 @@ class Store:
         """Write noisy frames."""
         self._write(request, packing.pack(frames))
 
-    def keep_reference(self, request: Request, frame: Frame) -> None:
-        """Write a reference, in half floats."""
-        assert frame.radiance is not None
-        alpha = np.ones(frame.shape) if frame.alpha is None else frame.alpha
-        picture = np.dstack((frame.radiance, alpha))
-        np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
-        self._write(request, {"picture": picture.astype(np.float16)})
+    def keep_reference(self, request: Request, picture: Array) -> None:
+        """Write a reference (H, W, 4), in half floats."""
+        cut = np.clip(picture, -LARGEST_HALF, LARGEST_HALF)
+        self._write(request, {"picture": cut.astype(np.float16)})
 
     def _write(self, request: Request, arrays: dict[str, Array]) -> None:
         path = self.directory / request.file_name

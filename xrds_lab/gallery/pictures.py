@@ -18,14 +18,13 @@ from typing import Any
 import numpy as np
 
 import xrds_core
-from xrds_blender.frame.denoisers import load_denoiser
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.shot import finishing
+from xrds_blender.shot import full_size
+from xrds_blender.shot.full_size import FullSize
 from xrds_core.arrays import Array
 from xrds_core.atomic import write_json
 from xrds_core.metrics import to_srgb
 from xrds_core.temporal.frame import Frame, Stored, store
-from xrds_core.temporal.vectors import Movement
 from xrds_core.temporal.window import Shot as Window
 
 from ..checksum import checksum
@@ -47,13 +46,11 @@ class Clip:
     ) -> None:
         self.shot = shot
         count = None if shot.adaptive else samples
-        self.job = RenderJob(
-            scale=1, samples=count, temporal_radius=REACH, device="cpu"
-        )
+        job = RenderJob(scale=1, samples=count, temporal_radius=REACH, device="cpu")
+        self._method = FullSize(job)
         self.frames = frames
         self.view = next(iter(frames[shot.frames[0]]))
         self._stored: dict[int, dict[str, Stored]] = {}
-        self._movement = Movement()
 
     def alone(self, number: int) -> Array:
         """A frame by itself, radiance and alpha (H, W, 4)."""
@@ -61,7 +58,7 @@ class Clip:
 
     def lent(self, number: int) -> Array:
         """A frame with its neighbours' samples, and those of its other views."""
-        numbers = Window(self.shot.frames, REACH).lenders(number)
+        numbers = Window(self.shot.frames, REACH).neighbours(number)
         lenders = [self._packed(n)[self.view] for n in numbers]
         own = self._packed(number)
         beside = [each for name, each in own.items() if name != self.view]
@@ -69,9 +66,7 @@ class Clip:
 
     def _finish(self, number: int, lenders: Sequence[Stored]) -> Array:
         own = self._packed(number)[self.view]
-        made = finishing.finish(
-            own, lenders, self.job, load_denoiser(self.job), self._movement
-        )
+        made = self._method.finish_stored(own, lenders)
         return np.dstack((made.radiance, made.alpha))
 
     def _packed(self, number: int) -> dict[str, Stored]:
@@ -230,7 +225,7 @@ def _code() -> str:
     package = Path(xrds_core.__file__).parent
     parts = ("temporal", "denoising", "sequence")
     sources = [path for part in parts for path in package.glob(f"{part}/*.py")]
-    return checksum([*sources, Path(finishing.__file__)], GENERATION)
+    return checksum([*sources, Path(full_size.__file__)], GENERATION)
 
 
 def _stored(path: Path) -> dict[str, Point]:

@@ -64,21 +64,20 @@ def _render(scene: Any, request: Request, store: Store) -> None:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
     from xrds_blender.frame.job import RenderJob
     from xrds_blender.frame.rendering import call_engine
-    from xrds_blender.shot.sampling import noisy_frame
+    from xrds_blender.shot.sampling import noisy_frame, sample_frame
 
-    shot, job, place = SHOTS[request.shot], RenderJob(scale=1), None
-    if request.kind == NOISY:
-        samples = None if shot.adaptive else request.samples
-        job = RenderJob(scale=1, samples=samples, temporal_radius=REACH)
-        place = shot.frames.index(request.number)
-        scene.cycles.samples = request.samples
-    else:
+    if request.kind != NOISY:
         job = RenderJob(scale=1, samples=request.samples, seed=request.seed)
+        alone = call_engine(scene, lambda *given: sample_frame(*given, job))
+        store.keep_reference(request, next(iter(alone.views.values())).picture)
+        return
+    shot = SHOTS[request.shot]
+    samples = None if shot.adaptive else request.samples
+    job = RenderJob(scale=1, samples=samples, temporal_radius=REACH)
+    place = shot.frames.index(request.number)
+    scene.cycles.samples = request.samples
     frames, _ = call_engine(scene, lambda *given: noisy_frame(*given, job, place))
-    if request.kind == NOISY:
-        store.keep_frames(request, frames)
-    else:
-        store.keep_reference(request, next(iter(frames.values())))
+    store.keep_frames(request, frames)
 
 
 def _end_with_parent() -> None:

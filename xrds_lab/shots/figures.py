@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import xrds_core
-from xrds_blender.frame.denoisers import load_denoiser
 from xrds_blender.frame.job import RenderJob
-from xrds_blender.shot import finishing
+from xrds_blender.shot import full_size
+from xrds_blender.shot.full_size import FullSize
 from xrds_core.atomic import write_json
 from xrds_core.metrics import all_metrics, to_srgb
 from xrds_core.temporal.frame import Stored, store
-from xrds_core.temporal.vectors import Movement
 from xrds_core.temporal.window import Shot
 
 from ..checksum import checksum
@@ -61,18 +60,23 @@ class Clip:
         self.samples = samples
         self.frames: dict[int, Frame] = {n: frames.frame(r) for n, r in wanted.items()}
         self._stored: dict[int, Stored] = {}
-        self._movement = Movement()
+        self._methods: dict[int, FullSize] = {}
 
     def xrds(self, number: int, radius: int) -> Array:
         """A frame as `xrds render` finishes it, (H, W, 3)."""
-        job = RenderJob(
-            scale=1, samples=self.samples, temporal_radius=radius, device="cpu"
-        )
-        numbers = Shot(tuple(self.frames), radius).lenders(number)
+        numbers = Shot(tuple(self.frames), radius).neighbours(number)
         lenders = [self._packed(n) for n in numbers]
         own = self._packed(number)
-        made = finishing.finish(own, lenders, job, load_denoiser(job), self._movement)
-        return made.radiance
+        return self._method(radius).finish_stored(own, lenders).radiance
+
+    def _method(self, radius: int) -> FullSize:
+        if radius not in self._methods:
+            self._methods[radius] = FullSize(
+                RenderJob(
+                    scale=1, samples=self.samples, temporal_radius=radius, device="cpu"
+                )
+            )
+        return self._methods[radius]
 
     def _packed(self, number: int) -> Stored:
         if number not in self._stored:
@@ -235,7 +239,7 @@ def _code(is_ours: bool) -> str:
         package = Path(xrds_core.__file__).parent
         parts = ("temporal", "denoising", "sequence")
         sources = [path for part in parts for path in package.glob(f"{part}/*.py")]
-        sources.append(Path(finishing.__file__))
+        sources.append(Path(full_size.__file__))
     return checksum(sources, GENERATION)
 
 

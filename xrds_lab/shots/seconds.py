@@ -97,16 +97,14 @@ def _finished(
     sampled: Mapping[int, Stored], job: RenderJob, rounds: int
 ) -> dict[str, float]:
     """Seconds of the middle frame's accumulation and denoising."""
-    from xrds_blender.frame.denoisers import load_denoiser
-    from xrds_blender.shot.finishing import finish
-    from xrds_core.temporal.vectors import Movement
+    from xrds_blender.shot.full_size import FullSize
     from xrds_core.temporal.window import Shot as Window
 
-    numbers = Window(tuple(sampled), job.temporal_radius).lenders(MIDDLE)
+    numbers = Window(tuple(sampled), job.temporal_radius).neighbours(MIDDLE)
     own, lenders = sampled[MIDDLE], [sampled[number] for number in numbers]
-    denoiser, movement, runs = load_denoiser(job), Movement(), []
+    method, runs = FullSize(job), []
     for _ in range(rounds):
-        picture, clock = _clocked(lambda: finish(own, lenders, job, denoiser, movement))
+        picture, clock = _clocked(lambda: method.finish_stored(own, lenders))
         runs.append({**picture.seconds, **clock})
     return _median(runs)
 

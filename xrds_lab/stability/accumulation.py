@@ -119,16 +119,13 @@ def fisheye() -> Iterator[Measured]:
 
 def finished(frames: dict[int, Stored], number: int, radius: int) -> Array:
     """A frame (H, W, 3) as the product finishes it."""
-    from xrds_blender.frame.denoisers import load_denoiser
     from xrds_blender.frame.job import RenderJob
-    from xrds_blender.shot.finishing import finish
-    from xrds_core.temporal.vectors import Movement
+    from xrds_blender.shot.full_size import FullSize
     from xrds_core.temporal.window import Shot
 
     job = RenderJob(scale=1, samples=SAMPLES, temporal_radius=radius, device="cpu")
-    lenders = [frames[n] for n in Shot(tuple(frames), radius).lenders(number)]
-    picture = finish(frames[number], lenders, job, load_denoiser(job), Movement())
-    return picture.radiance
+    lenders = [frames[n] for n in Shot(tuple(frames), radius).neighbours(number)]
+    return FullSize(job).finish_stored(frames[number], lenders).radiance
 
 
 def _error(picture: Array, truth: Array, shown: float) -> Array:

@@ -11,8 +11,7 @@ from xrds_core.errors import PictureError
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Stored
 from xrds_core.temporal.judge import MARGIN
-from xrds_core.temporal.vectors import Movement
-from xrds_core.temporal.window import Shot, slide
+from xrds_core.temporal.window import Shot, Window
 
 from .accumulation import RADIUS, SAMPLES, film, finished
 from .load import growth, resident
@@ -100,9 +99,9 @@ def missing(frames: Frames) -> Iterator[Measured]:
     shot = Shot(tuple(frames), RADIUS)
     lost = _MIDDLE + 1
     wrong, number_of = 0, []
-    for number, own, lenders in slide(shot, lambda n: frames[n] if n != lost else None):
-        number_of.append(number)
-        result = accumulate(own, list(lenders.values()))
+    for found in Window(shot, lambda n: frames[n] if n != lost else None):
+        number_of.append(found.number)
+        result = accumulate(found.own, list(found.neighbours.values()))
         wrong += faults(np.maximum(result.radiance, 0.0))
     expected = [number for number in frames if number != lost]
     yield Measured("accumulation.missing.faults", float(wrong))
@@ -131,20 +130,19 @@ def crashes(frames: Frames) -> int:
 
 def long(frames: Frames) -> Measured:
     """Growth of memory in KiB per frame over a thousand frames, one after the other."""
-    from xrds_blender.frame.denoisers import load_denoiser
     from xrds_blender.frame.job import RenderJob
-    from xrds_blender.shot.finishing import finish
+    from xrds_blender.shot.full_size import FullSize
 
     originals = list(frames.values())
     job = RenderJob(scale=1, samples=SAMPLES, temporal_radius=RADIUS, device="cpu")
-    denoiser, movement, memory = load_denoiser(job), Movement(), []
+    method, memory = FullSize(job), []
 
     def load(number: int) -> Stored:
         frame = originals[number % len(originals)]
         return replace(frame, number=number, picture=frame.picture.copy())
 
-    for _, own, lenders in slide(Shot(tuple(range(LONG)), RADIUS), load):
-        finish(own, list(lenders.values()), job, denoiser, movement)
+    for found in Window(Shot(tuple(range(LONG)), RADIUS), load):
+        method.finish_stored(found.own, list(found.neighbours.values()))
         memory.append(resident() / 2**10)
     late = memory[len(memory) // 3 :: 4]
     above = {float(i): value - late[0] for i, value in enumerate(late)}
@@ -153,5 +151,5 @@ def long(frames: Frames) -> Measured:
 
 def gathered(frames: Frames) -> Accumulated:
     """The middle frame with its neighbours' samples, before it is denoised."""
-    others = [frames[n] for n in Shot(tuple(frames), RADIUS).lenders(_MIDDLE)]
+    others = [frames[n] for n in Shot(tuple(frames), RADIUS).neighbours(_MIDDLE)]
     return accumulate(frames[_MIDDLE], others)

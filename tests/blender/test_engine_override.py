@@ -10,8 +10,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.frame import engine_loan
-from xrds_blender.shot import animation
+from xrds_blender.internals import engine_override
+from xrds_blender.internals.lifetimes import PROCESS
+from xrds_blender.shot import render
 from xrds_core.errors import SceneError
 
 
@@ -19,13 +20,13 @@ from xrds_core.errors import SceneError
 def renders(life: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The engine that the scene has during each render by XRDS."""
     seen: list[str] = []
-    real = animation.render_frame
+    real = render.render_frame
 
     def render_frame(*arguments: Any) -> Any:
         seen.append(life.render.engine)
         return real(*arguments)
 
-    monkeypatch.setattr(animation, "render_frame", render_frame)
+    monkeypatch.setattr(render, "render_frame", render_frame)
     life.xrds.way = "full_size"
     return seen
 
@@ -83,8 +84,8 @@ def test_a_render_that_does_not_begin_lends_nothing(
     life: Any, renders: list[str]
 ) -> None:
     life.render.engine, life.camera = "CYCLES", None
-    engine_loan.lend(life)
-    engine_loan.withdraw()
+    engine_override.begin(life)
+    engine_override.withdraw()
     life.camera = bpy.data.objects["Camera"]
     bpy.ops.render.render()
     assert not renders
@@ -92,15 +93,16 @@ def test_a_render_that_does_not_begin_lends_nothing(
 
 @pytest.fixture
 def unknown_place() -> Iterator[None]:
-    usual, engine_loan._offset = engine_loan._offset, 0
+    override = PROCESS.of(engine_override.Override)
+    usual, override.offset = override.offset, 0
     yield
-    engine_loan._offset = usual
+    override.offset = usual
 
 
 def test_an_unknown_blender_is_told(life: Any, unknown_place: None) -> None:
     life.render.engine = "CYCLES"
     with pytest.raises(SceneError, match="keeps the name of a scene's render engine"):
-        engine_loan.lend(life)
+        engine_override.begin(life)
     with pytest.raises(RuntimeError, match="choose the engine XRDS instead"):
         bpy.ops.xrds.render()
     assert life.render.engine == "CYCLES"

@@ -13,36 +13,44 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
-from ..frame.job import ENGINE
+from ..internals.engine_override import ENGINE
+from ..internals.lifetimes import PROCESS
 
 _PATIENT = 5.0  # seconds; far longer than any drawing takes
-_usual: float | None = None
+
+
+@dataclass
+class _Guard:
+    """The usual seconds between switches of threads, while they are others."""
+
+    usual: float | None = None
 
 
 @bpy.app.handlers.persistent
 def _begin(scene: Any, *_: Any) -> None:
-    global _usual
-    if scene is not None and scene.render.engine == ENGINE and _usual is None:
-        _usual = sys.getswitchinterval()
+    guard = PROCESS.of(_Guard)
+    if scene is not None and scene.render.engine == ENGINE and guard.usual is None:
+        guard.usual = sys.getswitchinterval()
         sys.setswitchinterval(_PATIENT)
 
 
 @bpy.app.handlers.persistent
 def _end(*_: Any) -> None:
-    global _usual
-    if _usual is not None:
-        sys.setswitchinterval(_usual)
-        _usual = None
+    guard = PROCESS.of(_Guard)
+    if guard.usual is not None:
+        sys.setswitchinterval(guard.usual)
+        guard.usual = None
 
 
 @contextmanager
 def shared() -> Iterator[None]:
     """Let threads take turns as usual inside the engine's work."""
-    usual = _usual
+    usual = PROCESS.of(_Guard).usual
     if usual is not None:
         sys.setswitchinterval(usual)
     try:

@@ -11,70 +11,78 @@ it.
 from __future__ import annotations
 
 import ctypes
+from dataclasses import dataclass
 from typing import Any
 
 import bpy
 
 from xrds_core.errors import SceneError
 
-from .job import ENGINE
+from .lifetimes import PROCESS
+
+ENGINE = "XRDS"
+"""Blender's name for the render engine."""
 
 _NAME_SIZE = 32  # bytes that Blender keeps for the name
 _MOST = 1 << 16  # bytes of the render settings, far more than they are
 
-_offset: int | None = None
-"""Where the name lies in the render settings; the same in every scene."""
-_waiting: Any = None
-"""The scene whose next render is to be ours."""
-_lent: tuple[Any, bytes] | None = None
-"""The scene that bears our name now, and the bytes of its own."""
-_last: Any = None
-"""The scene of the render that goes on."""
+
+@dataclass
+class Override:
+    """Which scene is, or will be, rendered by XRDS in the place of its own engine.
+
+    `offset` is where the name lies in the render settings, the same in every scene.
+    `waiting` is the scene whose next render is to be ours; `named` the one that bears
+    our name now, with the bytes of its own; `last` that of the render that goes on.
+    """
+
+    offset: int | None = None
+    waiting: Any = None
+    named: tuple[Any, bytes] | None = None
+    last: Any = None
 
 
-def lend(scene: Any) -> None:
+def begin(scene: Any) -> None:
     """Let the render of `scene` that is started next be by XRDS.
 
     To be called on the main thread. Raises SceneError where this Blender keeps the
     name in an unknown way; nothing is changed then.
     """
-    global _waiting
     if scene.render.engine != ENGINE:
         _find(scene.render)
         _free_kept_engine(scene)
-        _waiting = scene
+        PROCESS.of(Override).waiting = scene
 
 
 def withdraw() -> None:
     """The render has ended, or none has begun: the next one is not to be ours."""
-    global _waiting
-    _waiting = None
+    PROCESS.of(Override).waiting = None
 
 
 @bpy.app.handlers.persistent
 def _before_copy(scene: Any, *_: Any) -> None:
-    global _lent, _last, _waiting
-    if _waiting is not None and scene == _waiting:
+    state = PROCESS.of(Override)
+    if state.waiting is not None and scene == state.waiting:
         address = _find(scene.render)
-        _lent = scene, ctypes.string_at(address, _NAME_SIZE)
-        _last, _waiting = scene, None
+        state.named = scene, ctypes.string_at(address, _NAME_SIZE)
+        state.last, state.waiting = scene, None
         ctypes.memmove(address, _padded(ENGINE), _NAME_SIZE)
 
 
 @bpy.app.handlers.persistent
 def _after_copy(*_: Any) -> None:
-    global _lent
-    if _lent is not None:
-        (scene, own), _lent = _lent, None
+    state = PROCESS.of(Override)
+    if state.named is not None:
+        (scene, own), state.named = state.named, None
         ctypes.memmove(_find(scene.render), own, _NAME_SIZE)
 
 
 @bpy.app.handlers.persistent
 def _at_end(*_: Any) -> None:
-    global _last
     _after_copy()  # where nothing could be rendered it has not been called
-    if _last is not None:
-        scene, _last = _last, None
+    state = PROCESS.of(Override)
+    if state.last is not None:
+        scene, state.last = state.last, None
         _free_kept_engine(scene)
 
 
@@ -90,16 +98,16 @@ def _free_kept_engine(scene: Any) -> None:
 
 def _find(render: Any) -> int:
     """The address of the engine's name in render settings; raises SceneError."""
-    global _offset
-    base = render.as_pointer()
-    if _offset is None:
-        _offset = _look_for(render)
-    if _offset is None or ctypes.string_at(base + _offset) != render.engine.encode():
+    state, base = PROCESS.of(Override), render.as_pointer()
+    if state.offset is None:
+        state.offset = _look_for(render)
+    at = state.offset
+    if at is None or ctypes.string_at(base + at) != render.engine.encode():
         raise SceneError(
             f"Blender {bpy.app.version_string} keeps the name of a scene's render "
             "engine in a way that XRDS does not know; choose the engine XRDS instead"
         )
-    return base + _offset
+    return base + at
 
 
 def _look_for(render: Any) -> int | None:

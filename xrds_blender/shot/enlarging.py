@@ -12,8 +12,8 @@ from xrds_core.errors import OutOfMemory, WeightsError
 
 from ..cycles.colour import converted, to_rec709, working_space
 from ..cycles.rendered import Beauty, Guides
-from .cover import cover
-from .job import NetworkFailed, RenderJob
+from ..frame.cover import cover
+from ..frame.job import NetworkFailed, RenderJob
 
 if TYPE_CHECKING:
     from xrds_core import Upscaled, Upscaler
@@ -80,15 +80,28 @@ def enlarged_lights(
     shape: tuple[int, ...],
 ) -> dict[str, Array]:
     """Low-resolution light passes (h, w, channels) on the picture's (H, W, ...)."""
-    return {name: bilinear(low, scale, offset, shape) for name, low in lights.items()}
+    return {name: _bilinear(low, scale, offset, shape) for name, low in lights.items()}
 
 
-def bilinear(
+def enlarged(
+    beauties: dict[str, Beauty], scale: int, size: tuple[int, int]
+) -> dict[str, Array]:
+    """By view, the radiance and alpha of a region of `size` (H, W) without a network.
+
+    They are (H, W, 4).
+    """
+    return {
+        view: _bilinear(np.dstack((low.radiance, low.alpha)), scale, low.offset, size)
+        for view, low in beauties.items()
+    }
+
+
+def _bilinear(
     low: Array, scale: int, offset: tuple[int, int], shape: tuple[int, ...]
 ) -> Array:
     """Enlarge (h, w, channels) without a network and cut the region out."""
-    from xrds_core.baselines import bilinear as enlarged
+    from xrds_core.baselines import bilinear
 
     rows, columns = offset
-    large = enlarged(low, scale)
+    large = bilinear(low, scale)
     return large[rows : rows + shape[0], columns : columns + shape[1]]

@@ -9,17 +9,13 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from xrds_core.arrays import Array
-
 from ..cycles import session
 from ..cycles.low_samples import LowSamples
 from ..cycles.rendered import Beauty
 from ..cycles.samples import samples_in
-from .denoisers import in_process, load_denoiser
-from .enlarging import bilinear
-from .job import RenderJob
+from ..frame.denoisers import in_process, load_denoiser
+from ..frame.job import RenderJob
+from .enlarging import enlarged
 
 
 def keep_samples(engine: Any, layer_name: str, job: RenderJob) -> None:
@@ -65,19 +61,6 @@ def keep_beauties(
         size = result.resolution_y, result.resolution_x
         pictures = enlarged(beauties, job.scale, size)
         session.write_combined(engine, layer_name, pictures)
-
-
-def enlarged(
-    beauties: dict[str, Beauty], scale: int, size: tuple[int, int]
-) -> dict[str, Array]:
-    """By view, the radiance and alpha of a region of `size` (H, W) without a network.
-
-    They are (H, W, 4).
-    """
-    return {
-        view: bilinear(np.dstack((low.radiance, low.alpha)), scale, low.offset, size)
-        for view, low in beauties.items()
-    }
 
 
 def quick(job: RenderJob) -> RenderJob:

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ..cycles.passes import CyclesPasses
+from ..frame.facts import find_facts
+from ..frame.job import RenderJob
+from ..frame.rendering import call_engine
 from ..planning.lending import lending
 from ..scene.cuts import cuts
-from .facts import find_facts
-from .job import RenderJob
-from .lending import can_lend
-from .picking import Pick, pick, picked_decisions
-from .rendering import call_engine
+from .choosing import ChosenJob, chosen
+from .sampling import has_neighbours
 
 
 def explain(
@@ -32,27 +31,20 @@ def explain(
     shot = frames or range(scene.frame_start, scene.frame_end + 1)
 
     def look(engine: Any, depsgraph: Any) -> dict[str, Any]:
-        if not job.is_picked:
-            return _told(depsgraph, job, scene, shot)
-        lends = len(shot) > 1 and can_lend(scene, job)
-        with CyclesPasses(engine, depsgraph) as passes:
-            picked = pick(passes, job, start, shot=lends)
-            return _told(depsgraph, picked.job, scene, shot, picked)
+        is_shot = len(shot) > 1 and has_neighbours(scene, job)
+        with chosen(engine, depsgraph, job, start, is_shot) as found:
+            return _told(depsgraph, found, scene, shot)
 
     return call_engine(scene, look)
 
 
 def _told(
-    depsgraph: Any,
-    job: RenderJob,
-    scene: Any,
-    shot: Sequence[int],
-    picked: Pick | None = None,
+    depsgraph: Any, choice: ChosenJob, scene: Any, shot: Sequence[int]
 ) -> dict[str, Any]:
+    job = choice.job
     facts = find_facts(depsgraph, job)
     decisions = job.plan(facts).decisions
     if job.temporal_radius and len(shot) > 1:
         decisions += lending(facts, job.temporal_radius, cuts(scene, shot))
-    if picked is not None:
-        decisions = picked_decisions(picked, decisions)
+    decisions = choice.all_decisions(decisions)
     return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}

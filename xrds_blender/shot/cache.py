@@ -1,4 +1,4 @@
-"""Samples of frames that are kept in a folder, so that no frame is rendered twice.
+"""Samples of frames, cached in a folder, so that no frame is rendered twice.
 
 Each frame is a file of its own, in the form that `xrds denoise` reads. Any number of
 processes and machines may fill one folder, in any order.
@@ -22,7 +22,6 @@ from xrds_core.sequence.reading import Reading, read_frame
 from xrds_core.temporal.frame import Frame, Stored
 
 from ..cycles.size import picture_size
-from ..frame import progress
 from ..frame.job import RenderJob
 from .sampling import Sampled
 
@@ -30,10 +29,10 @@ _FORM = 2  # counts up where samples of the same settings become others
 
 
 @dataclass(frozen=True)
-class Keeper:
-    """A folder of kept samples of one file and one set of settings.
+class SampleCache:
+    """A folder of samples of one file and one set of settings.
 
-    `say` takes a line about kept samples that cannot be used; `rendered` are the frames
+    `say` takes a line about samples that cannot be used; `rendered` are the frames
     that were written. Of a stereo pair each view has a file of its own.
     """
 
@@ -61,7 +60,7 @@ class Keeper:
             self.rendered.add(frame.number)
 
     def read(self, number: int) -> Sampled | None:
-        """Return a frame that is kept whole and of these settings; else None."""
+        """Return a frame that is there whole and of these settings; else None."""
         views = {}
         for view in self.views:
             path = self._path(number, view)
@@ -79,10 +78,10 @@ class Keeper:
                 )
                 return None
             views[view] = _with_alpha(kept.stored)
-        return Sampled(views, dict.fromkeys(progress.STAGES, 0.0))
+        return Sampled(number, views, {})
 
     def beside(self, numbers: Sequence[int], radius: int) -> list[int]:
-        """Return kept frames before the first and after the last, that could lend."""
+        """Return cached frames beyond the ends of these, near enough for them."""
         first, last = min(numbers), max(numbers)
         there = frame_numbers(self._pattern(self.views[0]))
         return [
@@ -96,10 +95,10 @@ class Keeper:
         return str(self.folder / (f"####_{view}.exr" if view else "####.exr"))
 
 
-def keeper_of(
+def cache_of(
     scene: Any, job: RenderJob, folder: Path, say: Callable[[str], object]
-) -> Keeper:
-    """Make the keeper of an open file's samples, and its folder.
+) -> SampleCache:
+    """Make the cache of an open file's samples, and its folder.
 
     Raises PictureError where the folder takes no files.
     """
@@ -108,7 +107,7 @@ def keeper_of(
     views: tuple[str, ...] = ("",)
     if scene.render.use_multiview:
         views = tuple(view.name for view in scene.render.views if view.use)
-    return Keeper(
+    return SampleCache(
         folder,
         Origin(_key(scene, job, layer), layer, job.temporal_radius),
         views,

@@ -1,0 +1,153 @@
+"""The frames of an animation, sampled by the engine inside the render of one of them.
+
+Blender asks for one frame after the other. Inside the render of a frame its neighbours
+are evaluated and sampled too, those ahead as well; none is sampled twice.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from xrds_core.arrays import Array
+from xrds_core.temporal.window import Neighbourhood, Shot, Window
+
+from ..cycles import session
+from ..cycles.passes import CyclesPasses
+from ..frame import progress
+from ..scene.cuts import cuts
+from ..scene.facts import requested_passes
+from .methods import Method
+from .sampling import Sampled, can_continue, first_sample
+from .visiting import go_to
+
+_Passes = dict[tuple[str, str], Array]
+# Passes that the first sample of a sequence writes alone, and the layer's switches.
+_OF_ONE_SAMPLE = {
+    "z": {"Depth"},
+    "position": {"Position"},
+    "object_index": {"IndexOB", "Object Index"},
+    "material_index": {"IndexMA", "Material Index"},
+}
+
+
+@dataclass(frozen=True)
+class _Call:
+    """One call of `RenderEngine.render()`, and the passes of its layer.
+
+    It is for a frame's `number`; `last` is the last frame that is sampled in it.
+    """
+
+    engine: Any
+    depsgraph: Any
+    passes: CyclesPasses
+    number: int
+    last: int | None
+
+
+@dataclass
+class EngineFrames:
+    """The frames of one view layer of an animation, for one render job.
+
+    `ahead` are Cycles' own passes of frames that were sampled before their turn.
+    `count` is how many were sampled since `began`.
+    """
+
+    method: Method
+    window: Window[Sampled] = field(init=False)
+    ahead: dict[int, _Passes] = field(default_factory=dict)
+    began: float = field(default_factory=time.perf_counter)
+    count: int = 0
+    _call: _Call | None = None
+
+    @classmethod
+    def of(cls, scene: Any, method: Method) -> EngineFrames:
+        """The frames of a scene's range."""
+        found = cls(method)
+        numbers = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
+        radius, begins = method.job.temporal_radius, cuts(scene, numbers)
+        found.window = Window(Shot(tuple(numbers), radius, begins), found._load)
+        return found
+
+    def neighbourhood(self, engine: Any, depsgraph: Any) -> Neighbourhood[Sampled]:
+        """The frame that Blender asks for, with its neighbours.
+
+        The render result then holds the frame's own passes.
+        """
+        number = depsgraph.scene_eval.frame_current
+        self._show(depsgraph.scene_eval)
+        for old in [n for n in self.ahead if n < number]:
+            del self.ahead[old]
+        missing = self.window.missing(number)
+        if not missing:
+            session.allocate(engine)
+        with CyclesPasses(engine, depsgraph) as passes:
+            last = missing[-1] if missing else None
+            self._call = _Call(engine, depsgraph, passes, number, last)
+            try:
+                return self._whole(number)
+            finally:
+                self._call = None
+                go_to(engine, depsgraph, number)
+                if number in self.ahead:
+                    passes.put_back(self.ahead.pop(number))
+
+    def _whole(self, number: int) -> Neighbourhood[Sampled]:
+        """A frame with its neighbours, sampled again where these lack what it lacks."""
+        call, found = self._call, self.window.neighbourhood(number)
+        assert call is not None
+        assert found is not None
+        if not self.method.lacks(found.own, list(found.neighbours.values())):
+            return found
+        go_to(call.engine, call.depsgraph, number)
+        self.ahead.pop(number, None)  # its own passes are rendered now
+        own = self._sample(between=False)
+        self.window.replace(number, own)
+        return replace(found, own=own)
+
+    def _show(self, scene: Any) -> None:
+        """Show how far the animation is; frames ahead are sampled already."""
+        number, end, step = scene.frame_current, scene.frame_end, scene.frame_step
+        newest = self.window.newest
+        seconds = None
+        if self.count:
+            each = (time.perf_counter() - self.began) / self.count
+            last = number - step if newest is None else newest
+            seconds = each * ((end - last) // step + 1)
+        progress.begin_frame(number, (end - number) // step, seconds)
+
+    def _load(self, number: int) -> Sampled:
+        """Sample a frame, and keep its passes where others overwrite them."""
+        call = self._call
+        assert call is not None
+        go_to(call.engine, call.depsgraph, number)
+        sampled = self._sample(self.window.shot.is_between(number))
+        self.count += 1
+        if number >= call.number != call.last:
+            self.ahead[number] = call.passes.all_passes()
+        return sampled
+
+    def _sample(self, between: bool) -> Sampled:
+        """Sample the frame that the dependency graph is at.
+
+        Under a camera that stands still frames continue one sequence, as `place_of`
+        says. Passes that its first sample alone writes are then rendered by
+        themselves, for each frame: that nothing moves in them is seldom sure.
+        """
+        call = self._call
+        assert call is not None
+        engine, depsgraph, passes = call.engine, call.depsgraph, call.passes
+        scene = depsgraph.scene_eval
+        if not can_continue(scene, self.method.job):
+            return self.method.sample(engine, depsgraph, between=between)
+        place = scene.frame_current // scene.frame_step
+        sampled = self.method.sample(engine, depsgraph, place)
+        asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
+        if asked:
+            others = passes.all_passes()
+            first_sample(engine, depsgraph, self.method.job, place)
+            names = set().union(*(_OF_ONE_SAMPLE[each] for each in asked))
+            own = {k: x for k, x in passes.all_passes().items() if k[1] in names}
+            passes.put_back(others | own)
+        return sampled

@@ -1,0 +1,166 @@
+"""Cycles' samples at full size, denoised in this process; no network, no torch."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_core.arrays import Array
+from xrds_core.sequence.finishing import finish_frame
+from xrds_core.temporal.accumulate import Accumulated
+from xrds_core.temporal.vectors import Movement
+
+from ..cycles.samples import Samples
+from ..frame.denoisers import load_denoiser
+from ..frame.job import Picture, RenderJob, Temporal
+from ..frame.memory import peak_memory
+from ..planning.plan import Decision
+from .methods import Method, Report
+from .sampling import Keep, Sampled, sample_frame
+from .stopping import quick
+
+if TYPE_CHECKING:
+    from xrds_core.denoising import Denoised
+    from xrds_core.temporal.frame import Stored
+
+
+class FullSize(Method):
+    """Samples at full size, denoised.
+
+    `keep` takes each frame that is sampled. `denoise_in_time` gives the quality in the
+    place of the job's, once the samples of a still are there.
+    """
+
+    def __init__(
+        self,
+        job: RenderJob,
+        keep: Keep | None = None,
+        denoise_in_time: Callable[[], str] | None = None,
+    ) -> None:
+        super().__init__(job)
+        self._keep, self._denoise_in_time = keep, denoise_in_time
+        self._foreseen = job.denoise
+        self._denoiser = load_denoiser(job)
+        self._movement = Movement()
+
+    def sample(
+        self,
+        engine: Any,
+        depsgraph: Any,
+        place: int | None = None,
+        between: bool = False,
+    ) -> Sampled:
+        return sample_frame(engine, depsgraph, self.job, place, self._keep)
+
+    def begin_finishing(self, engine: Any) -> Report:
+        if self._denoise_in_time is not None:
+            self.job = replace(self.job, denoise=self._denoise_in_time())
+            self._denoiser = load_denoiser(self.job)
+        return super().begin_finishing(engine)
+
+    def finish(
+        self,
+        own: Sampled,
+        others: Sequence[Sampled],
+        view: str,
+        report: Report | None = None,
+    ) -> Picture:
+        frame = own.views[view]
+        if isinstance(frame, Samples):
+            return self._alone(frame, report)
+        neighbours = own.neighbours(view, others)
+        return self.finish_stored(frame, neighbours, report)
+
+    def finish_stored(
+        self, own: Stored, neighbours: Sequence[Stored], report: Report | None = None
+    ) -> Picture:
+        """The picture of a packed frame with the samples of its neighbours."""
+        finished = finish_frame(own, neighbours, self._denoiser, self._movement, report)
+        gathered = finished.gathered
+        return self._picture(
+            finished.denoised,
+            gathered.albedo,
+            gathered.normal,
+            finished.seconds,
+            decisions=(accumulation(gathered),),
+            temporal=temporal(self.job, gathered),
+        )
+
+    def _alone(self, samples: Samples, report: Report | None) -> Picture:
+        started = time.perf_counter()
+        denoised = self._denoiser(
+            samples.picture, samples.albedo, samples.normal, progress=report
+        )
+        seconds = {"denoise": time.perf_counter() - started}
+        decisions = in_time(self._foreseen, self.job.denoise)
+        return self._picture(
+            denoised, samples.albedo, samples.normal, seconds, decisions=decisions
+        )
+
+    def _picture(
+        self,
+        denoised: Denoised,
+        albedo: Array,
+        normal: Array,
+        seconds: dict[str, float],
+        *,
+        decisions: tuple[Decision, ...],
+        temporal: Temporal | None = None,
+    ) -> Picture:
+        return Picture.of(
+            denoised.radiance,
+            albedo=albedo,
+            normal=normal,
+            seconds=seconds,
+            plan=(*self.job.plan().decisions, *decisions, prefilter(denoised)),
+            peak_memory=peak_memory(),
+            device=self._denoiser.device,
+            job=self.job,
+            temporal=temporal,
+        )
+
+    def stopped(self, own: Sampled) -> dict[str, Array]:
+        alone = FullSize(quick(self.job))
+        pictures = {
+            view: alone.finish(_only(own, view), (), view) for view in own.views
+        }
+        return {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
+
+
+def _only(sampled: Sampled, view: str) -> Sampled:
+    """One view, without what the others would add to it."""
+    return replace(sampled, views={view: sampled.views[view]})
+
+
+def temporal(job: RenderJob, gathered: Accumulated) -> Temporal:
+    """What neighbours added to a picture, as it reports."""
+    samples = float(gathered.samples.mean())
+    return Temporal(job.temporal_radius, gathered.frames, samples, gathered.rejected)
+
+
+def accumulation(gathered: Accumulated) -> Decision:
+    """What was decided where neighbours were asked for their samples."""
+    frames = gathered.frames
+    reason = "neighbouring frames show the same: their samples count here as well"
+    return Decision("accumulation", f"frames {frames[0]} to {frames[-1]}", reason)
+
+
+def in_time(foreseen: str, quality: str) -> tuple[Decision, ...]:
+    """Why the denoising is another than a time budget has foreseen."""
+    if quality == foreseen:
+        return ()
+    why = f"by the seconds that were left after the samples; foreseen was {foreseen}"
+    return (Decision("denoise in time", quality, why),)
+
+
+def prefilter(denoised: Denoised) -> Decision:
+    """Which guides were denoised before they guided."""
+    name = "guide prefilter"
+    if denoised.prefiltered:
+        guides = " and ".join(denoised.prefiltered)
+        return Decision(name, guides, "their own noise would stay in the picture")
+    return Decision(name, "none", "the guides are clean, or the quality takes them raw")

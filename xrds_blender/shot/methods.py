@@ -1,0 +1,80 @@
+"""What makes pictures of frames: one object of a method serves a whole shot.
+
+Every method samples a frame, by itself or as a neighbour of others, and finishes its
+picture from these samples. A still is a frame without neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from xrds_core.arrays import Array
+
+from ..frame import progress
+from ..frame.job import Picture, RenderJob
+from .sampling import Sampled
+
+Report = Callable[[float], bool]
+"""Takes how far a stage is, from 0 to 1; False once the user has stopped it."""
+
+
+class Method:
+    """Cycles alone, full size or super-resolution.
+
+    Raises XRDSError, when it is made, where what it needs cannot be loaded.
+    """
+
+    stages = (progress.DENOISE, 2, 2)
+    """The last stage: its name, its number and how many there are."""
+
+    def __init__(self, job: RenderJob) -> None:
+        self.job = job
+
+    def sample(
+        self,
+        engine: Any,
+        depsgraph: Any,
+        place: int | None = None,
+        between: bool = False,
+    ) -> Sampled:
+        """Render the frame that the dependency graph is at.
+
+        The result then holds its passes. `place` is as in `sampling_of`; what other
+        frames show as well may be missing of one that lies `between` two. Raises
+        Cancelled when the user stops it; what there is then is kept as the job says.
+        """
+        raise NotImplementedError
+
+    def lacks(self, own: Sampled, others: Sequence[Sampled]) -> bool:
+        """Whether what is missing of a frame is not shown by others after all."""
+        return False
+
+    def begin_finishing(self, engine: Any) -> Report:
+        """Show the last stage; returns what shows how far it is."""
+        progress.begin(engine, *self.stages)
+        return progress.reporter(engine)
+
+    def finish(
+        self,
+        own: Sampled,
+        others: Sequence[Sampled],
+        view: str,
+        report: Report | None = None,
+    ) -> Picture:
+        """The picture of one view, with the samples of its neighbours.
+
+        Its seconds are of finishing alone. Raises Cancelled where `report` says so.
+        """
+        raise NotImplementedError
+
+    def light_passes(self, own: Sampled, view: str) -> dict[str, Array]:
+        """Light passes of a low-resolution render by name, enlarged as they are."""
+        return {}
+
+    def stopped(self, own: Sampled) -> dict[str, Array]:
+        """What the user sees of a frame that was stopped, by view, (H, W, 4).
+
+        The frame's own samples, denoised as quickly as can be.
+        """
+        return {}

@@ -1,0 +1,496 @@
+"""The paper's method: low-resolution light, full-size guides, and the network.
+
+In a shot light and guides take the samples of neighbour frames before the light is
+denoised and enlarged.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_core.arrays import Array
+from xrds_core.errors import Cancelled
+from xrds_core.temporal.accumulate import Accumulated, accumulate
+from xrds_core.temporal.frame import Camera, Frame, Stored, store
+from xrds_core.temporal.stand_in import stand_in
+from xrds_core.temporal.takes import same_take
+from xrds_core.temporal.vectors import Movement
+
+from ..cycles import live
+from ..cycles.low_samples import LowPlace, LowSamples
+from ..cycles.pass_names import COMBINED, is_light
+from ..cycles.passes import CyclesPasses
+from ..cycles.rendered import Beauty, Guides
+from ..cycles.view import low_view
+from ..frame import progress
+from ..frame.denoisers import in_process, load_denoiser
+from ..frame.facts import find_facts
+from ..frame.guide_cache import GuideName
+from ..frame.guides import GuideSource
+from ..frame.job import NetworkFailed, Picture, RenderJob, Temporal
+from ..frame.memory import peak_memory
+from ..frame.networks import load_upscaler
+from ..planning import plan
+from ..planning.plan import GUIDE_CACHE, Decision, Facts, Plan
+from ..scene.facts import shapes_move
+from .enlarging import enlarge, enlarged, enlarged_lights
+from .full_size import accumulation, temporal
+from .methods import Method, Report
+from .sampling import Sampled, Sampling, light_of, sampling_of
+from .stopping import keep_beauties, keep_low_samples, quick
+
+if TYPE_CHECKING:
+    from xrds_core.denoising import Denoiser
+
+_OF_OTHERS = Decision(
+    "guides", "of the frames beside", "only the camera moves: they show the same"
+)
+_NOT_KEPT = Decision(
+    GUIDE_CACHE, "off", "the camera moves: no frame has the guides of another"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What the network takes of one view, and what made it.
+
+    `exposure` is the factor that brings radiance to middle grey, None to be found in
+    the picture.
+    """
+
+    beauty: Beauty
+    guides: Guides
+    exposure: float | None
+    skip_idle: bool
+    decisions: tuple[Decision, ...]
+    seconds: dict[str, float] = field(default_factory=dict)
+    temporal: Temporal | None = None
+
+    @property
+    def place(self) -> Beauty:
+        """What holds the light's `offset` and its `others`, as in `LowPlace`."""
+        return self.beauty
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Height and width of the picture."""
+        height, width = self.guides.alpha.shape
+        return height, width
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One view of a frame of a shot as the window keeps it, noisy.
+
+    `place` is that of the light's pixels, `camera` sees those of the picture. Guides of
+    the same `guide_name` hold each other's samples: they are not added up. None where
+    those of the frames beside it show what this one would show.
+    """
+
+    light: Stored
+    guides: Stored | None
+    camera: Camera
+    shape: tuple[int, int]
+    guide_name: GuideName | None
+    place: LowPlace
+    exposure: float | None
+    plan: Plan
+
+
+class SuperResolution(Method):
+    """Light at low resolution, guides at full size, and the network."""
+
+    stages = (progress.NETWORK, 3, 3)
+
+    def __init__(self, job: RenderJob) -> None:
+        super().__init__(job)
+        self._upscaler = load_upscaler(job)
+        # of light that neighbours add to; a still's is denoised as it is rendered
+        self._denoiser = load_denoiser(job) if job.temporal_radius else None
+        self._movement = Movement()
+
+    def sample(
+        self,
+        engine: Any,
+        depsgraph: Any,
+        place: int | None = None,
+        between: bool = False,
+    ) -> Sampled:
+        """As `Method.sample`; the result then holds the guides' data passes.
+
+        A frame `between` two others takes its guides from them where that costs no
+        detail.
+        """
+        how = sampling_of(engine, depsgraph, self.job, place)
+        layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
+        with CyclesPasses(
+            engine, depsgraph, noisy=True, geometry=how.geometry
+        ) as passes:
+            facts = find_facts(depsgraph, self.job)
+            chosen = self.job.plan(facts)
+            if not chosen.motion_blur:
+                passes.hold_still()
+            renders = _Renders(
+                engine, depsgraph, self.job, how, passes, facts, chosen, layer_name
+            )
+            return renders.alone() if how.is_alone else renders.of_shot(between)
+
+    def lacks(self, own: Sampled, others: Sequence[Sampled]) -> bool:
+        return any(
+            lacks_guides(each, own.neighbours(view, others))
+            for view, each in own.views.items()
+        )
+
+    def finish(
+        self,
+        own: Sampled,
+        others: Sequence[Sampled],
+        view: str,
+        report: Report | None = None,
+    ) -> Picture:
+        """As `Method.finish`; raises NetworkFailed."""
+        inputs = own.views[view]
+        if isinstance(inputs, View):
+            assert self._denoiser is not None
+            neighbours = own.neighbours(view, others)
+            inputs = gathered_inputs(
+                inputs, neighbours, self.job, self._denoiser, self._movement
+            )
+        started = time.perf_counter()
+        try:
+            picture = enlarge(
+                inputs.beauty,
+                inputs.guides,
+                self.job,
+                self._upscaler,
+                exposure=inputs.exposure,
+                skip_idle=inputs.skip_idle,
+                progress=report,
+            )
+        except NetworkFailed as error:
+            error.number = own.number
+            raise
+        seconds = {"network": time.perf_counter() - started}
+        return Picture.of(
+            picture,
+            albedo=inputs.guides.albedo,
+            normal=inputs.guides.normal,
+            low_resolution=inputs.beauty.radiance,
+            seconds=inputs.seconds | seconds,
+            plan=inputs.decisions,
+            peak_memory=peak_memory(),
+            device=str(self._upscaler.device),
+            temporal=inputs.temporal,
+        )
+
+    def light_passes(self, own: Sampled, view: str) -> dict[str, Array]:
+        each = own.views[view]
+        lights, offset = each.place.others, each.place.offset
+        return enlarged_lights(lights, self.job.scale, offset, each.shape)
+
+    def stopped(self, own: Sampled) -> dict[str, Array]:
+        first = next(iter(own.views.values()))
+        beauties = {view: _alone(each, self.job) for view, each in own.views.items()}
+        return enlarged(beauties, self.job.scale, first.shape)
+
+
+def _alone(view: View | Inputs, job: RenderJob) -> Beauty:
+    """The light of a view with its own samples alone, denoised."""
+    if isinstance(view, Inputs):
+        return view.beauty
+    own = accumulate(view.light, (), Movement())
+    return _denoised(view, own, load_denoiser(quick(job)))
+
+
+# --- Sampling ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Renders:
+    """Both Cycles renders of one frame."""
+
+    engine: Any
+    depsgraph: Any
+    job: RenderJob
+    how: Sampling
+    passes: CyclesPasses
+    facts: Facts
+    chosen: Plan
+    layer_name: str
+
+    def alone(self) -> Sampled:
+        """The light of a still, denoised, and its guides: what the network takes."""
+        beauties: dict[str, Beauty] = {}
+        try:
+            beauties = self._beauties()
+            exposure = self._exposure()
+            source = self._source(self.job, self.chosen.guide_samples)
+            guides = self._guides(source, beauties)
+        except Cancelled:
+            if beauties:
+                keep_beauties(self.engine, self.layer_name, self.job, beauties)
+            else:
+                self._keep_light()
+            raise
+        first = self.passes.views[0]
+        rendered = beauties[first].seconds, guides[first].seconds
+        decisions = (*self.chosen.decisions, source.decision)
+        sync, again = sorted(each["sync"] for each in rendered)[::-1]
+        if again:
+            decisions += plan.after(sync, again)
+        skip_idle = self.chosen.skip_idle
+        views = {
+            view: Inputs(beauty, guides[view], exposure, skip_idle, decisions)
+            for view, beauty in beauties.items()
+        }
+        return Sampled(self.how.number, views, _summed(rendered))
+
+    def of_shot(self, between: bool) -> Sampled:
+        """The noisy light and guides of a frame that has neighbours."""
+        light: dict[str, LowSamples] = {}
+        try:
+            light = self._noisy_light()
+            views = self._views(light)
+            rendered = [next(iter(light.values())).place.seconds]
+            if between and self._is_shown_by_others():
+                found, decision = views, _OF_OTHERS
+            else:
+                found, decision, seconds = self._with_guides(views, light)
+                rendered.append(seconds)
+        except Cancelled:
+            self._keep_light(light)
+            raise
+        return Sampled(
+            self.how.number, _with_decision(found, decision), _summed(rendered)
+        )
+
+    def _keep_light(self, light: Mapping[str, LowSamples] | None = None) -> None:
+        light = light or self.passes.stopped_samples(self.job.scale)
+        keep_low_samples(self.engine, self.layer_name, self.job, light)
+
+    def _beauties(self) -> dict[str, Beauty]:
+        """The denoised low-resolution light by view."""
+        self._begin(progress.LOW, 1)
+        job = self.job
+        beauties = self.passes.beauties(
+            job.scale,
+            job.samples,
+            denoise=self.chosen.denoise,
+            seed=job.seed,
+            denoiser=job.denoiser,
+            in_process=in_process(job),
+        )
+        first = next(iter(beauties.values()))
+        live.show(np.dstack((first.radiance, first.alpha)), job.scale, first.offset)
+        return beauties
+
+    def _noisy_light(self) -> dict[str, LowSamples]:
+        """The noisy low-resolution light by view."""
+        self._begin(progress.LOW, 1)
+        how, job = self.how, self.job
+        portion = how.portion(how.count)
+        return self.passes.low_samples(
+            job.scale, job.samples, seed=how.own_seed, portion=portion
+        )
+
+    def _exposure(self) -> float | None:
+        return self.job.exposure or self.passes.border_exposure()
+
+    def _views(self, light: Mapping[str, LowSamples]) -> dict[str, View]:
+        """The views without guides."""
+        exposure, region = self._exposure(), self.passes.region
+        return {
+            view: View(
+                light=_stored_light(self.how, self.job, low, view),
+                guides=None,
+                camera=self.how.cameras[view],
+                shape=(region.height, region.width),
+                guide_name=None,
+                place=low.place,
+                exposure=exposure,
+                plan=self.chosen,
+            )
+            for view, low in light.items()
+        }
+
+    def _is_shown_by_others(self) -> bool:
+        """Whether guides of the frames beside this one show what its own would show."""
+        if _OF_OTHERS.decision not in self.job.savings or not self.chosen.render_guides:
+            return False
+        spare = {name for _, name in self.engine.spare_passes}
+        asked = set(self.passes.pass_names()) - spare - {COMBINED}
+        if not all(is_light(name) for name in asked):
+            return False  # they come with the guides
+        # under a camera that stands still guides are not rendered again anyway
+        return self.how.place is None and not shapes_move(self.depsgraph)
+
+    def _with_guides(
+        self, views: Mapping[str, View], light: Mapping[str, LowSamples]
+    ) -> tuple[dict[str, View], Decision, dict[str, float]]:
+        """The views with guides, rendered or cached, why, and the seconds."""
+        samples = self.chosen.guide_samples
+        source = self._source(_guide_job(self.job, self.how, samples), samples)
+        noisy = {v: low.place.beauty(low.samples.picture) for v, low in light.items()}
+        guides = self._guides(source, noisy)
+        found = {
+            view: replace(
+                each, guides=self._stored(guides[view], view), guide_name=source.name
+            )
+            for view, each in views.items()
+        }
+        is_kept = self.how.place is not None or self.job.guide_cache is not None
+        decision = source.decision if is_kept else _NOT_KEPT
+        return found, decision, next(iter(guides.values())).seconds
+
+    def _source(self, job: RenderJob, samples: int) -> GuideSource:
+        return GuideSource(
+            self.passes,
+            self.depsgraph,
+            job,
+            self.chosen,
+            self.facts,
+            self.engine.report,
+            self.how.portion(samples, other=1),
+        )
+
+    def _guides(
+        self, source: GuideSource, light: dict[str, Beauty]
+    ) -> dict[str, Guides]:
+        self._begin(progress.GUIDES, 2)
+        return source.guides(light)
+
+    def _stored(self, guides: Guides, view: str) -> Stored:
+        if self.chosen.render_guides:
+            depth, vector = self.passes.geometry(view)
+        else:  # an even background
+            depth, vector = np.full(guides.alpha.shape, np.inf, np.float32), None
+        frame = Frame(
+            number=self.how.number,
+            camera=self.how.cameras[view],
+            radiance=None,
+            alpha=guides.alpha,
+            albedo=guides.albedo,
+            normal=guides.normal,
+            depth=depth,
+            vector=vector,
+            samples=guides.samples or self.chosen.guide_samples or 1,
+            still=self.how.still,
+        )
+        return store(frame, np.float16)
+
+    def _begin(self, stage: str, number: int) -> None:
+        progress.begin(self.engine, self.how.named(stage), number)
+
+
+def _with_decision(views: dict[str, View], decision: Decision) -> dict[str, View]:
+    """The views with a decision in the place of that of its name."""
+
+    def decided(plan: Plan) -> Plan:
+        others = [d for d in plan.decisions if d.decision != decision.decision]
+        return replace(plan, decisions=(*others, decision))
+
+    return {name: replace(v, plan=decided(v.plan)) for name, v in views.items()}
+
+
+def _guide_job(job: RenderJob, how: Sampling, samples: int) -> RenderJob:
+    """Under a camera that stands still guides are kept until they are as many.
+
+    Under another no frame finds what one before it has left, so memory is spared.
+    """
+    if how.place is not None:
+        enough = samples * (2 * how.radius + 1)
+        return replace(job, guide_limit=max(job.guide_limit, enough))
+    kept = job.savings
+    if job.guide_cache is None:
+        kept = tuple(name for name in kept if name != _NOT_KEPT.decision)
+    return replace(job, seed=how.own_seed, savings=kept)
+
+
+def _stored_light(how: Sampling, job: RenderJob, low: LowSamples, view: str) -> Stored:
+    window = low.place.window.x, low.place.window.y
+    camera = low_view(how.cameras[view], job.scale, window)
+    return store(light_of(how, camera, low.samples), np.float16)
+
+
+def _summed(rendered: Sequence[Mapping[str, float]]) -> dict[str, float]:
+    """Seconds by stage of all renders together."""
+    stages = {stage for each in rendered for stage in each}
+    return {s: sum(each.get(s, 0.0) for each in rendered) for s in stages}
+
+
+# --- Finishing -----------------------------------------------------------------------
+
+
+def gathered_inputs(
+    own: View,
+    others: Sequence[View],
+    job: RenderJob,
+    denoiser: Denoiser,
+    movement: Movement,
+) -> Inputs:
+    """What the network takes of a view, with the samples of its neighbours."""
+    started = time.perf_counter()
+    gathered = accumulate(own.light, [each.light for each in others], movement)
+    guides = gathered_guides(own, others, movement)
+    accumulated = time.perf_counter()
+    beauty = _denoised(own, gathered, denoiser)
+    seconds = {
+        "accumulate": accumulated - started,
+        "denoise": time.perf_counter() - accumulated,
+    }
+    return Inputs(
+        beauty,
+        guides,
+        own.exposure,
+        own.plan.skip_idle,
+        (*own.plan.decisions, accumulation(gathered)),
+        seconds,
+        temporal(job, gathered),
+    )
+
+
+def _denoised(own: View, gathered: Accumulated, denoiser: Denoiser) -> Beauty:
+    assert gathered.radiance is not None
+    picture = np.dstack((gathered.radiance, gathered.alpha))
+    if not own.plan.denoise:
+        return own.place.beauty(picture)
+    denoised = denoiser(picture, gathered.albedo, gathered.normal)
+    return own.place.beauty(denoised.radiance, gathered.radiance)
+
+
+def gathered_guides(own: View, others: Sequence[View], movement: Movement) -> Guides:
+    """Guides with the samples of other frames; the richest of those of one name."""
+    others = [each for each in others if each.guides is not None]
+    if own.guide_name is not None:
+        name = own.guide_name
+        same = [own, *(each for each in others if name.is_same(each.guide_name))]
+        own = max(same, key=_samples)
+        others = [each for each in others if each not in same]
+    neighbours = [each.guides for each in others if each.guides is not None]
+    target = own.guides
+    if target is None:
+        number = own.light.number
+        beside = sorted(neighbours, key=lambda each: abs(each.number - number))[:2]
+        target = stand_in(number, own.camera, beside)
+    found = accumulate(target, neighbours, movement)
+    assert found.alpha is not None
+    # their own number: where nothing is gathered there are no more
+    samples = max(1, int(target.samples))
+    return Guides(found.albedo, found.normal, found.alpha, None, None, samples)
+
+
+def lacks_guides(own: View, others: Sequence[View]) -> bool:
+    """Whether a frame counted on guides of frames that a cut parts from it."""
+    if not isinstance(own, View) or own.guides is not None:
+        return False
+    rich = [each.light for each in others if each.guides is not None]
+    return not same_take(own.light, rich)
+
+
+def _samples(view: View) -> float:
+    return 0.0 if view.guides is None else view.guides.samples
