@@ -186,7 +186,7 @@ def test_what_a_kept_file_holds(blend: Path) -> None:
     assert set(kinds.values()) == {"float16"}
     passes = {name.rpartition(".")[0] for name in kinds}
     names = ("Noisy Image", "Denoising Albedo", "Denoising Normal", "Vector")
-    assert passes == {f"{layer}.{name}" for name in names}
+    assert passes == {f"{layer}.{name}" for name in (*names, "XRDS Noise")}
     told = file.parts[0].attributes
     assert told["xrds/samples"] == 1
     scene = bpy.context.scene

@@ -12,6 +12,7 @@ from sequences import CYCLES, frame, write
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.sequence.denoise import Files
 from xrds_core.sequence.reading import Reading, read_frame
+from xrds_core.temporal.noise import brightness
 
 NUMBERS = range(1, 6)
 
@@ -30,13 +31,16 @@ def test_a_frame_is_the_mean_of_its_halves(tmp_path: Path) -> None:
     folder, reading = written(tmp_path)
     alone = read_frame(folder / "0003.exr", 3, Reading()).stored
     both = read_frame(folder / "0003.exr", 3, reading).stored
-    assert alone.noise is None
-    assert both.noise is not None
     assert both.samples == 2 * alone.samples
     picture = alone.picture.reshape(*alone.shape, -1)[..., :3].astype(np.float32)
     mean = (picture + picture[:, ::-1]) / 2
     found = both.picture.reshape(*both.shape, -1)[..., :3]
     assert found == pytest.approx(mean, abs=2e-3)
+    # and its noise is what the halves say, not the pixels around
+    assert both.noise is not None
+    told = both.noise.difference.reshape(both.shape)
+    halves = (brightness(picture) - brightness(picture[:, ::-1])) / 2
+    assert told == pytest.approx(halves, abs=2e-3)
 
 
 def test_a_half_that_is_missing_or_of_other_passes_is_told(tmp_path: Path) -> None:

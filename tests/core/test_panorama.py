@@ -84,7 +84,7 @@ def test_pixels_pass_to_where_the_other_sees_them(
 
 @pytest.mark.parametrize("move", [{"yaw": 0.4}, {"x": 0.1, "z": 0.1, "yaw": 0.1}])
 def test_panoramas_lend_all_around(move: dict[str, float]) -> None:
-    here, there = frame(0, camera(), 0.4), frame(1, camera(**move), 0.4)
+    here, there = frame(0, camera(), 0.8), frame(1, camera(**move), 0.8)
     found = accumulate(store(here), [store(there)])
     assert found.samples.mean() > 1.7
     assert np.abs(found.albedo - here.albedo).mean() < 0.01

@@ -27,10 +27,11 @@ def test_it_knows_where_its_pixels_lie(orthographic: bool) -> None:
     assert close.mean() > 0.97  # all but the card's edges
 
 
-def test_it_takes_what_the_others_show() -> None:
+@pytest.mark.parametrize("lit", [False, True])
+def test_it_takes_what_the_others_show(lit: bool) -> None:
     eyes = [camera(x=0.2 * k) for k in range(3)]
     frames = [view(k, eye, CARD).frame for k, eye in enumerate(eyes)]
-    guides = [store(replace(each, radiance=None)) for each in frames]
+    guides = [store(x if lit else replace(x, radiance=None)) for x in frames]
     empty = stand_in(1, eyes[1], [guides[0], guides[2]])
     found = accumulate(empty, [guides[0], guides[2]])
     assert found.samples.mean() > 1.3

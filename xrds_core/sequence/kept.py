@@ -70,13 +70,13 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
         (NOISY, "RGB", frame.radiance),
         ("Denoising Albedo", "RGB", frame.albedo),
         (CAMERA_NORMAL, "XYZ", frame.normal),
+        # always: half floats of the rest would tell another noise when read
+        (NOISE, "XYZ", _noise(frame)),
     ]
     if frame.alpha is not None:
         passes.append((NOISY, "A", frame.alpha[..., None]))
     if frame.vector is not None:
         passes.append(("Vector", "XYZW", frame.vector))
-    if frame.halves is not None:
-        passes.append((NOISE, "XYZ", _noise(frame)))
     channels: dict[str, NDArray[Any]] = {
         f"{layer}{name}.{letter}": _half(array[..., i])
         for name, letters, array in passes
@@ -88,7 +88,6 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
 def _noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
     noise = noise_in(frame, np.float16)
-    assert noise is not None
     parts = (noise.brightness, noise.difference, noise.guides)
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 

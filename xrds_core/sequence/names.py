@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
 CAMERA_NORMAL = "Denoising Normal"
-NOISE = "XRDS Noise"  # what halves of the samples say, in frames that XRDS keeps
+NOISE = "XRDS Noise"  # of the samples, as was known when XRDS kept them
 # Of passes in the order in which they are looked for, in any case of letters.
 _USUAL = {
     "beauty": (NOISY, COMBINED, "beauty", "RGBA", "rgb", "C", "Ci"),

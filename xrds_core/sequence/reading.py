@@ -117,7 +117,7 @@ def read_frame(
     if reading.halves is not None:
         frame = _with_other_half(frame, file, camera, reading)
     stored = store(frame, np.float16)
-    if stored.noise is None:
+    if reading.halves is None and found.noise:
         stored = replace(stored, noise=_noise(file, found))
     return FrameFile(
         stored=stored,
@@ -283,10 +283,8 @@ def _vector(file: File, found: Found, reading: Reading) -> Array | None:
     return motion
 
 
-def _noise(file: File, found: Found) -> Noise | None:
-    """What halves said of a frame that XRDS kept."""
-    if not found.noise:
-        return None
+def _noise(file: File, found: Found) -> Noise:
+    """What was known of the noise of a frame that XRDS kept."""
     planes = (np.nan_to_num(file.plane(name).ravel()) for name in found.noise)
     cut = (np.clip(plane, -LARGEST_HALF, LARGEST_HALF) for plane in planes)
     return Noise(*(plane.astype(np.float16) for plane in cut))

@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import PictureError
-from .agreement import REACH, agreement, brightness, likeness
-from .judge import MARGIN, Judge, light_for_albedo
+from .judge import MARGIN, GuideJudge, Judge, light_for_albedo
 from .motion import grid, pair, places, surroundings
 from .neighbours import extreme
 from .survey import spread, survey
@@ -39,10 +38,6 @@ if TYPE_CHECKING:
 # per pixel; it falls with their cube root. Noise asks for a wide one, texture for a
 # narrow one: 0.7 and 0.6 were best at 1 and 2 samples, 0.2 to 0.3 at 16.
 _SOFTNESS = 0.7
-# Samples per pixel at which what moves by itself lends half of what else would. It may
-# differ by what neither light nor guides tell, as lamps under a moving pane do; that
-# stays, however many samples there are, while what lending gains falls with them.
-_MOVING_HALF = 8.0
 _ROWS = 128  # at a time, with the margin of the judge
 _TINY = np.float32(1e-9)
 # Every half float, by its bits.
@@ -85,16 +80,14 @@ def accumulate(
     """
     others = same_take(target, others)
     near, far = _lenders(target, others, movement or Movement())
-    judged = bool(others) and _can_judge(target, others)
-    usual = light_for_albedo(target) if judged else None
-    lenders = [near + far] if usual is None else [near, far]
+    usual = light_for_albedo(target) if others and target.has_light else 0.0
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
     samples = np.empty(height * width, np.float32)
 
     def work(first: int) -> float:
         block = _Block(target, slice(first, min(first + _ROWS, height)), usual)
-        groups = [_gathered(block, group) for group in lenders if group]
+        groups = [_gathered(block, group) for group in (near, far) if group]
         for group in groups:
             group.finish()
         means[block.pixels], samples[block.pixels] = _means(target, block, groups)
@@ -105,10 +98,6 @@ def accumulate(
     rejected = 1.0 - taken / asked if asked else 0.0
     frames = tuple(sorted({target.number, *(x.number for x in others)}))
     return _unpacked(target, means, samples, rejected, frames)
-
-
-def _can_judge(target: Stored, others: Sequence[Stored]) -> bool:
-    return target.has_light and all(x.noise is not None for x in (target, *others))
 
 
 def _lenders(
@@ -136,30 +125,27 @@ def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
 
 
 class _Block:
-    """Some rows of the target, with a margin that the tests look at.
+    """Some rows of the target, with a margin that the judge looks at.
 
-    `usual` is as in `Judge`; None where there is nothing to judge by. `void` (n,) says
+    `usual` is as in `Judge`. `void` (n,) says
     where a frame with alpha has none, in a pixel or beside it: there is no noise to
     take away, and a rim that several frames draw is wider than that of one.
     """
 
-    def __init__(self, target: Stored, rows: slice, usual: float | None) -> None:
+    def __init__(self, target: Stored, rows: slice, usual: float) -> None:
         height, width = target.shape
-        margin = REACH if usual is None else MARGIN
-        first, last = max(rows.start - margin, 0), min(rows.stop + margin, height)
+        first, last = max(rows.start - MARGIN, 0), min(rows.stop + MARGIN, height)
         self.rows = slice(first, last)
         self.pixels = slice(rows.start * width, rows.stop * width)
         self.wide = grid(target.shape, first, last)
         start = self.pixels.start - first * width
         self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
         self.own = _floats(target.picture[self.wide.pixels])
-        self.judge: Judge | None = None
         self.void = self._void()
-        if usual is not None:
-            self.judge = _judge(target, self, usual)
-        else:
-            light = self.own[:, :3]
-            self.brightness = {x: brightness(light, x) for x in (True, False)}
+        self.known = np.ones(len(self.own), bool)
+        if target.spoilt is not None:
+            self.known = ~target.spoilt[self.wide.pixels]
+        self.judge = _judge(target, self, usual) if target.has_light else None
 
     def _void(self) -> Mask | None:
         if not self.own.shape[1] % 3:
@@ -175,9 +161,6 @@ class _Block:
 def _judge(target: Stored, block: _Block, usual: float) -> Judge:
     noise, pixels = target.noise, block.wide.pixels
     assert noise is not None
-    known = np.ones(len(block.own), bool)
-    if target.spoilt is not None:
-        known = ~target.spoilt[pixels]
     parts = (noise.brightness, noise.difference, noise.guides)
     brightness, difference, guides = (block.shaped(_floats(x[pixels])) for x in parts)
     return Judge(
@@ -185,7 +168,7 @@ def _judge(target: Stored, block: _Block, usual: float) -> Judge:
         brightness,
         difference,
         np.square(guides),
-        block.shaped(known),
+        block.shaped(block.known),
         target.samples,
         usual,
     )
@@ -220,12 +203,16 @@ class _Sums:
     def finish(self) -> None:
         """Let all count as far as they are right, on the block's own rows alone."""
         block = self.block
+        weights = np.maximum(self.weights, _TINY)
+        means = block.shaped(self.values / weights[:, None])
+        seen = block.shaped(self.weights > 0.0)
         if block.judge is not None:
-            weights = np.maximum(self.weights, _TINY)
-            passes = block.shaped(self.values[:, 3:] / weights[:, None])
             root = block.shaped(self.brightness / weights)
-            seen = block.shaped(self.weights > 0.0)
-            self._scale(block.judge.trust(passes, root, seen).ravel())
+            trust = block.judge.trust(means[..., 3:], root, seen)
+        else:
+            own, known = block.shaped(block.own), block.shaped(block.known)
+            trust = GuideJudge(own, known).trust(means, seen)
+        self._scale(trust.ravel())
         if block.void is not None:
             self._scale((~block.void).astype(np.float32))
         inner = block.inner
@@ -301,45 +288,11 @@ class _Lender:
             normal = slice(6, 9) if other.has_light else slice(3, 6)
             picked[:, normal] = picked[:, normal] @ self._turn.T
         weight = found.seen.astype(np.float32)
-        if block.judge is None:
-            weight *= self._agreement(block, picked, found.seen)
-            self._doubt_moving(weight, block, picked, found.seen)
         weight *= spread(self._tiles, self._pair.here.shape, block.rows).ravel()
         weight *= _samples(other, found.pixel, len(weight))
         lent = weight.copy()
         weight *= np.exp(found.apart * self._fall)
         sums.add(picked, weight, lent, _noise(other, found.pixel, block))
-
-    def _agreement(self, block: _Block, picked: Array, seen: Mask) -> Array:
-        """Return the weights (n,) of the block's pixels by the light of both."""
-        target = self._pair.here
-        known = seen
-        if target.spoilt is not None:
-            known = seen & ~target.spoilt[block.wide.pixels]
-        alike = target.samples == self._pair.there.samples
-        difference = brightness(picked[:, :3], alike) - block.brightness[alike]
-        difference *= known
-        return agreement(block.shaped(difference)).ravel()
-
-    def _doubt_moving(
-        self, weight: Array, block: _Block, picked: Array, seen: Mask
-    ) -> None:
-        """Lower the weights (n,) of pixels that show what moves by itself."""
-        detour = self._pair.detour
-        if detour is None:
-            return
-        pixels = block.wide.pixels
-        assert isinstance(pixels, slice)
-        part = slice(*detour.pixels.searchsorted((pixels.start, pixels.stop)))
-        moving = detour.pixels[part] - pixels.start
-        if not moving.size:
-            return
-        target = self._pair.here
-        guides = slice(3, 9) if target.has_light else slice(0, 6)
-        difference = block.shaped(picked[:, guides] - block.own[:, guides])
-        alike = likeness(difference, block.shaped(seen)).ravel()
-        share = np.float32(1.0 / (1.0 + target.samples / _MOVING_HALF))
-        weight[moving] *= share * alike[moving]
 
 
 def _samples(

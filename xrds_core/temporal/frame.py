@@ -117,8 +117,8 @@ class Frame:
     surface was one frame before minus where it is, then where it is minus where it will
     be one frame later, in pixels, y upwards; without it, whatever is hit is taken to
     stand still. `counts` (H, W): samples of each pixel, where they differ; `samples` is
-    their mean. `halves` of the samples tell what is noise: with them no neighbour is
-    believed that shows something else.
+    their mean. `halves` of the samples tell what is noise better than the pixels around
+    a pixel can.
     """
 
     number: int
@@ -164,7 +164,7 @@ class Stored:
     without a hit; the depth itself for an orthographic camera; NaN where it is not
     known. `spoilt` (H W) says which pixels held NaN or infinities and are 0 now; None
     if none did. `counts` (H W): samples of each pixel where they differ. `noise` is
-    what `noise_in` says.
+    what `noise_in` says, None of guides alone.
     """
 
     number: int
@@ -223,7 +223,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
     picture[spoilt] = 0.0
     if np.dtype(dtype) == np.float16:
         np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
-    noise = noise_in(frame, dtype)
+    noise = None if frame.radiance is None else noise_in(frame, dtype)
     return Stored(
         number=frame.number,
         camera=frame.camera,
@@ -239,15 +239,14 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
     )
 
 
-def noise_in(frame: Frame, dtype: DTypeLike) -> Noise | None:
-    """Return the noise of a frame; None without halves, and of guides alone."""
-    if frame.halves is None or frame.radiance is None:
-        return None
+def noise_in(frame: Frame, dtype: DTypeLike) -> Noise:
+    """Return the noise of a frame with radiance."""
+    assert frame.radiance is not None
     parts = [frame.albedo, frame.normal]
     if frame.alpha is not None:
         parts.append(frame.alpha[..., None])
     guides = np.concatenate(parts, axis=-1)
-    return noise_of(frame.halves, guides, frame.samples, dtype)
+    return noise_of(frame.halves or frame.radiance, guides, frame.samples, dtype)
 
 
 def _counts(counts: Array) -> NDArray[Any]:

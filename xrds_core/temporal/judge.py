@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .agreement import brightness as root_of_luminance
 from .changes import REACH, Changes
 from .neighbours import box
-from .noise import guides_of
+from .noise import brightness as root_of_luminance
+from .noise import guides_of, noise_of_guides
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -52,6 +52,7 @@ _DARKEST_ROOT = 0.1  # the root of an albedo's luminance, in the same way
 _EVEN_NOISE = 0.1  # albedo's luminance, added to it: noise is more even than albedo
 MARGIN = max(max(a for _, a in _GUIDE_AREAS) // 2, REACH) + _SMOOTH // 2
 """How many pixels to each side of a pixel have a say in it."""
+_BEARABLE = 0.03  # of guides alone: what they may be off by and count half
 _TINY = np.float32(1e-9)
 
 
@@ -146,6 +147,36 @@ class Judge:
     @cached_property
     def _unrest(self) -> Array:
         return np.asarray(self._often[1] * self._changes.error())
+
+
+class GuideJudge:
+    """As `Judge` of frames of guides alone: albedo, normal, and alpha if there is any.
+
+    What is wrong with the neighbours' mean counts once against the noise of the frame's
+    guides: no denoiser is to take it away. `picture` (H, W, 6 or 7) has samples
+    where it is `known` (H, W).
+    """
+
+    def __init__(self, picture: Array, known: Mask) -> None:
+        self._guides, self._known = guides_of(picture), known
+        # believed in full, as of one sample: to lend too little is a loss here, too
+        noise = noise_of_guides(self._guides, 1.0)
+        self._variance = box(np.square(noise), _NOISE_AREA)
+
+    def trust(self, passes: Array, seen: Mask) -> Array:
+        """Return the weights (H, W) in [0, 1] of neighbours whose means are given.
+
+        `passes` (H, W, 6 or 7) are as the frame's own, where they are `seen` (H, W).
+        """
+        asked = (seen & self._known).astype(np.float32)
+        apart = guides_of(passes)
+        apart -= self._guides
+        apart = np.einsum("ijk,ijk->ij", apart, apart)
+        error = _mean(apart, asked, _SMOOTH) - self._variance
+        error = np.maximum(error, np.float32(0.0))
+        variance = self._variance + np.float32(_BEARABLE**2)
+        weight = _mean(variance / (variance + error), asked, _SMOOTH)
+        return np.asarray(np.where(self._known, weight, 1.0) * seen, np.float32)
 
 
 def _variance(difference: Array, texture: Array) -> Array:

@@ -38,6 +38,7 @@ def stand_in(number: int, camera: Camera, beside: Sequence[Stored]) -> Stored:
     near[~np.isfinite(near) | (near < 0.0)] = np.nan
     # pixels stretch where the camera comes nearer: what is beside fills the gaps
     around = extreme(near.reshape(first.shape).astype(np.float32), np.fmax).ravel()
+    empty = np.ones(len(near), bool)
     return Stored(
         number=number,
         camera=camera,
@@ -45,5 +46,6 @@ def stand_in(number: int, camera: Camera, beside: Sequence[Stored]) -> Stored:
         samples=first.samples,
         picture=np.zeros_like(first.picture),
         nearness=np.where(np.isnan(near), around, near).astype(np.float32),
-        spoilt=np.ones(len(near), bool),
+        spoilt=empty,
+        noise=None if first.noise is None else first.noise.without(empty),
     )

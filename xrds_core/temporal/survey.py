@@ -1,9 +1,9 @@
 """A first look at a neighbour, at some of its pixels: is it the same shot and light?
 
-Two things need more pixels than the test of each sample (`agreement`) has around it. A
+Two things need more pixels than the judge of each pixel has around it. A
 frame from before a cut fits nearly nowhere, and where its geometry fits by chance it
 must lend nothing either. And light that changes a little over a large part of the
-picture, as a lamp that flickers or a fade, drowns in the noise of 7x7 pixels.
+picture, as a lamp that flickers or a fade, drowns in the noise of a few pixels.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .agreement import brightness
 from .motion import Grid, still_places
+from .noise import brightness, luminance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -31,7 +31,7 @@ _STRIDES, _LARGE = (2, 4), 1_000_000
 _LEAST_SHARE = 1 / 3
 # Tested are tiles, 3x3 tiles, and the whole picture.
 _REACHES = (0, 1, None)
-_NOISE, _FALL = 4.0, 2.0  # as `agreement`
+_NOISE, _FALL = 4.0, 2.0  # z squared is 1 on the mean where frames agree
 # Of the brightness: a difference that no one sees, however sure it is.
 _HARMLESS = 0.01
 
@@ -116,7 +116,13 @@ def _moving(pair: Pair, step: int) -> tuple[float, float]:
 
 
 def _brightness(frame: Stored, pixels: NDArray[np.integer], alike: bool) -> Array:
-    return brightness(frame.picture[pixels, :3].astype(np.float32), alike)
+    """Return the root of luminance (n,), or itself where frames are not `alike`.
+
+    Between frames of other sample counts the root would lie: less noise has a larger
+    mean root.
+    """
+    light = frame.picture[pixels, :3].astype(np.float32)
+    return brightness(light) if alike else luminance(light)
 
 
 def _weights(sums: list[NDArray[np.float64]]) -> Array:
