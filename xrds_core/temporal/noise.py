@@ -33,7 +33,7 @@ _LEAST, _OF_ONE_SAMPLE = 1.2, 2.5
 _LIT, _DARKEST_ROOT = 5, 0.1
 # What halves of few samples say more than the pixels around, variance: halves of one
 # sequence complement each other, and noise that light shares with albedo is left out.
-_HALVES_SAY_MORE = 3.0
+_HALVES_SAY_MORE = 1.0
 _SEED = 7
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
 
