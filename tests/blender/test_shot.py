@@ -143,7 +143,7 @@ def test_under_a_still_camera_frames_continue_one_sequence(
     assert len(list(shot.render_shot(scene, job, FRAMES))) == 5
     whole = run_job(scene, lambda p: p.beauty(1, 5, denoise=False, seed=4))
     middle = gathered[2]
-    assert middle.samples.mean() > 4.7
+    assert middle.samples.mean() > 3.8  # one sample without halves is doubted at edges
     difference = np.abs(middle.radiance - whole.radiance)
     assert np.median(difference) < 1e-3  # half floats
     own = np.abs(gathered[0].radiance - whole.radiance)  # three frames of five
