@@ -121,8 +121,8 @@ def upscaler() -> Any:
     """A network that has learnt nothing, but whose every kernel counts."""
     import torch
 
-    from xrds_core.network import XRDS, preset_config
-    from xrds_core.upscaler import Upscaler
+    from xrds_core.superres.network import XRDS, preset_config
+    from xrds_core.superres.upscaler import Upscaler
 
     torch.manual_seed(3)
     network = XRDS(preset_config("fast", 2))

@@ -155,11 +155,14 @@ def test_planning_is_plain_python(path: Path) -> None:
 
 def test_network_is_torch_alone() -> None:
     allowed = {"torch", "__future__", "math", "dataclasses", "typing", "collections"}
-    assert roots(source("xrds_core.regression")) <= allowed
+    assert roots(source("xrds_core.superres.regression")) <= allowed
     for name in ("network", "kernels"):
-        module = f"xrds_core.{name}"
+        module = f"xrds_core.superres.{name}"
         assert roots(source(module)) <= allowed | {"xrds_core"}
-        assert own_imports(module) <= {"xrds_core.kernels", "xrds_core.regression"}
+        assert own_imports(module) <= {
+            "xrds_core.superres.kernels",
+            "xrds_core.superres.regression",
+        }
 
 
 def test_the_wheel_holds_core_and_add_on_alone() -> None:

@@ -20,12 +20,12 @@ from .errors import (
 )
 
 if TYPE_CHECKING:
-    from .exr_upscale import upscale_file as upscale_file
-    from .network import XRDS as XRDS
-    from .network import NetworkConfig as NetworkConfig
-    from .upscaler import Upscaled as Upscaled
-    from .upscaler import Upscaler as Upscaler
-    from .upscaler import upscale as upscale
+    from .superres.exr_upscale import upscale_file as upscale_file
+    from .superres.network import XRDS as XRDS
+    from .superres.network import NetworkConfig as NetworkConfig
+    from .superres.upscaler import Upscaled as Upscaled
+    from .superres.upscaler import Upscaler as Upscaler
+    from .superres.upscaler import upscale as upscale
 
 _LAZY = {
     "XRDS": ".network",

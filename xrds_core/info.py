@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,11 @@ from typing import Any
 import torch
 
 from .errors import WeightsError
-from .operations import shipped_costs
+from .superres.weights import DIRECTORY, available, guide_filter_record
 from .version import package_version
-from .weights import available, guide_filter_record
+
+COSTS = DIRECTORY / "costs.json"
+"""Parameters and operations of the networks, counted before: counting takes seconds."""
 
 
 def devices() -> list[str]:
@@ -21,6 +24,11 @@ def devices() -> list[str]:
     if torch.backends.mps.is_available():
         names.append("mps")
     return names
+
+
+def shipped_costs() -> dict[str, Any]:
+    """{paper_table, presets} of the networks."""
+    return dict(json.loads(COSTS.read_text("utf-8")))
 
 
 def info(

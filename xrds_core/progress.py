@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any
+from collections.abc import Callable
 
-from torch import Tensor
-
-from .cost import leaves
 from .errors import Cancelled
-from .network import XRDS
 
 Callback = Callable[[float], object]
 """Takes a fraction in [0, 1] that never falls; False as its result cancels."""
@@ -39,18 +33,3 @@ class Progress:
         self._reported = max(self._reported, fraction)
         if self._callback is not None and self._callback(self._reported) is False:
             raise Cancelled
-
-
-@contextmanager
-def watched(network: XRDS, progress: Progress) -> Iterator[None]:
-    """Let every layer of `network` add the number of values it returns."""
-
-    def add(module: Any, inputs: Any, output: Tensor) -> None:
-        progress.add(output.numel())
-
-    hooks = [layer.register_forward_hook(add) for layer in leaves(network)]
-    try:
-        yield
-    finally:
-        for hook in hooks:
-            hook.remove()

@@ -24,10 +24,11 @@ from xrds_core.errors import (
     WeightsError,
     XRDSError,
 )
-from xrds_core.exr_encoding import Encoding
-from xrds_core.network import XRDS, preset_config
+from xrds_core.exr.encoding import Encoding
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_core.superres.weights import file_name
 from xrds_core.version import package_version
-from xrds_core.weights import file_name, save
+from xrds_lab.weights import save_network
 
 HUGE = "99999999999999999999999"  # more than 64 bits
 MAIN = "import sys, xrds_blender.command.main as m; sys.exit(m.main(sys.argv[1:]))"
@@ -310,7 +311,7 @@ def test_wrong_usage_is_json_too(
 def test_a_failure_is_one_json_object(tmp_path: Path) -> None:
     beauty, out = str(tmp_path / "missing.exr"), str(tmp_path / "out.exr")
     weights = tmp_path / file_name("fast", 2)
-    save(XRDS(preset_config("fast", 2)), weights, {})
+    save_network(XRDS(preset_config("fast", 2)), weights, {})
     words = ["upscale", beauty, beauty, "-o", out, "--weights", str(weights)]
     done = run(MAIN, *words, "--json")
     assert done.returncode == 1

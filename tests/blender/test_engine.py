@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from channels import read_channels
 
+from xrds_lab.weights import save_network
+
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import render, run_job
@@ -72,7 +74,7 @@ def test_a_border_agrees_with_the_whole(
 
 
 def auto_exposure(scene: Any, picture: np.ndarray) -> float:
-    from xrds_core import front_end
+    from xrds_core.superres import front_end
 
     return front_end.auto_exposure(np.ascontiguousarray(picture[..., :3]))
 
@@ -279,11 +281,10 @@ def test_the_package_name_is_the_function_even_after_its_import(
 def test_a_small_network_of_its_own_renders(life: Any, tmp_path: Path) -> None:
     """The real Upscaler behind F12's path, with weights made here."""
     torch = pytest.importorskip("torch")
-    from xrds_core import weights
-    from xrds_core.network import XRDS, preset_config
+    from xrds_core.superres.network import XRDS, preset_config
 
     torch.manual_seed(0)
-    weights.save(XRDS(preset_config("fast", 2)), tmp_path / "fast_x2.safetensors", {})
+    save_network(XRDS(preset_config("fast", 2)), tmp_path / "fast_x2.safetensors", {})
     picture = render(life, 2, samples=8, weights=tmp_path)
     assert picture.radiance.shape == (33, 45, 3)
     reference = low_picture(life)

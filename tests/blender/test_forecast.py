@@ -9,9 +9,9 @@ from xrds_blender.planning import forecast
 
 @pytest.mark.parametrize(("preset", "scale"), list(forecast.NETWORK_BYTES))
 def test_network_bytes_are_those_of_the_network(preset: str, scale: int) -> None:
-    from xrds_core import upscaler
-    from xrds_core.cost import measure
-    from xrds_core.network import XRDS, preset_config
+    from xrds_core.superres import upscaler
+    from xrds_core.superres.cost import measure
+    from xrds_core.superres.network import XRDS, preset_config
 
     cost = measure(XRDS(preset_config(preset, scale)).eval())
     told = forecast.NETWORK_BYTES[preset, scale]

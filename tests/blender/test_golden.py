@@ -18,9 +18,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import render
-from xrds_core import inputs, upscaler
-from xrds_core.metrics import psnr
+from xrds_core.superres import inputs, upscaler
 from xrds_lab.demo import scene as demo
+from xrds_lab.metrics import psnr
 
 RECORD = Path(__file__).with_name("golden.json")
 SERIES = ".".join(map(str, bpy.app.version[:2]))

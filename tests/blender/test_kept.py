@@ -14,6 +14,8 @@ import numpy as np
 import pytest
 from channels import read_channels
 
+from xrds_core import exr
+
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
@@ -22,7 +24,6 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.command.scene_file import SceneChoice
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import full_size
-from xrds_core import exr
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError, UsageError
 from xrds_core.sequence import cameras

@@ -8,6 +8,8 @@ from typing import Any
 
 import pytest
 
+from xrds_core.exr import library
+
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender.frame import record
@@ -104,7 +106,6 @@ def test_the_commands_files_tell_what_made_them(
 ) -> None:
     from xrds_blender.command.render_file import render_file
     from xrds_blender.command.whole_file import is_whole
-    from xrds_core import exr_library
 
     path, output = tmp_path / "life.blend", tmp_path / f"frame{suffix}"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
@@ -113,7 +114,7 @@ def test_the_commands_files_tell_what_made_them(
     if suffix == ".png":
         found = texts(output.read_bytes())
     else:
-        found = exr_library.read(output)[0].attributes
+        found = library.read(output)[0].attributes
     told = {name: found[f"xrds.{name}"] for name in (*NAMES, "left_out")}
     assert (told["way"], told["scale"], told["samples"]) == ("full size", "1", "3")
 

@@ -16,8 +16,10 @@ import pytest
 from PIL import Image
 
 from xrds_blender.command import main
-from xrds_core import exr, weights
-from xrds_core.network import XRDS, preset_config
+from xrds_core import exr
+from xrds_core.superres import weights
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_lab.weights import save_network
 
 STAGES = {"total", "sync", "beauty", "denoise", "guides", "network", "write"}
 
@@ -41,7 +43,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "blind.blend"))
     (folder / "broken.blend").write_bytes(b"BLENDER-v405" + bytes(100))
     network = XRDS(preset_config("fast", 2))
-    weights.save(network, folder / weights.file_name("fast", 2), {})
+    save_network(network, folder / weights.file_name("fast", 2), {})
     return folder
 
 

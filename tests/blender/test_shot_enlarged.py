@@ -21,7 +21,7 @@ from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import super_resolution
 from xrds_core.errors import XRDSError
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres.upscaler import Upscaler
 
 FRAMES = [1, 2, 3, 4, 5]
 pytestmark = pytest.mark.usefixtures("one_thread")

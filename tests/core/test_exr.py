@@ -12,11 +12,17 @@ import OpenEXR
 import pytest
 from channels import read_channels
 
-from xrds_core import exr_library, exr_limits
 from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
-from xrds_core.exr import Names, read_beauty, read_guides, write_picture
-from xrds_core.exr_encoding import CODECS, Encoding
+from xrds_core.exr import (
+    Names,
+    library,
+    limits,
+    read_beauty,
+    read_guides,
+    write_picture,
+)
+from xrds_core.exr.encoding import CODECS, Encoding
 
 LAYOUTS = ("flat", "layered", "parts", "named parts")
 
@@ -73,7 +79,7 @@ def path(tmp_path: Path) -> Path:
 @pytest.fixture
 def apart(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a program that has an OpenEXR of its own."""
-    monkeypatch.setattr(exr_library, "_is_shadowed", lambda: True)
+    monkeypatch.setattr(library, "_is_shadowed", lambda: True)
 
 
 # --- in a process of its own ----------------------------------------------------------
@@ -84,9 +90,9 @@ def test_a_process_of_its_own_reads_what_this_one_would(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_passes(path, PASSES, "parts")
-    parts = exr_library.read(path)
-    monkeypatch.setattr(exr_library, "_is_shadowed", lambda: False)
-    for part, expected in zip(parts, exr_library.read(path), strict=True):
+    parts = library.read(path)
+    monkeypatch.setattr(library, "_is_shadowed", lambda: False)
+    for part, expected in zip(parts, library.read(path), strict=True):
         assert replace(part, channels={}) == replace(expected, channels={})
         assert part.channels.keys() == expected.channels.keys()
         for name, pixels in part.channels.items():
@@ -100,7 +106,7 @@ def test_a_process_of_its_own_writes(
 ) -> None:
     channels = planes(8, "RGBA")
     write_picture(path, channels)
-    monkeypatch.setattr(exr_library, "_is_shadowed", lambda: False)
+    monkeypatch.setattr(library, "_is_shadowed", lambda: False)
     written = read_channels(path)
     assert written.keys() == channels.keys()
     for name, plane in channels.items():
@@ -406,19 +412,19 @@ def test_the_limit_can_be_raised_and_lowered(
     path: Path, monkeypatch: pytest.MonkeyPatch, shadowed: bool
 ) -> None:
     write(path, planes(0))
-    monkeypatch.setattr(exr_library, "_is_shadowed", lambda: shadowed)
-    monkeypatch.setattr(exr_limits, "_allowed", 0)
-    exr_limits.allow(4 * 6 * 3 * 4)
+    monkeypatch.setattr(library, "_is_shadowed", lambda: shadowed)
+    monkeypatch.setattr(limits, "_allowed", 0)
+    limits.allow(4 * 6 * 3 * 4)
     assert read_beauty(path).radiance.shape == (4, 6, 3)
-    exr_limits.allow(4 * 6 * 3 * 4 - 1)
+    limits.allow(4 * 6 * 3 * 4 - 1)
     with pytest.raises(PictureError, match="claims"):
         read_beauty(path)
 
 
 def test_black_of_any_size_is_no_claim() -> None:
     """A packed picture holds no more bytes than the limit for its size allows."""
-    assert exr_limits.limit_of(0) >= 8192 * 8192 * 4 * 4
-    assert exr_limits.limit_of(10**8) == 10**11
+    assert limits.limit_of(0) >= 8192 * 8192 * 4 * 4
+    assert limits.limit_of(10**8) == 10**11
 
 
 def test_a_header_that_claims_too_much(path: Path) -> None:

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import torch
 
-from xrds_core import exr_upscale, weights
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.exr import read_beauty, write_picture
-from xrds_core.exr_upscale import upscale_file
-from xrds_core.network import XRDS, preset_config
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres import exr_upscale, weights
+from xrds_core.superres.exr_upscale import upscale_file
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_core.superres.upscaler import Upscaler
+from xrds_lab.weights import save_network
 
 
 def planes(name: str, letters: str, height: int, width: int) -> dict[str, np.ndarray]:
@@ -29,7 +30,7 @@ def guides(request: pytest.FixtureRequest) -> str:
 def folder(tmp_path: Path, guides: str) -> Path:
     torch.manual_seed(0)
     network = XRDS(preset_config("fast", 2, guides))
-    weights.save(network, tmp_path / weights.file_name("fast", 2, guides), {})
+    save_network(network, tmp_path / weights.file_name("fast", 2, guides), {})
     passes = {
         **planes("ViewLayer.Combined.", "RGBA", 19, 16),
         **planes("ViewLayer.Noisy Image.", "RGB", 19, 16),

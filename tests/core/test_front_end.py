@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from xrds_core import front_end
 from xrds_core.arrays import Array
-from xrds_core.front_end import (
+from xrds_core.superres import front_end
+from xrds_core.superres.front_end import (
     area_mean,
     auto_exposure,
     clean_albedo,

@@ -9,12 +9,18 @@ import pytest
 import torch
 from torch.nn import functional
 
-from xrds_core import guide_filter, guide_noise, weights
 from xrds_core.errors import UsageError, WeightsError
-from xrds_core.exr_upscale import upscale_file
-from xrds_core.guide_filter import FEW_SAMPLES, STRENGTH, GuideFilter, filter_guides
-from xrds_core.upscaler import Upscaler
-from xrds_core.weights import guide_filter_record, load_guide_filter, save_guide_filter
+from xrds_core.superres import guide_filter, guide_noise, weights
+from xrds_core.superres.exr_upscale import upscale_file
+from xrds_core.superres.guide_filter import (
+    FEW_SAMPLES,
+    STRENGTH,
+    GuideFilter,
+    filter_guides,
+)
+from xrds_core.superres.upscaler import Upscaler
+from xrds_core.superres.weights import guide_filter_record, load_guide_filter
+from xrds_lab.weights import save_guide_filter
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xrds_core import guide_noise
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import Cancelled, UsageError
-from xrds_core.guide_filter import FEW_SAMPLES
-from xrds_core.guide_noise import NOISY_SAMPLES, remover
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres import guide_noise
+from xrds_core.superres.guide_filter import FEW_SAMPLES
+from xrds_core.superres.guide_noise import NOISY_SAMPLES, remover
+from xrds_core.superres.upscaler import Upscaler
 
 pytest.importorskip("mitsuba_oidn")
 SIDE = 96

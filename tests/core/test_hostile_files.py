@@ -16,8 +16,9 @@ import numpy as np
 import pytest
 import torch
 
-from xrds_core import exr, weights
-from xrds_core.network import XRDS, NetworkConfig
+from xrds_core import exr
+from xrds_core.superres.network import XRDS, NetworkConfig
+from xrds_lab.weights import save_network
 
 if sys.platform == "win32":
     pytest.skip("limits of memory are POSIX'", allow_module_level=True)
@@ -29,7 +30,10 @@ COUNT = 150
 # The readers, and the errors that they may raise; anything else is a fault.
 READERS = {
     "exr": ("from xrds_core.exr import read_beauty as read", "PictureError"),
-    "safetensors": ("from xrds_core.weights import load as read", "WeightsError"),
+    "safetensors": (
+        "from xrds_core.superres.weights import load as read",
+        "WeightsError",
+    ),
     "toml": ("from xrds_lab.training.config import read_config as read", "UsageError"),
     "npz": (
         "from xrds_lab.training.windows import read_window\n"
@@ -80,7 +84,7 @@ def good_safetensors(path: Path) -> None:
     config = NetworkConfig(
         scale=2, groups=1, blocks=1, channels=4, guide_channels=4, window_size=2
     )
-    weights.save(XRDS(config), path, {"preset": "fast"})
+    save_network(XRDS(config), path, {"preset": "fast"})
 
 
 def good_toml(path: Path) -> None:

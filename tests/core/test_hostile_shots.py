@@ -20,9 +20,11 @@ import pytest
 import sequences
 from sequences import CYCLES, frame, picture, write
 
+from xrds_core import exr
+
 pytest.importorskip("mitsuba_oidn")
 
-from xrds_core import exr, files
+from xrds_core import files
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.frames import in_words

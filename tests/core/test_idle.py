@@ -7,11 +7,11 @@ import pytest
 import torch
 
 from xrds_core.arrays import Array
-from xrds_core.front_end import demodulated_base
-from xrds_core.idle import write_base
-from xrds_core.inputs import check
-from xrds_core.network import XRDS, preset_config
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres.front_end import demodulated_base
+from xrds_core.superres.idle import write_base
+from xrds_core.superres.inputs import check
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_core.superres.upscaler import Upscaler
 
 SIDE, SCALE = 320, 2
 THING = slice(128, 160)  # low-resolution rows and columns that are not background

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from xrds_core import info, operations
+from xrds_core import info
 from xrds_core.errors import WeightsError
-from xrds_core.network import PRESETS, NetworkConfig, preset_config
+from xrds_core.superres.network import PRESETS, NetworkConfig, preset_config
+from xrds_lab import operations
 
 # (RDST per XDG, XDG): parameters (M), MACs (G), FLOPs (T) as the paper prints them.
 PRINTED = {
@@ -27,7 +28,7 @@ def test_paper_table_is_the_papers() -> None:
             f"{row['macs'] / 1e9:.2f}",
             f"{row['flops'] / 1e12:.2f}",
         )
-        for row in operations.shipped_costs()["paper_table"]
+        for row in info.shipped_costs()["paper_table"]
     }
     assert told == PRINTED
 
@@ -56,7 +57,7 @@ def test_presets_cost_what_their_names_say(scale: int) -> None:
 
 
 def test_what_is_shipped_is_what_is_counted() -> None:
-    assert operations.shipped_costs() == operations.costs(), "call write_costs()"
+    assert info.shipped_costs() == operations.costs(), "call write_costs()"
 
 
 def test_what_has_no_weights_counts_nothing(monkeypatch: pytest.MonkeyPatch) -> None:

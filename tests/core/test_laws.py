@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 
 from xrds_core.arrays import Array
-from xrds_core.front_end import (
+from xrds_core.superres.front_end import (
     TRANSFER_GAIN,
     area_mean,
     auto_exposure,
@@ -24,7 +24,7 @@ from xrds_core.front_end import (
     transfer,
     upsample_alpha,
 )
-from xrds_core.tiling import fit, tiles
+from xrds_core.superres.tiling import fit, tiles
 
 settings.register_profile("laws", max_examples=30, deadline=None, derandomize=True)
 settings.load_profile("laws")

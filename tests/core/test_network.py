@@ -8,8 +8,13 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from xrds_core.network import GUIDE_CHANNELS, XRDS, NetworkConfig, preset_config
-from xrds_core.regression import explain
+from xrds_core.superres.network import (
+    GUIDE_CHANNELS,
+    XRDS,
+    NetworkConfig,
+    preset_config,
+)
+from xrds_core.superres.regression import explain
 
 TINY = NetworkConfig(groups=1, blocks=1, channels=8, guide_channels=4, window_size=4)
 
@@ -141,6 +146,6 @@ def test_strips_are_of_no_matter_to_the_picture(
     radiance, guides = torch.rand(1, 3, 64, 64), torch.rand(1, 6, 128, 128)
     with torch.inference_mode():
         whole = network(radiance, guides)
-        monkeypatch.setattr("xrds_core.network.STRIP_CELLS", 1)
+        monkeypatch.setattr("xrds_core.superres.network.STRIP_CELLS", 1)
         parts = network(radiance, guides)
     assert (parts - whole).abs().max() < 1e-5 * whole.abs().max()

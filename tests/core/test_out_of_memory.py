@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import torch
 
-from xrds_core import upscaler
 from xrds_core.devices import free_memory, is_out_of_memory
 from xrds_core.errors import OutOfMemory
-from xrds_core.network import XRDS, preset_config
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres import upscaler
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_core.superres.upscaler import Upscaler
 
 LOW = (210, 8)  # two tiles of the smallest size
 CPU = "[enforce fail at alloc_cpu.cpp:127] DefaultCPUAllocator: can't allocate memory"
@@ -100,8 +100,8 @@ import resource
 import numpy as np
 import torch
 from xrds_core.errors import OutOfMemory
-from xrds_core.network import XRDS, preset_config
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_core.superres.upscaler import Upscaler
 
 torch.set_num_threads(1)
 made = Upscaler(device="cpu", weights=XRDS(preset_config("fast", 2)))

@@ -7,7 +7,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from xrds_core.regression import (
+from xrds_core.superres.regression import (
     ALBEDO_EPSILON,
     GRAIN_LIMIT,
     RESTORED_LIMIT,
@@ -160,6 +160,6 @@ def test_bands_are_of_no_matter(scale: int, monkeypatch: pytest.MonkeyPatch) -> 
     low, noisy = torch.rand(2, 1, 3, 50, 10)
     guides = torch.rand(1, 6, 50 * scale, 10 * scale)
     whole = explain(low, noisy, guides, scale)
-    monkeypatch.setattr("xrds_core.regression.BAND", 7)
+    monkeypatch.setattr("xrds_core.superres.regression.BAND", 7)
     for part, expected in zip(explain(low, noisy, guides, scale), whole, strict=True):
         torch.testing.assert_close(part, expected)

@@ -15,9 +15,10 @@ import sequences
 import shots
 from sequences import CYCLES, frame, picture, write
 
+from xrds_core import exr
+
 pytest.importorskip("mitsuba_oidn")
 
-from xrds_core import exr
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.sequence.denoise import Files, denoise_sequence

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xrds_core.tiling import fit, tiles
+from xrds_core.superres.tiling import fit, tiles
 
 SIZES = (1, 7, 16, 31, 64, 65, 100, 257)
 

@@ -9,12 +9,13 @@ import pytest
 import torch
 from torch.nn import functional
 
-from xrds_core import upscaler, weights
 from xrds_core.arrays import Array
 from xrds_core.errors import Cancelled, PictureError, UsageError, WeightsError
-from xrds_core.front_end import transfer
-from xrds_core.network import XRDS, preset_config
-from xrds_core.upscaler import Upscaler, upscale
+from xrds_core.superres import upscaler, weights
+from xrds_core.superres.front_end import transfer
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_core.superres.upscaler import Upscaler, upscale
+from xrds_lab.weights import save_network
 
 
 def network(scale: int = 2, guides: str = "fast", preset: str = "fast") -> XRDS:
@@ -349,8 +350,8 @@ def test_a_memory_limit_makes_tiles(fast: Upscaler) -> None:
 MEASURE = """
 import sys
 import numpy as np
-from xrds_core.network import XRDS, preset_config
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_core.superres.upscaler import Upscaler
 
 def status(key):
     lines = open("/proc/self/status").read().splitlines()
@@ -494,7 +495,7 @@ def test_bands_of_alpha_meet(fast: Upscaler, monkeypatch: pytest.MonkeyPatch) ->
     low = np.dstack((radiance, textured(40, 20, 1, seed=7)))
     cover = textured(80, 40, 1, seed=8)[..., 0]
     expected = fast(low, albedo, normal, guide_alpha=cover).radiance
-    monkeypatch.setattr("xrds_core.alpha._BAND", 7)
+    monkeypatch.setattr("xrds_core.superres.alpha._BAND", 7)
     result = fast(low, albedo, normal, guide_alpha=cover).radiance
     np.testing.assert_array_equal(result, expected)
 
@@ -513,7 +514,7 @@ def test_upscale_uses_shipped_presets(
     monkeypatch: pytest.MonkeyPatch, tmp_path: object
 ) -> None:
     monkeypatch.setattr(weights, "DIRECTORY", tmp_path)
-    weights.save(network(4), f"{tmp_path}/fast_x4.safetensors", {})
+    save_network(network(4), f"{tmp_path}/fast_x4.safetensors", {})
     inputs = picture(6, 5, 4)
     upscaler._upscaler.cache_clear()
     fractions: list[float] = []

@@ -10,9 +10,10 @@ import torch
 from safetensors import safe_open
 from safetensors.torch import save_file
 
-from xrds_core import weights
 from xrds_core.errors import WeightsError
-from xrds_core.network import XRDS, NetworkConfig
+from xrds_core.superres import weights
+from xrds_core.superres.network import XRDS, NetworkConfig
+from xrds_lab.weights import save_network
 
 CONFIG = NetworkConfig(
     scale=2,
@@ -37,7 +38,7 @@ def network() -> XRDS:
 @pytest.fixture
 def path(network: XRDS, tmp_path: Path) -> Path:
     file = tmp_path / "fast_x2.safetensors"
-    weights.save(network, file, RECORD)
+    save_network(network, file, RECORD)
     return file
 
 
@@ -60,7 +61,7 @@ def test_packing_again_changes_nothing(path: Path, tmp_path: Path) -> None:
     network, _ = weights.load(path)
     with torch.no_grad():
         network.fuse.weight[0] = 0  # a channel without any weight
-    weights.save(network, tmp_path / "again.safetensors", RECORD)
+    save_network(network, tmp_path / "again.safetensors", RECORD)
     again, _ = weights.load(tmp_path / "again.safetensors")
     for name, value in network.state_dict().items():
         torch.testing.assert_close(again.state_dict()[name], value, rtol=1e-3, atol=0)
@@ -100,7 +101,7 @@ def test_diverged_weights_are_not_saved(network: XRDS, tmp_path: Path) -> None:
     with torch.no_grad():
         network.fuse.bias[0] = 1e6
     with pytest.raises(WeightsError, match=r"fuse\.bias"):
-        weights.save(network, tmp_path / "x.safetensors", {})
+        save_network(network, tmp_path / "x.safetensors", {})
     assert not list(tmp_path.iterdir())
 
 

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from xrds_core import weights
-from xrds_core.network import XRDS, preset_config
-from xrds_core.weights_header import headers, read_header
+from xrds_core.superres import weights
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_core.superres.weights_header import headers, read_header
+from xrds_lab.weights import save_network
 
 
 def test_headers_tell_what_loading_tells() -> None:
@@ -20,7 +21,10 @@ def test_headers_tell_what_loading_tells() -> None:
 
 
 def test_no_torch_is_loaded() -> None:
-    code = "import sys, xrds_core.weights_header as w; w.headers(); print(*sys.modules)"
+    code = (
+        "import sys, xrds_core.superres.weights_header as w; "
+        "w.headers(); print(*sys.modules)"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=True
     )
@@ -42,5 +46,5 @@ def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
     path = tmp_path / "fast_x2.safetensors"
     path.write_bytes(b"")
     assert headers(tmp_path) == []
-    weights.save(XRDS(preset_config("fast", 2)), path, {"blender_series": "5.2"})
+    save_network(XRDS(preset_config("fast", 2)), path, {"blender_series": "5.2"})
     assert [h.blender_series for h in headers(tmp_path)] == ["5.2"]

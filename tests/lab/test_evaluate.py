@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from xrds_core import exr, metrics, weights
+from xrds_core import exr
 from xrds_core.errors import UsageError
-from xrds_core.network import XRDS, preset_config
+from xrds_core.superres import weights
+from xrds_core.superres.network import XRDS, preset_config
+from xrds_lab import metrics
 from xrds_lab.bench.evaluate import evaluate
 from xrds_lab.bench.inputs import Folder, Request
 from xrds_lab.bench.journal import Strict
@@ -22,6 +24,7 @@ from xrds_lab.bench.pictures import Networks, Pictures
 from xrds_lab.bench.rivals import ENLARGEMENTS
 from xrds_lab.bench.samples import samples_table
 from xrds_lab.bench.windows import find_shots
+from xrds_lab.weights import save_network
 
 FRAME, WINDOW = [128, 96], [32, 16, 64, 48]
 
@@ -159,7 +162,7 @@ def test_a_spoilt_file_is_rendered_again(world: World, report: dict[str, Any]) -
 
 def test_weights_and_whole_frames(world: World) -> None:
     network = XRDS(preset_config("fast", 2))
-    weights.save(network, world.folder / "fast_x2.safetensors", {})
+    save_network(network, world.folder / "fast_x2.safetensors", {})
     report = world.run(
         weights=world.folder,
         timing=True,
@@ -202,7 +205,7 @@ def test_table_of_samples(world: World, capsys: pytest.CaptureFixture[str]) -> N
     folder.mkdir()
     for guides in ("fast", "full"):
         network = XRDS(preset_config("fast", 2, guides))
-        weights.save(network, folder / weights.file_name("fast", 2, guides), {})
+        save_network(network, folder / weights.file_name("fast", 2, guides), {})
     report = samples_table(
         [world.scene],
         windows=world.windows,

@@ -13,7 +13,7 @@ import torch
 
 from xrds_blender.command import main
 from xrds_core.errors import Cancelled, PictureError, UsageError
-from xrds_core.weights import load_guide_filter
+from xrds_core.superres.weights import load_guide_filter
 from xrds_lab.training import guide_filter as module
 from xrds_lab.training.guide_filter import (
     Learner,

@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from xrds_lab.weights import save_network
+
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("torch")
 
-from xrds_core import weights
-from xrds_core.network import XRDS, preset_config
+from xrds_core.superres import weights
+from xrds_core.superres.network import XRDS, preset_config
 from xrds_lab.stability import load
 from xrds_lab.stability.load import Frame, drive, growth, settled
 
@@ -35,7 +37,7 @@ def moving(life: Any) -> Any:
 def untrained(tmp_path: Path) -> Path:
     """A folder with weights: the stand-in would keep what it is given."""
     made = XRDS(preset_config("fast", 2))
-    weights.save(made, tmp_path / weights.file_name("fast", 2), {})
+    save_network(made, tmp_path / weights.file_name("fast", 2), {})
     return tmp_path
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from xrds_core import weights
 from xrds_core.errors import UsageError
+from xrds_core.superres import weights
 from xrds_lab.stability import report, suite
 from xrds_lab.stability.measured import Measured
 from xrds_lab.stability.subject import Subject

@@ -18,8 +18,8 @@ import pytest
 import torch
 from PIL import Image
 
-from xrds_core import weights
 from xrds_core.errors import Cancelled, UsageError, WeightsError
+from xrds_core.superres import weights
 from xrds_lab.training.ablations import TABLES, Changes, _run_name, ablate, lines
 from xrds_lab.training.config import TrainingConfig, read_config, to_toml
 from xrds_lab.training.data import Variation

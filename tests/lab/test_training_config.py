@@ -9,7 +9,7 @@ import pytest
 
 import xrds_lab.training
 from xrds_core.errors import UsageError
-from xrds_core.network import NetworkConfig, preset_config
+from xrds_core.superres.network import NetworkConfig, preset_config
 from xrds_lab.training.config import TrainingConfig, read_config, to_toml
 from xrds_lab.training.data import Variation
 

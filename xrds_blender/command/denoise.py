@@ -104,7 +104,6 @@ _PASS_HELP = {
 
 
 def _denoise(options: argparse.Namespace) -> dict[str, Any]:
-    from xrds_core import exr_limits
     from xrds_core.denoising import Denoiser
     from xrds_core.sequence.cameras import read_cameras
     from xrds_core.sequence.denoise import Files, denoise_sequence

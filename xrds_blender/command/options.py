@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import UsageError
-from xrds_core.exr_encoding import CODECS, FLOAT_ZIP, Encoding
+from xrds_core.exr.encoding import CODECS, FLOAT_ZIP, Encoding
 from xrds_core.frames import RADIUS
 
 from ..frame.job import GUIDES, PRESETS, QUALITIES, SCALES, RenderJob

@@ -13,7 +13,7 @@ from xrds_core import files
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
-from xrds_core.exr_encoding import FLOAT_ZIP, Encoding
+from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
 from xrds_core.frames import frame_path
 
 from . import png_text
@@ -63,7 +63,6 @@ def save(
     if path.suffix.lower() == ".png":
         _write_png(path, radiance, alpha, scene, metadata or {})
         return
-    from xrds_core import exr
 
     channels = {name: radiance[..., i] for i, name in enumerate("RGB")}
     if scene.render.film_transparent:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import PictureError, UsageError, XRDSError
-from xrds_core.exr_encoding import FLOAT_ZIP, Encoding
+from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
 from xrds_core.frames import frame_path
 from xrds_core.notices import warn
 from xrds_core.time_left import Clock

@@ -56,7 +56,6 @@ def add_upscale(commands: Any) -> argparse.ArgumentParser:
 
 
 def _upscale(options: argparse.Namespace) -> dict[str, Any]:
-    from xrds_core import exr_limits
 
     from ..frame.torch_folder import load
 

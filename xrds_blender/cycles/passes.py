@@ -137,7 +137,7 @@ class CyclesPasses(LayerSession):
         """
         if not self._render.use_border:
             return None
-        from xrds_core.front_end import auto_exposure
+        from xrds_core.superres.front_end import auto_exposure
 
         width, height = self._size
         scale = max(-(-self.width // width), -(-self.height // height))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from xrds_core.weights_header import WeightsHeader, headers, read_header
+from xrds_core.superres.weights_header import WeightsHeader, headers, read_header
 
 from ..cycles import session
 from ..planning.budget import Network

@@ -100,8 +100,9 @@ def _bilinear(
     low: Array, scale: int, offset: tuple[int, int], shape: tuple[int, ...]
 ) -> Array:
     """Enlarge (h, w, channels) without a network and cut the region out."""
-    from xrds_core.baselines import bilinear
+    from xrds_core.superres.front_end import upsample_bilinear
+    from xrds_core.superres.layout import to_picture, to_planes
 
     rows, columns = offset
-    large = bilinear(low, scale)
+    large = to_picture(upsample_bilinear(to_planes(low), scale))
     return large[rows : rows + shape[0], columns : columns + shape[1]]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import exr
-from ..exr_library import Part
+from ..exr.library import Part
 from ..temporal.frame import LARGEST_HALF, noise_in
 from .cameras import to_header
 from .names import CAMERA_NORMAL, NOISE, NOISY

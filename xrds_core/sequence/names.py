@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
-from ..exr_channels import COMPONENTS
+from ..exr.channels import COMPONENTS
 from .errors import Unfit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from ..exr_channels import Channels
+    from ..exr.channels import Channels
 
 NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
 CAMERA_NORMAL = "Denoising Normal"

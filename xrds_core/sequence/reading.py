@@ -9,16 +9,9 @@ import numpy as np
 
 from ..errors import PictureError
 from ..exr import File
-from ..exr_limits import is_mostly_empty
+from ..exr.limits import is_mostly_empty
 from ..frames import MOST_RADIUS, frame_path
-from ..temporal.frame import (
-    LARGEST_HALF,
-    SKY_DEPTH,
-    Camera,
-    Frame,
-    Stored,
-    store,
-)
+from ..temporal.frame import LARGEST_HALF, SKY_DEPTH, Camera, Frame, Stored, store
 from ..temporal.halves import Halves
 from ..temporal.motion import centres, pixels_of
 from ..temporal.noise import Noise
@@ -32,7 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..arrays import Array
-    from ..exr_library import Part, Window
+    from ..exr.library import Part, Window
 
 SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
 NAME = "cameraLabel"

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core.errors import XRDSError
-from xrds_core.metrics import to_srgb
 
+from ..metrics import to_srgb
 from .sweep import Config
 
 if TYPE_CHECKING:

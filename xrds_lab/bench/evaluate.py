@@ -15,10 +15,10 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.budget import Network
-from xrds_core import metrics
 from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
 
+from .. import metrics
 from ..progress import silent
 from . import table
 from .inputs import GENERATION, kept

@@ -22,8 +22,9 @@ import numpy as np
 from xrds_blender.command import console
 from xrds_blender.planning.budget import Choice, Curve, ErrorModel, Model
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
-from xrds_core import metrics
 from xrds_core.atomic import read_json, write_json
+
+from .. import metrics
 
 COUNTS = (1, 2, 3, 4, 5, 6, 8, 12, 16, 24, 32, 64)
 # Blue noise of other counts is laid out less well: five samples are hardly better than

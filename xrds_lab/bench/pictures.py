@@ -13,11 +13,13 @@ import numpy as np
 from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_blender.planning.denoiser import Denoiser as Mode
-from xrds_core import denoising, exr, front_end, metrics
+from xrds_core import denoising, exr
 from xrds_core.atomic import replacing
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError
+from xrds_core.superres import front_end
 
+from .. import metrics
 from ..checksum import checksum
 from .inputs import GENERATION, Folder, Request, open_scene, sample_adaptively
 from .journal import Strict
@@ -43,7 +45,7 @@ class Networks:
     """Upscalers by network, each loaded once."""
 
     def __init__(self, weights: Path | None, device: str) -> None:
-        from xrds_core import weights as files
+        from xrds_core.superres import weights as files
 
         self.weights, self.device = weights, device
         self._loaded: dict[Network, Any] = {}
@@ -59,7 +61,7 @@ class Networks:
 
     def __getitem__(self, network: Network) -> Any:
         if network not in self._loaded:
-            from xrds_core.upscaler import Upscaler
+            from xrds_core.superres.upscaler import Upscaler
 
             self._loaded[network] = Upscaler(
                 *network, self.device, weights=self.weights

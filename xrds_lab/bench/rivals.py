@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from xrds_core import baselines, front_end
 from xrds_core.arrays import Array
+from xrds_core.superres import front_end
+
+from .. import baselines
 
 # (radiance, radiance before denoising, albedo, normal, scale) -> picture; those that
 # need no guides take None

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from xrds_core.atomic import replacing
-from xrds_core.metrics import to_srgb
 
+from ..metrics import to_srgb
 from .crops import largest
 from .table import COLUMNS
 

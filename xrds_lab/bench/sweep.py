@@ -90,14 +90,14 @@ class Config:
     @property
     def has_noisy_guides(self) -> bool:
         """Whether the noise of its guides is filtered before the network sees them."""
-        from xrds_core.guide_filter import FEW_SAMPLES
+        from xrds_core.superres.guide_filter import FEW_SAMPLES
 
         return self.method == "xrds" and 0 < self.guide_samples < FEW_SAMPLES
 
     @property
     def denoises_guides(self) -> bool:
         """Whether OIDN takes the noise of its guides out instead."""
-        from xrds_core.guide_noise import is_noisy
+        from xrds_core.superres.guide_noise import is_noisy
 
         return self.method == "xrds" and is_noisy(self.guide_samples)
 

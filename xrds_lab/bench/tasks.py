@@ -150,7 +150,7 @@ def _guide_filter(networks: Networks, network: Network, window: Window) -> Task:
     """Time the filter of a whole frame's guides; all networks share it."""
     import torch
 
-    from xrds_core.guide_filter import filter_guides
+    from xrds_core.superres.guide_filter import filter_guides
 
     def task() -> Run:
         upscaler, (_, full) = networks[network], noise(window, network.scale)
@@ -169,8 +169,8 @@ def _guide_filter(networks: Networks, network: Network, window: Window) -> Task:
 
 def _guide_denoiser(networks: Networks, network: Network, window: Window) -> Task:
     """Time the denoising of a whole frame's guides; all networks share it."""
-    from xrds_core.guide_filter import FEW_SAMPLES
-    from xrds_core.guide_noise import remover
+    from xrds_core.superres.guide_filter import FEW_SAMPLES
+    from xrds_core.superres.guide_noise import remover
 
     def task() -> Run:
         upscaler, (_, full) = networks[network], noise(window, network.scale)

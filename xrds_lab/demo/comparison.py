@@ -10,8 +10,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from xrds_core.atomic import replacing
-from xrds_core.metrics import to_srgb
 
+from ..metrics import to_srgb
 from ..shots import film
 
 if TYPE_CHECKING:

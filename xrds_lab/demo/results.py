@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_blender.command.picture_file import save
-from xrds_core import metrics
 from xrds_core.atomic import write_json
 
+from .. import metrics
 from ..bench import machine
 from ..shots.figures import wrong_change
 from . import comparison

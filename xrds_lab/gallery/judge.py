@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from xrds_core.arrays import Array
-from xrds_core.metrics import to_srgb
+
+from ..metrics import to_srgb
 
 BLOCK = 32  # pixels
 UNSEEN = 1e-5

@@ -23,11 +23,11 @@ from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.arrays import Array
 from xrds_core.atomic import write_json
-from xrds_core.metrics import to_srgb
 from xrds_core.temporal.frame import Frame, Stored, store
 from xrds_core.temporal.window import Shot as Window
 
 from ..checksum import checksum
+from ..metrics import to_srgb
 from .frames import REACH, Measure, Request, Store
 from .judge import BLOCK, Verdict, judge, unsteadiness
 from .table import Shot

@@ -17,17 +17,7 @@ from typing import Any
 
 from xrds_core.errors import UsageError
 
-from . import (
-    bending,
-    cameras,
-    cards,
-    changes,
-    clear,
-    lights,
-    mirrors,
-    small,
-    textures,
-)
+from . import bending, cameras, cards, changes, clear, lights, mirrors, small, textures
 from .stage import SHUTTER, SIZE, Set, open_set
 
 CHOOSING, JUDGING = "choosing", "judging"

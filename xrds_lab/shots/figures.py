@@ -18,11 +18,11 @@ from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.atomic import write_json
-from xrds_core.metrics import all_metrics, to_srgb
 from xrds_core.temporal.frame import Stored, store
 from xrds_core.temporal.window import Shot
 
 from ..checksum import checksum
+from ..metrics import all_metrics, to_srgb
 from . import rivals
 from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
 from .motions import MOTIONS
@@ -223,7 +223,7 @@ class SceneFigures:
 
 def best_mode(clip: Clip, reference: Array) -> Denoiser:
     """The mode of Cycles' denoiser with the highest PSNR on the middle frame."""
-    from xrds_core.metrics import psnr
+    from ..metrics import psnr
 
     return max(
         rivals.MODES,

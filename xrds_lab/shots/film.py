@@ -9,8 +9,8 @@ import numpy as np
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_core.atomic import replacing
-from xrds_core.metrics import to_srgb
 
+from ..metrics import to_srgb
 from .figures import REACH, XRDS, Clip
 from .report import cases, compared
 

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xrds_core import metrics
-
+from .. import metrics
 from .measured import Measured
 from .stiff import stops
 

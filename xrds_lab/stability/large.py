@@ -21,7 +21,7 @@ LIMIT = 2 << 30
 _PROGRAM = """
 import json, sys
 import numpy as np
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres.upscaler import Upscaler
 
 preset, scale, precision, side, limit = sys.argv[1], *sys.argv[2:6]
 scale, side, limit = int(scale), int(side), int(limit)

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xrds_core import baselines, metrics
-
+from .. import baselines, metrics
 from .measured import Measured, faults, worst
 from .pictures import Inputs, blocks, constant, dome, lit_surface
 

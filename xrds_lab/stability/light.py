@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xrds_core import baselines
-
+from .. import baselines
 from .measured import Measured, distance, faults, relative_difference, worst
 from .pictures import Inputs, area_mean, blocks, constant, even, lit_surface, textured
 from .pictures import waves as smooth_light

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from xrds_core import exr
 from xrds_core.sequence import cameras
 from xrds_core.temporal.frame import Camera, Sphere
 
@@ -45,7 +46,6 @@ class Case:
 
     def picture(self, path: Path) -> list[str]:
         """The channels of an output that must be finite."""
-        from xrds_core import exr
 
         names = exr.File(path).names.names
         kinds = ["", "Combined.", "V.Combined."]

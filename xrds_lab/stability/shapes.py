@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xrds_core.front_end import transfer
+from xrds_core.superres.front_end import transfer
 
 from .measured import Measured, faults
 from .pictures import Inputs, blocks, textured

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
-from xrds_core import metrics
 from xrds_core.atomic import replacing
 
+from .. import metrics
 from .measured import Measured
 from .stiff import GUIDE_SAMPLES, SAMPLES, SCALES, before_denoising, equal_samples
 

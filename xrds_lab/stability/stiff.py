@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
-from xrds_core import baselines, front_end, metrics
 from xrds_core.atomic import replacing
+from xrds_core.superres import front_end
 
+from .. import baselines, metrics
 from .measured import Measured, faults
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_core import weights
-from xrds_core.upscaler import Upscaler
+from xrds_core.superres import weights
+from xrds_core.superres.upscaler import Upscaler
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

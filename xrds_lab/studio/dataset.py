@@ -164,7 +164,7 @@ def _windows(
     recipe: Recipe, stage: Stage, seed: int
 ) -> Iterator[tuple[View, Window, float]]:
     """Views and windows worth rendering, with the exposure of the whole frame."""
-    from xrds_core.front_end import auto_exposure
+    from xrds_core.superres.front_end import auto_exposure
 
     rng = random.Random(f"{seed} windows")
     used = 0

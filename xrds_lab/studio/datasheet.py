@@ -16,7 +16,8 @@ import numpy as np
 
 from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
-from xrds_core.metrics import to_srgb
+
+from ..metrics import to_srgb
 
 COLUMNS, SIDE, MOST = 12, 128, 96  # of the sheet: cells a row, their pixels, cells
 QUALITY = 85  # of the JPEG

@@ -1,1 +1,1 @@
-"""Training of `xrds_core.network.XRDS`; not part of the extension."""
+"""Training of `xrds_core.superres.network.XRDS`; not part of the extension."""

@@ -16,8 +16,8 @@ from typing import Any
 
 from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
-from xrds_core.operations import PAPER_OUTPUT, count
 
+from ..operations import PAPER_OUTPUT, count
 from .config import read_config
 from .run_folder import RunFolder
 from .train import train

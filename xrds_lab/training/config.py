@@ -15,7 +15,7 @@ import torch
 
 from xrds_core.devices import choose_precision
 from xrds_core.errors import UsageError
-from xrds_core.network import NetworkConfig, preset_config
+from xrds_core.superres.network import NetworkConfig, preset_config
 
 from .data import Variation
 from .losses import LOSSES

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from xrds_core.arrays import Array
-from xrds_core.front_end import transfer
+from xrds_core.superres.front_end import transfer
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
-from xrds_core.front_end import clean_albedo, clean_radiance
+from xrds_core.superres.front_end import clean_albedo, clean_radiance
 
 from .augmentation import (
     over_denoised,

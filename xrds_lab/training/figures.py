@@ -12,7 +12,8 @@ from matplotlib.ticker import MaxNLocator
 
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
-from xrds_core.metrics import psnr, to_srgb
+
+from ..metrics import psnr, to_srgb
 
 COLOURS = {"xrds": "tab:red", "bicubic": "tab:gray", "demodulated": "tab:blue"}
 INCH = 100  # pixels

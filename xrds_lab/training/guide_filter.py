@@ -20,10 +20,10 @@ from tqdm import tqdm
 
 from xrds_core.devices import choose_device
 from xrds_core.errors import Cancelled, UsageError, WeightsError
-from xrds_core.front_end import clean_albedo, clean_normal
-from xrds_core.guide_filter import FEW_SAMPLES, GuideFilter
-from xrds_core.weights import save_guide_filter
+from xrds_core.superres.front_end import clean_albedo, clean_normal
+from xrds_core.superres.guide_filter import FEW_SAMPLES, GuideFilter
 
+from ..weights import save_guide_filter
 from .checkpoint import read_checkpoint, taking_over, write_checkpoint
 from .config import cosine
 from .interruption import Interruption

@@ -11,10 +11,11 @@ import torch
 from torch import Tensor
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
-from xrds_core import weights
 from xrds_core.devices import choose_precision
-from xrds_core.network import XRDS
+from xrds_core.superres import weights
+from xrds_core.superres.network import XRDS
 
+from ..weights import save_network
 from .config import TrainingConfig
 from .crop import Batch
 from .losses import weighted
@@ -136,7 +137,7 @@ class Learner:
             return  # a figure in a table, never a preset
         network = XRDS(self.config.network_config)
         network.load_state_dict({k: v.cpu() for k, v in self.average.items()})
-        weights.save(network, path, record)
+        save_network(network, path, record)
 
     def start_from(self, path: Path) -> None:
         """Take every tensor whose name and shape agree from a weights file."""

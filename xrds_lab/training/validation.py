@@ -15,10 +15,10 @@ import torch
 from torch import Tensor
 
 from xrds_core.arrays import Array
-from xrds_core.baselines import bicubic
-from xrds_core.front_end import demodulated_base, inverse_transfer
-from xrds_core.metrics import psnr
+from xrds_core.superres.front_end import demodulated_base, inverse_transfer
 
+from ..baselines import bicubic
+from ..metrics import psnr
 from .crop import Batch
 from .data import Variation, draw
 from .windows import WindowSet

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from xrds_core.arrays import Array
 from xrds_core.errors import PictureError, UsageError
-from xrds_core.front_end import auto_exposure, clean_radiance
+from xrds_core.superres.front_end import auto_exposure, clean_radiance
 
 Box = tuple[slice, slice]
 

@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from .arrays import Array
+from ..arrays import Array
 
 
 def to_planes(picture: Array) -> Tensor:

@@ -9,12 +9,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from .arrays import Array, float_array
-from .errors import PictureError, UsageError
+from ..arrays import Array, float_array
+from ..errors import PictureError, UsageError
+from ..holes import clean_alpha, fill_holes
 from .front_end import clean_radiance, pad_guide, transfer
 from .guide_filter import FEW_SAMPLES
 from .guide_noise import Quiet
-from .holes import clean_alpha, fill_holes
 from .layout import to_planes
 from .tiling import Tile
 

@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .arrays import Array
-from .errors import XRDSError
+from ..arrays import Array
+from ..errors import XRDSError
 from .guide_filter import FEW_SAMPLES
 
 if TYPE_CHECKING:
-    from .denoising import Denoiser
-    from .progress import Callback
+    from ..denoising import Denoiser
+    from ..progress import Callback
 
 NOISY_SAMPLES = 16
 """Guides of fewer samples per pixel are denoised: at 4 the picture gains 0.05 to 0.8
@@ -101,7 +101,7 @@ def _checksum(albedo: Array, normal: Array, device: str) -> bytes:
 
 @lru_cache(maxsize=1)
 def _denoiser(device: str, memory_limit: int | None) -> Denoiser | None:
-    from .denoising import Denoiser
+    from ..denoising import Denoiser
 
     try:
         return Denoiser("high", device, memory_limit=memory_limit)

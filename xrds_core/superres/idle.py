@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array
+from ..arrays import Array
 from .front_end import demodulated_base, pad_guide
 from .inputs import Inputs
 

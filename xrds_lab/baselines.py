@@ -10,21 +10,15 @@ from __future__ import annotations
 import torch
 from torch.nn import functional
 
-from .arrays import Array
-from .errors import PictureError
-from .front_end import upsample_bilinear
-from .layout import to_picture, to_planes
+from xrds_core.arrays import Array
+from xrds_core.errors import PictureError
+from xrds_core.superres.layout import to_picture, to_planes
 
 # Chosen on the very windows that are measured, which favours this rival alone.
 SPATIAL_SIGMA = 0.5  # of a low-resolution pixel
 ALBEDO_SIGMA = 0.1
 NORMAL_SIGMA = 0.15
 RADIUS = 2
-
-
-def bilinear(picture: Array, scale: int) -> Array:
-    """Enlarge (h, w, C) to (scale h, scale w, C): half-pixel centres, edges held."""
-    return to_picture(upsample_bilinear(to_planes(picture), scale))
 
 
 def bicubic(radiance: Array, scale: int) -> Array:

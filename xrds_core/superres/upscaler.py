@@ -11,19 +11,19 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from ..arrays import Array
+from ..devices import choose_device, choose_precision, free_memory, is_out_of_memory
+from ..errors import OutOfMemory, PictureError, WeightsError
+from ..progress import Callback, Progress
 from . import guide_noise, tiling
 from .alpha import finish
-from .arrays import Array
-from .cost import Cost, measure
-from .devices import choose_device, choose_precision, free_memory, is_out_of_memory
-from .errors import OutOfMemory, PictureError, WeightsError
+from .cost import Cost, measure, watched
 from .front_end import LARGEST_TRANSFERRED, choose_exposure, inverse_transfer
 from .guide_filter import filter_guides
 from .idle import Area, busy_area, write_base
 from .inputs import Inputs, check
 from .layout import to_picture
 from .network import XRDS
-from .progress import Callback, Progress, watched
 from .weights import choose_network, load_guide_filter
 
 DEFAULT_MEMORY = 4 << 30

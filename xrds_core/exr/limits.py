@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from .errors import PictureError
+from ..errors import PictureError
 
 _LARGEST_SIDE = 1 << 16  # pixels; more is a damaged header
 _ALWAYS_READ = 1 << 30  # bytes of pixels

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xrds_core import metrics
 from xrds_core.errors import PictureError
+from xrds_lab import metrics
 
 RANDOM = np.random.default_rng(5)
 REFERENCE = RANDOM.uniform(0, 1, (20, 24, 3)).astype(np.float32)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from pathlib import Path
 
-from .errors import PictureError
+from ..errors import PictureError
 
 COMPONENTS = ("RGB", "XYZ", "rgb", "xyz")
 """Letters of the channels of a colour or a direction, in their order."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from torch.nn import functional
 
-from .arrays import Array
+from ..arrays import Array
 from .front_end import upsample_alpha, upsample_bilinear
 from .layout import to_picture, to_planes
 

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from . import exr_library
-from .arrays import Array
-from .atomic import replacing
-from .errors import PictureError
-from .exr_channels import Channels
-from .exr_encoding import FLOAT_ZIP, Encoding
-from .exr_library import Part, Window
+from ..arrays import Array
+from ..atomic import replacing
+from ..errors import PictureError
+from . import library
+from .channels import Channels
+from .encoding import FLOAT_ZIP, Encoding
+from .library import Part, Window
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def write_picture(
     planes = {name: encoding.plane(pixels) for name, pixels in channels.items()}
     with _whole(path) as unfinished:
         attributes = dict(metadata or {})
-        exr_library.write(unfinished, planes, encoding.codec, attributes)
+        library.write(unfinished, planes, encoding.codec, attributes)
 
 
 def copy_picture(
@@ -126,13 +126,13 @@ def copy_picture(
     """
     planes = {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}
     with _whole(path) as unfinished:
-        exr_library.copy(source, unfinished, planes, part=part, alone=alone)
+        library.copy(source, unfinished, planes, part=part, alone=alone)
 
 
 def write_part(path: str | Path, part: Part) -> None:
     """Write a file of one part; raises PictureError as `write_picture`."""
     with _whole(path) as unfinished:
-        exr_library.write_part(unfinished, part)
+        library.write_part(unfinished, part)
 
 
 @contextmanager
@@ -149,7 +149,7 @@ def display_size(path: str | Path, *, whole: bool = False) -> tuple[int, int]:
 
     Raises PictureError where it cannot be read; for `whole`, also where pixels cannot.
     """
-    read = exr_library.read if whole else exr_library.read_headers
+    read = library.read if whole else library.read_headers
     (left, top), (right, bottom) = read(path)[0].display_window
     return right - left + 1, bottom - top + 1
 
@@ -163,7 +163,7 @@ class File:
 
     def __init__(self, path: str | Path) -> None:
         self.path = path
-        self.parts = exr_library.read(path)
+        self.parts = library.read(path)
         self._places = _places(path, self.parts)
         self.names = Channels(path, self._places)
         self.window: Window | None = None

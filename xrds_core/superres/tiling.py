@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .arrays import Array
+from ..arrays import Array
 
 # Of an overlap, this part at each end counts nothing: what is near a tile's edge has
 # not seen its surroundings. The blend happens in the rest.

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
+from ..progress import Progress
 from .kernels import KernelTail
 from .network import XRDS
 
@@ -91,6 +92,21 @@ def measure(network: XRDS) -> Cost:
     with torch.inference_mode(), _small_areas(network.tail), _LiveBytes() as live:
         network(radiance, guides)
     return Cost(live.peak / high**2, values / high**2)
+
+
+@contextmanager
+def watched(network: XRDS, progress: Progress) -> Iterator[None]:
+    """Let every layer of `network` add the number of values it returns."""
+
+    def add(module: Any, inputs: Any, output: Tensor) -> None:
+        progress.add(output.numel())
+
+    hooks = [layer.register_forward_hook(add) for layer in leaves(network)]
+    try:
+        yield
+    finally:
+        for hook in hooks:
+            hook.remove()
 
 
 @contextmanager

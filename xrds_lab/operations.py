@@ -5,18 +5,17 @@ Counting takes seconds, so what `xrds info` prints was counted before (`write_co
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from .atomic import write_json
-from .kernels import KernelTail
-from .network import (
+from xrds_core.atomic import write_json
+from xrds_core.info import COSTS
+from xrds_core.superres.kernels import KernelTail
+from xrds_core.superres.network import (
     PRESETS,
     XRDS,
     NetworkConfig,
@@ -25,7 +24,6 @@ from .network import (
     preset_config,
 )
 
-COSTS = Path(__file__).parent / "weights" / "costs.json"
 PAPER_ROWS = ((5, 3), (3, 3), (1, 3), (5, 2), (5, 1))  # RDST per XDG, XDG: table 5
 PAPER_OUTPUT = 1024  # pixels along each side of the picture the paper counts for
 SCALES = (2, 4, 8)
@@ -157,11 +155,6 @@ def _preset_cost(preset: str, scale: int) -> dict[str, int]:
 def costs() -> dict[str, Any]:
     """Count {paper_table, presets}; takes ten seconds of a processor."""
     return {"paper_table": paper_table(), "presets": preset_costs()}
-
-
-def shipped_costs() -> dict[str, Any]:
-    """The same as `write_costs` has left it."""
-    return dict(json.loads(COSTS.read_text("utf-8")))
 
 
 def write_costs() -> None:

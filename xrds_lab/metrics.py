@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array
-from .errors import PictureError
+from xrds_core.arrays import Array
+from xrds_core.errors import PictureError
 
 RELMSE_EPSILON = 0.01  # the published tables of Monte Carlo denoising use this value
 TRIMMED_FRACTION = 0.001  # of pixels: a few fireflies rule the raw RelMSE
@@ -69,7 +69,7 @@ def lpips(picture: Array, reference: Array, exposure: float = 0.0) -> float:
     """
     import torch
 
-    from .layout import to_planes
+    from xrds_core.superres.layout import to_planes
 
     _check(picture, reference)
     shown = [to_planes(to_srgb(x, exposure) * 2 - 1) for x in (picture, reference)]

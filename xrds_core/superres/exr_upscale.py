@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import torch
 
-from .errors import UsageError
-from .exr import CYCLES, Names, read_beauty, read_guides, write_picture
-from .exr_encoding import FLOAT_ZIP, Encoding
-from .files import check_output, check_place
-from .progress import Callback
+from ..errors import UsageError
+from ..exr import CYCLES, Names, read_beauty, read_guides, write_picture
+from ..exr.encoding import FLOAT_ZIP, Encoding
+from ..files import check_output, check_place
+from ..progress import Callback
+from ..version import package_version
 from .upscaler import Upscaler
-from .version import package_version
 
 
 def upscale_file(

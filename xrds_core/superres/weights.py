@@ -18,11 +18,9 @@ from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save as serialize
-from torch import Tensor, nn
+from torch import Tensor
 
-from .atomic import replacing
-from .errors import WeightsError
+from ..errors import WeightsError
 from .guide_filter import FILE_NAME, GuideFilter
 from .network import PRESETS, XRDS, NetworkConfig
 
@@ -30,7 +28,6 @@ DIRECTORY = Path(__file__).with_name("weights")
 GUIDE_FILTER = DIRECTORY / FILE_NAME
 
 FACTORS = ".factors"
-_MOST, _LEAST = 127, 1e-12  # of 8 bits with a sign; so that zeros divide by something
 _LARGEST_SETTING = 4096  # far above any real width or count; bounds hostile files
 
 
@@ -40,52 +37,8 @@ def file_name(preset: str, scale: int, guides: str = "fast") -> str:
     return f"{preset}{kind}_x{scale}.safetensors"
 
 
-def save(network: XRDS, path: str | Path, metadata: dict[str, str]) -> None:
-    """Write `network` and `metadata` to `path`, all at once or not at all.
-
-    Raises WeightsError if a weight does not fit half precision.
-    """
-    record = {**metadata, "config": json.dumps(network.config.to_dict())}
-    _write(pack(_halves(network)), path, record)
-
-
-def save_guide_filter(
-    guide_filter: GuideFilter, path: str | Path, metadata: dict[str, str]
-) -> None:
-    """Write a filter and `metadata`, as `save` does a network."""
-    _write(_halves(guide_filter), path, metadata)
-
-
-def _halves(module: nn.Module) -> dict[str, Tensor]:
-    tensors = {k: v.detach().cpu().half() for k, v in module.state_dict().items()}
-    bad = [name for name, tensor in tensors.items() if not tensor.isfinite().all()]
-    if bad:
-        raise WeightsError(
-            f"{bad[0]} is not finite in half precision; the training has diverged"
-        )
-    return tensors
-
-
-def pack(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Replace what has several axes by whole numbers of 8 bits and their factors.
-
-    Half the size; no shipped network's error changes by 0.01 dB.
-    """
-    packed = {}
-    for name, tensor in tensors.items():
-        if tensor.dim() < 2:
-            packed[name] = tensor
-            continue
-        rows = tensor.float().flatten(1)
-        factors = rows.abs().amax(1) / _MOST
-        whole = (rows / factors.clamp(min=_LEAST)[:, None]).round()
-        packed[name] = whole.to(torch.int8).view(tensor.shape)
-        packed[name + FACTORS] = factors
-    return packed
-
-
 def unpack(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
-    """The inverse of `pack`, as floats; what is a float already stays.
+    """Whole numbers times their factors, as floats; what is a float already stays.
 
     Raises ValueError where factors are missing or not one per output channel.
     """
@@ -98,13 +51,6 @@ def unpack(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
             ones = (1,) * (tensor.dim() - 1)
             unpacked[name] = tensor.float() * factors.float().view(-1, *ones)
     return unpacked
-
-
-def _write(
-    tensors: dict[str, Tensor], path: str | Path, record: dict[str, str]
-) -> None:
-    with replacing(Path(path)) as unfinished:
-        unfinished.write_bytes(serialize(tensors, record))
 
 
 def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:

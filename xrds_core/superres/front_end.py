@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from .arrays import Array
-from .errors import UsageError
-from .holes import fill_holes
+from ..arrays import Array
+from ..errors import UsageError
+from ..holes import fill_holes
 from .layout import to_picture, to_planes
 from .regression import ALBEDO_EPSILON, explain
 

@@ -24,12 +24,12 @@ from typing import Any
 
 import numpy as np
 
-from .atomic import scratch_folder
-from .children import run_python
-from .errors import PictureError
-from .exr_encoding import FLOAT_ZIP, Pixels, fitting
-from .exr_limits import check_claims, limit_of
-from .files import check_input
+from ..atomic import scratch_folder
+from ..children import run_python
+from ..errors import PictureError
+from ..files import check_input
+from .encoding import FLOAT_ZIP, Pixels, fitting
+from .limits import check_claims, limit_of
 
 Window = tuple[tuple[int, int], tuple[int, int]]
 Attributes = dict[str, Any]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xrds_core import baselines
 from xrds_core.errors import PictureError
+from xrds_lab import baselines
 
 
 def area_mean(picture: np.ndarray, scale: int) -> np.ndarray:

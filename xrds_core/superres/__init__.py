@@ -1,0 +1,1 @@
+"""Super-resolution: the networks, what they are fed, and how a picture is enlarged."""
