@@ -57,7 +57,7 @@ def render(scene: Any, scale: int = 2, **choices: Any) -> Picture:
 
 
 def run_job(
-    scene: Any, job: Callable[[CyclesPasses], T], *, layer: str | None = None
+    scene: Any, request: Callable[[CyclesPasses], T], *, layer: str | None = None
 ) -> T:
     """Call `job` inside a render of `scene` and return what it returns.
 
@@ -70,4 +70,4 @@ def run_job(
     from .interface.registration import ensure_registered
 
     ensure_registered()
-    return rendering.run_job(scene, job, layer=layer)
+    return rendering.run_job(scene, request, layer=layer)

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
 PLAIN, QUICK = Choice(Denoiser.HIGH_ACCURATE, 0), Choice(Denoiser.FAST_FAST, 0)
 LOW = Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 2)

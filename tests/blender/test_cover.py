@@ -11,11 +11,12 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
+from xrds_blender.frame.job import RenderJob
+
 from xrds_blender import render, run_job
 from xrds_blender.cycles.rendered import Guides
 from xrds_blender.frame import denoisers
 from xrds_blender.frame.cover import cover
-from xrds_blender.frame.job import RenderJob
 
 SIDE = 96
 

@@ -13,9 +13,10 @@ from xrds_lab.weights import save_network
 
 bpy = pytest.importorskip("bpy")
 
+from xrds_blender.frame.job import RenderJob
+
 from xrds_blender import render, run_job
 from xrds_blender.frame.denoisers import in_process
-from xrds_blender.frame.job import RenderJob
 from xrds_core.errors import UsageError, WeightsError
 
 BLENDER_5 = bpy.app.version >= (5, 0)

@@ -20,6 +20,8 @@ from xrds_core import exr
 
 bpy = pytest.importorskip("bpy")
 
+from xrds_blender.frame.job import NetworkFailed, RenderJob
+
 from xrds_blender import render
 from xrds_blender.command import main, picture_file
 from xrds_blender.command.render_file import render_file
@@ -27,7 +29,6 @@ from xrds_blender.command.scene_file import SceneChoice
 from xrds_blender.command.whole_file import is_whole
 from xrds_blender.cycles import session
 from xrds_blender.frame import denoisers, guide_cache, networks, progress
-from xrds_blender.frame.job import NetworkFailed, RenderJob
 from xrds_core.errors import Cancelled, OutOfMemory, PictureError, XRDSError
 
 SIZE = (45, 33)

@@ -15,10 +15,11 @@ from channels import read_channels
 
 bpy = pytest.importorskip("bpy")
 
+from xrds_blender.frame.job import RenderJob
+
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
 from xrds_blender.frame.denoisers import in_process
-from xrds_blender.frame.job import RenderJob
 
 BLENDER_5 = bpy.app.version >= (5, 0)
 

@@ -20,15 +20,15 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from guides import deeds, settings, stage
+from xrds_blender.frame.facts import find_facts
+from xrds_blender.frame.job import RenderJob
 
 from xrds_blender.cycles import passes as cycles_passes
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.frame import guide_cache
 from xrds_blender.frame import guides as frame_guides
-from xrds_blender.frame.facts import find_facts
 from xrds_blender.frame.guide_cache import TOLERANCE
 from xrds_blender.frame.guides import GuideSource
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine, run_job
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.plan import GuideRender, savings_but

@@ -11,8 +11,9 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
-from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.job import RenderJob
+
+from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.shot import sampling
 from xrds_core.temporal.frame import Frame

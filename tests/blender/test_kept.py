@@ -19,10 +19,11 @@ from xrds_core import exr
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
+from xrds_blender.frame.job import RenderJob
+
 from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.command.scene_file import SceneChoice
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import full_size
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError, UsageError

@@ -11,6 +11,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
+from xrds_blender.planning.ways import Means, Way
 
 import xrds_blender
 from xrds_blender.frame import history, progress
@@ -31,7 +32,6 @@ from xrds_blender.interface import (
 from xrds_blender.internals.lifetimes import FILE, PROCESS
 from xrds_blender.planning import ways
 from xrds_blender.planning.budget import Network
-from xrds_blender.planning.ways import Means, Way
 
 
 @pytest.fixture(autouse=True)

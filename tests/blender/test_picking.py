@@ -9,14 +9,14 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.planning.denoiser import Denoiser
 
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
 from xrds_blender.frame import picking
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
-from xrds_blender.planning.denoiser import Denoiser
 from xrds_blender.shot.explain import explain
 from xrds_core.errors import UsageError, XRDSError
 

@@ -12,8 +12,9 @@ from xrds_core.exr import library
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.frame import record
 from xrds_blender.frame.job import Picture, RenderJob
+
+from xrds_blender.frame import record
 from xrds_blender.planning.plan import Decision
 
 NAMES = ("version", "way", "scale", "preset", "samples", "device", "seconds")

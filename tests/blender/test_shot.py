@@ -13,16 +13,17 @@ from channels import read_channels
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.shot.choosing import ChosenJob
+
 from xrds_blender import run_job
 from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.internals.lifetimes import RENDER_JOB
 from xrds_blender.shot import full_size, shot
 from xrds_blender.shot import render as engine_shots
-from xrds_blender.shot.choosing import ChosenJob
 from xrds_core.sequence import finishing
 
 FRAMES = [1, 2, 3, 4, 5]

@@ -14,13 +14,14 @@ from channels import read_channels
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
+from xrds_blender.frame.job import RenderJob
+from xrds_blender.planning.denoiser import Denoiser
+
 from xrds_blender.command.render_file import render_file
 from xrds_blender.frame import picking
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
-from xrds_blender.planning.denoiser import Denoiser
 from xrds_blender.shot.explain import explain
 
 FRAMES = [1, 2, 3]

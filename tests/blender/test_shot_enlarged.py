@@ -14,11 +14,12 @@ bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 torch = pytest.importorskip("torch")
 
+from xrds_blender.frame.job import RenderJob
+
 from xrds_blender import run_job
 from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.cycles.settings import has_subsets
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import super_resolution
 from xrds_core.errors import XRDSError
 from xrds_core.superres.upscaler import Upscaler

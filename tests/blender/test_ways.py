@@ -5,12 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-
-from xrds_blender.internals.lifetimes import FILE
-from xrds_blender.planning import budget
-from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import Denoiser
-from xrds_blender.planning.measured import GUIDE_SHARE, Measured, learn
 from xrds_blender.planning.ways import (
     WAYS,
     Asked,
@@ -22,6 +17,11 @@ from xrds_blender.planning.ways import (
     missing,
     outlooks,
 )
+
+from xrds_blender.internals.lifetimes import FILE
+from xrds_blender.planning import budget
+from xrds_blender.planning.budget import Network
+from xrds_blender.planning.measured import GUIDE_SHARE, Measured, learn
 
 MODEL = budget.shipped()
 NETWORKS = frozenset(Network("fast", scale, "fast") for scale in (2, 4, 8))
@@ -165,8 +165,9 @@ def test_plain_alone_does_not_tell_samples_from_denoising() -> None:
 def test_layers_of_a_scene_add_up() -> None:
     from types import SimpleNamespace
 
-    from xrds_blender.frame import history
     from xrds_blender.frame.job import Picture, RenderJob
+
+    from xrds_blender.frame import history
 
     FILE.end()
     picture = Picture(None, None, seconds=FULL)

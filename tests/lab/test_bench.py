@@ -13,12 +13,12 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from xrds_blender.planning.denoiser import Denoiser
 
 from xrds_blender import run_job
 from xrds_blender.command import main
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Network
-from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import UsageError
 from xrds_lab.bench import (
     growth,

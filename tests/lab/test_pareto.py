@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from xrds_blender.planning.denoiser import Denoiser
 
 from xrds_blender.planning.budget import Network
-from xrds_blender.planning.denoiser import Denoiser
 from xrds_core.errors import Cancelled
 from xrds_lab.bench import growth, machine, pareto, same_picture
 from xrds_lab.bench.inputs import OFF

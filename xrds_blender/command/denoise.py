@@ -11,7 +11,7 @@ from xrds_core.frames import in_words
 from xrds_core.notices import warn
 from xrds_core.sequence.names import PASSES, PassNames
 
-from ..frame.job import QUALITIES
+from ..planning.settings import QUALITIES
 from . import arguments
 from .options import add_read_limit
 

@@ -1,4 +1,4 @@
-"""Options that several commands have, and the job that they describe."""
+"""Options that several commands have, and the request that they describe."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ from xrds_core.errors import UsageError
 from xrds_core.exr.encoding import CODECS, FLOAT_ZIP, Encoding
 from xrds_core.frames import RADIUS
 
-from ..frame.job import GUIDES, PRESETS, QUALITIES, SCALES, RenderJob
 from ..planning.plan import SAVINGS
+from ..planning.request import Request, request
+from ..planning.settings import PRESETS, QUALITIES, SCALES
 from . import arguments
 from .scene_file import SceneChoice
 
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
 
 
-def add_job(command: argparse.ArgumentParser) -> None:
-    """Add what `RenderJob` holds."""
+def add_request(command: argparse.ArgumentParser) -> None:
+    """Add what a request holds."""
     add_scene(command)
     add = command.add_argument
     size = command.add_mutually_exclusive_group()
@@ -180,13 +181,12 @@ def choice_of(options: argparse.Namespace) -> SceneChoice:
     )
 
 
-def job_of(options: argparse.Namespace) -> RenderJob:
-    """The job that the options of `add_job` describe; raises UsageError."""
-    return RenderJob(
+def request_of(options: argparse.Namespace) -> Request:
+    """What the options of `add_request` ask for; raises UsageError."""
+    return request(
         scale=options.scale,
         samples=options.samples,
         guide_samples=options.guide_samples,
-        guides=options.guides,
         preset=options.preset,
         device=options.device,
         exposure=options.exposure,
@@ -222,7 +222,4 @@ def _hindrance(options: argparse.Namespace) -> str:
     """The option under which frames cannot lend to each other; empty if they can."""
     if options.plain:
         return "--plain: Cycles renders each frame alone"
-    is_picked = options.time_budget or options.quality
-    if options.scale > 1 and options.guides == "full" and not is_picked:
-        return "--guides full: frames lend fast guides alone"
     return ""

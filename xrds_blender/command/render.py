@@ -11,14 +11,14 @@ from xrds_core.errors import UsageError
 from ..planning.plan import GUIDE_CACHE
 from . import arguments
 from .deferred import need_blender
-from .options import add_job, add_output, choice_of, encoding_of, job_of
+from .options import add_output, add_request, choice_of, encoding_of, request_of
 
 
 def add_render(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds render`."""
     command = commands.add_parser("render", help="render frames of a .blend file")
     add = command.add_argument
-    add_job(command)
+    add_request(command)
     add_output(command, help="an .exr or .png file; #### stands for the frame number")
     add("--explain", action="store_true", help="print the plan without rendering")
     add("--resume", action="store_true", help="skip frames whose files are complete")
@@ -50,7 +50,7 @@ def add_render(commands: Any) -> argparse.ArgumentParser:
 def add_plan(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds plan`."""
     command = commands.add_parser("plan", help="show what a render would do and skip")
-    add_job(command)
+    add_request(command)
     command.set_defaults(work=_plan, lines=_plan_lines)
     return command
 
@@ -66,7 +66,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
     return render_file(
         options.scene,
         options.out,
-        job_of(options),
+        request_of(options),
         frames=options.frames,
         choice=choice_of(options),
         encoding=encoding_of(options),
@@ -80,8 +80,8 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
     from ..shot.explain import explain
     from .scene_file import open_scene
 
-    job, frames = job_of(options), getattr(options, "frames", None)
-    return explain(open_scene(options.scene, choice_of(options)), job, frames)
+    request, frames = request_of(options), getattr(options, "frames", None)
+    return explain(open_scene(options.scene, choice_of(options)), request, frames)
 
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:

@@ -18,10 +18,12 @@ from xrds_core.time_left import Clock
 from ..cycles.size import picture_size
 from ..frame import record
 from ..frame.denoisers import load_denoiser
-from ..frame.job import NetworkFailed, Picture, RenderJob
-from ..frame.networks import known_networks, load_upscaler
+from ..frame.networks import is_ready, load_upscaler
+from ..frame.picture import NetworkFailed, Picture
+from ..planning.request import Request
+from ..planning.settings import Mode
 from ..shot.cache import SampleCache, cache_of
-from ..shot.render import render
+from ..shot.render import render_scene
 from ..shot.sampling import has_neighbours
 from ..shot.shot import cache_samples, render_shot
 from . import picture_file
@@ -32,7 +34,7 @@ from .whole_file import is_whole
 def render_file(
     path: Path,
     output: str | None,
-    job: RenderJob,
+    request: Request,
     *,
     frames: Sequence[int] | None = None,
     choice: SceneChoice = AS_SAVED,
@@ -46,7 +48,7 @@ def render_file(
         path: the .blend file; whatever Blender has open is replaced by it.
         output: .exr or .png; # stands for digits of the frame number. None keeps
             samples alone.
-        job: scale, samples and the rest.
+        request: scale, samples and the rest.
         frames: numbers of the frames; the file's current one by default.
         choice: what comes in the place of what the file was saved with.
         encoding: of .exr files.
@@ -61,14 +63,14 @@ def render_file(
             rendered, and the frames before are complete.
     """
     if keep_samples is not None:
-        _check_keeping(job)
+        _check_keeping(request)
     if output is not None:
         picture_file.check_output(output, frames or [0])
     scene = open_scene(path, choice)
-    _check_libraries(job)
+    _check_libraries(request)
     numbers = list(frames or [scene.frame_current])
     size = picture_size(scene.render)
-    cache = keep_samples and _cache(scene, job, keep_samples)
+    cache = keep_samples and _cache(scene, request, keep_samples)
 
     def is_done(number: int) -> bool:
         # asked anew for each: another render may be writing the same frames
@@ -76,17 +78,17 @@ def render_file(
 
     written, last = [], None
     if output is not None:
-        for number, last in _pictures(scene, job, output, numbers, is_done, cache):
-            written.append(_write(scene, output, number, last, job, encoding))
+        for number, last in _pictures(scene, request, output, numbers, is_done, cache):
+            written.append(_write(scene, output, number, last, request, encoding))
     if cache:
-        _keep_others(scene, job, numbers, cache)
-    job = (last and last.job) or job
+        _keep_others(scene, request, numbers, cache)
+    settings = (last and last.settings) or request.settings
     rendered = {entry["frame"] for entry in written}
     return {
         "output": output,
         "resolution": list(size),
-        "scale": 1 if job.plain else job.scale,
-        "preset": job.preset if job.is_enlarged else None,
+        "scale": settings.scale,
+        "preset": settings.preset if settings.is_enlarged else None,
         "device": last.device if last else "",
         "frames": written,
         "kept": [n for n in numbers if n not in rendered] if output else [],
@@ -95,72 +97,73 @@ def render_file(
     }
 
 
-def _check_libraries(job: RenderJob) -> None:
+def _check_libraries(request: Request) -> None:
     """Raise XRDSError now rather than after the Cycles renders."""
-    if job.is_picked:
-        known_networks(job)  # and PyTorch is loaded before the budget begins
-    elif job.is_enlarged:
-        load_upscaler(job)
-    elif not job.plain:
-        load_denoiser(job)
+    settings, machine = request.settings, request.machine
+    if request.goal is not None:
+        is_ready()  # PyTorch is loaded before the budget begins
+    elif settings.is_enlarged:
+        load_upscaler(settings.network, machine)
+    elif not settings.is_cycles_only:
+        load_denoiser(settings.quality, machine)
 
 
 def _pictures(
     scene: Any,
-    job: RenderJob,
+    request: Request,
     output: str,
     numbers: Sequence[int],
     is_done: Callable[[int], bool],
     cache: SampleCache | None,
 ) -> Iterator[tuple[int, Picture]]:
     """Number and picture of every frame that is not done."""
-    is_shot = len(numbers) > 1 and has_neighbours(scene, job)
+    is_shot = len(numbers) > 1 and has_neighbours(scene, request)
     if is_shot or cache:
         try:
-            yield from render_shot(scene, job, numbers, is_done, cache)
+            yield from render_shot(scene, request, numbers, is_done, cache)
         except NetworkFailed as error:
             raise _kept(error, scene, output, error.number or 0) from error
         return
     for number in numbers:
         if not is_done(number):
-            yield number, _picture(scene, job, output, number)
+            yield number, _picture(scene, request, output, number)
 
 
-def _check_keeping(job: RenderJob) -> None:
-    """Raise UsageError for a job that has no samples to keep."""
-    if job.plain or job.is_picked or job.scale > 1:
+def _check_keeping(request: Request) -> None:
+    """Raise UsageError for a request that has no samples to keep."""
+    if request.goal is not None or request.settings.mode is not Mode.FULL_SIZE:
         raise UsageError(
             "--keep-samples needs --scale 1, without --plain, --time-budget and "
             "--quality"
         )
-    if not job.temporal_radius:
+    if not request.settings.temporal_radius:
         raise UsageError("--keep-samples needs a --temporal-radius of 1 or more")
 
 
-def _cache(scene: Any, job: RenderJob, folder: Path) -> SampleCache:
+def _cache(scene: Any, request: Request, folder: Path) -> SampleCache:
     """The cache of samples; raises UsageError where no frame could use them."""
-    if not has_neighbours(scene, job):
+    if not has_neighbours(scene, request):
         raise UsageError(
             "frames of such a panoramic camera lend nothing to each other: leave out "
             "--keep-samples"
         )
-    return cache_of(scene, job, folder, warn)
+    return cache_of(scene, request, folder, warn)
 
 
 def _keep_others(
-    scene: Any, job: RenderJob, numbers: Sequence[int], cache: SampleCache
+    scene: Any, request: Request, numbers: Sequence[int], cache: SampleCache
 ) -> None:
     """Render the samples of frames that no picture has asked for."""
     clock = Clock()
-    for number in cache_samples(scene, job, numbers, cache):
+    for number in cache_samples(scene, request, numbers, cache):
         left = sum(n > number for n in numbers)
         warn(f"frame {number}: samples kept, {clock.lap(left)}")
 
 
-def _picture(scene: Any, job: RenderJob, output: str, number: int) -> Picture:
+def _picture(scene: Any, request: Request, output: str, number: int) -> Picture:
     scene.frame_set(number)
     try:
-        return render(scene, **vars(job))
+        return render_scene(scene, request)
     except NetworkFailed as error:
         raise _kept(error, scene, output, number) from error
 
@@ -178,12 +181,14 @@ def _write(
     output: str,
     number: int,
     picture: Picture,
-    job: RenderJob,
+    request: Request,
     encoding: Encoding,
 ) -> dict[str, Any]:
     """Write one frame; returns its entry for the JSON."""
     target = frame_path(output, number)
-    metadata = record.metadata(record.fields(picture, job, scene.cycles.samples))
+    metadata = record.metadata(
+        record.fields(picture, request.settings, scene.cycles.samples)
+    )
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated

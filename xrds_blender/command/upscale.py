@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from ..frame.job import SCALES
+from ..planning.settings import SCALES
 from . import arguments
 from .options import add_network, add_output, add_read_limit, encoding_of
 

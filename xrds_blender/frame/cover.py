@@ -6,19 +6,17 @@ ragged and glass is mottled. The denoiser takes alpha for a grey picture.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from xrds_core.arrays import Array
 from xrds_core.errors import XRDSError
 
 from ..cycles.rendered import Guides
+from ..planning.request import Machine
 from .denoisers import load_denoiser
-from .job import RenderJob
 
 
-def cover(guides: Guides, job: RenderJob) -> Array:
+def cover(guides: Guides, machine: Machine) -> Array:
     """Alpha (H, W) of the guides, denoised; as it is where nothing can denoise.
 
     Where it is 0 or 1 all around a pixel it stays so.
@@ -27,7 +25,7 @@ def cover(guides: Guides, job: RenderJob) -> Array:
     if guides.samples is None or alpha.min() >= 1.0:
         return guides.alpha
     try:
-        denoiser = load_denoiser(replace(job, denoise="fast"))
+        denoiser = load_denoiser("fast", machine)
     except XRDSError:
         return guides.alpha
     grey = np.repeat(alpha[..., None], 3, axis=2)

@@ -1,4 +1,4 @@
-"""The denoiser of a job, kept from frame to frame."""
+"""Our denoiser, loaded and kept from frame to frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from xrds_core.errors import XRDSError
 
 from ..cycles import session
-from .job import RenderJob
+from ..planning.request import Machine
+from ..planning.settings import Denoising
 
 if TYPE_CHECKING:
     from xrds_core.denoising import Denoiser
@@ -17,14 +18,14 @@ if TYPE_CHECKING:
     from ..cycles.passes import InProcess
 
 
-def load_denoiser(job: RenderJob) -> Denoiser:
-    """The denoiser of a job; the last two stay for the next frame.
+def load_denoiser(quality: str, machine: Machine) -> Denoiser:
+    """Our denoiser of a quality; the last two stay for the next frame.
 
     The network's graphics card may be one that this library does not know: it takes
     the fastest device by itself. Raises XRDSError where it cannot be loaded.
     """
-    device = "cpu" if job.device == "cpu" else "auto"
-    return _load(job.denoise, device, job.threads or 0, job.memory_limit)
+    device = "cpu" if machine.device == "cpu" else "auto"
+    return _load(quality, device, machine.threads or 0, machine.memory_limit)
 
 
 def is_there() -> bool:
@@ -32,15 +33,17 @@ def is_there() -> bool:
     return find_spec("mitsuba_oidn") is not None
 
 
-def in_process(job: RenderJob) -> InProcess | None:
+def in_process(denoising: Denoising | None, machine: Machine) -> InProcess | None:
     """Our denoiser for the low-resolution picture, in the place of Cycles'.
 
     None where Cycles' own is asked for and there, or ours cannot be loaded.
     """
-    if job.denoiser is not None and session.has_denoiser():
+    if denoising is None:
+        denoising = Denoising.XRDS_HIGH
+    if not denoising.is_ours and session.has_denoiser():
         return None
     try:
-        denoiser = load_denoiser(job)
+        denoiser = load_denoiser(denoising.quality, machine)
     except XRDSError:
         return None
     return lambda picture, albedo, normal: denoiser(picture, albedo, normal).radiance

@@ -19,10 +19,10 @@ from ..cycles.passes import CyclesPasses
 from ..cycles.rendered import Beauty, Guides, Probe
 from ..planning.facts import Facts
 from ..planning.plan import GUIDE_CACHE, Decision, Plan
+from ..planning.request import Request
 from ..scene.guide_key import NotFollowed, guide_key
 from . import guide_cache
 from .guide_cache import CachedGuides, GuideName
-from .job import RenderJob
 
 
 @dataclass(frozen=True)
@@ -54,18 +54,19 @@ class GuideSource:
         self,
         passes: CyclesPasses,
         depsgraph: Any,
-        job: RenderJob,
+        request: Request,
         chosen: Plan,
         facts: Facts,
         report: Callable[[set[str], str], None],
         portion: Portion | None = None,
     ) -> None:
-        self._passes, self._graph, self._job = passes, depsgraph, job
+        self._passes, self._graph, self._request = passes, depsgraph, request
         self._report = report
         self._chosen, self._facts = chosen, facts
         self._portion = portion
         self.name: GuideName | None = None
-        self._folder = None if job.guide_cache is None else Path(job.guide_cache)
+        folder = request.guide_cache
+        self._folder = None if folder is None else Path(folder)
         self.decision = Decision(GUIDE_CACHE, "off", "as requested")
 
     def guides(self, low: dict[str, Beauty] | None = None) -> dict[str, Guides]:
@@ -76,7 +77,7 @@ class GuideSource:
         if low is not None and not self._chosen.render_guides:
             self.decision = Decision(GUIDE_CACHE, "off", "there are no guides to keep")
             return self._of_background(low)
-        if self._job.guides == "full" or GUIDE_CACHE not in self._job.savings:
+        if GUIDE_CACHE not in self._request.savings:
             return self._render(self._chosen.guide_samples)
         started = time.perf_counter()
         try:
@@ -104,7 +105,7 @@ class GuideSource:
 
     def _of_background(self, low: dict[str, Beauty]) -> dict[str, Guides]:
         """What Cycles writes where it sees nothing: its light as albedo, no normal."""
-        scale, region = self._job.scale, self._passes.region
+        scale, region = self._request.settings.scale, self._passes.region
         guides = {}
         for view, beauty in low.items():
             rows, columns = beauty.offset
@@ -141,16 +142,15 @@ class GuideSource:
         asked = self._chosen.guide_samples
         if kept < asked:
             return asked - kept
-        return max(0, min(asked, self._job.guide_limit - kept))
+        return max(0, min(asked, self._request.guide_limit - kept))
 
     def _render(self, samples: int, kept: int = 0) -> dict[str, Guides]:
-        seed = None if self._job.seed is None else self._job.seed + 1
+        seed = None if self._request.seed is None else self._request.seed + 1
         if kept:  # samples of the same seed would be the same samples
             first = self._graph.scene_eval.cycles.seed if seed is None else seed
             seed = first + kept
         return self._passes.guides_by_view(
             samples,
-            full=self._job.guides == "full",
             seed=seed,
             how=self._chosen.guides,
             portion=self._portion and replace(self._portion, length=samples),

@@ -1,52 +1,42 @@
-"""Which networks there are, and the one that a job needs, loaded."""
+"""The network that an enlargement needs, loaded."""
 
 from __future__ import annotations
 
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from xrds_core.errors import XRDSError
 
-from ..planning.budget import Network
+from ..planning.request import Machine
+from ..planning.settings import Network
 from . import torch_folder
-from .job import RenderJob
-from .means import networks_at_hand
 
 if TYPE_CHECKING:
     from xrds_core import Upscaler
 
 
-def load_upscaler(job: RenderJob) -> Upscaler:
-    """The network of a job; the last one stays loaded for the next frame."""
-    weights = None if job.weights is None else str(job.weights)
-    upscaler = _load(job.preset, job.scale, job.guides, job.device, weights)
-    if job.threads is not None:
+def load_upscaler(network: Network, machine: Machine) -> Upscaler:
+    """A network, loaded; the last one stays for the next frame."""
+    weights = None if machine.weights is None else str(machine.weights)
+    upscaler = _load(network, machine.device, weights)
+    if machine.threads is not None:
         import torch
 
-        torch.set_num_threads(job.threads)
+        torch.set_num_threads(machine.threads)
     return upscaler
 
 
 @lru_cache(maxsize=1)
-def _load(
-    preset: str, scale: int, guides: str, device: str, weights: str | None
-) -> Upscaler:
-    upscaler_class: type[Upscaler] = torch_folder.load("upscaler").Upscaler
-    return upscaler_class(preset, scale, guides, device, weights=weights)
+def _load(network: Network, device: str, weights: str | None) -> Upscaler:
+    preset, scale = network
+    upscaler_class: type[Upscaler] = torch_folder.load("superres.upscaler").Upscaler
+    return upscaler_class(preset, scale, device=device, weights=weights)
 
 
-def known_networks(job: RenderJob) -> list[Network]:
-    """Those whose weights are there; none for plain renders or without PyTorch.
-
-    By the files' headers alone: a budget has no seconds for the rest of them.
-    """
-    if job.plain:
-        return []
+def is_ready() -> bool:
+    """Whether PyTorch can be loaded; it then is."""
     try:
-        torch_folder.load("weights")
+        torch_folder.load("superres.weights")
     except XRDSError:
-        return []
-    if job.weights is not None and not Path(job.weights).is_dir():
-        return [Network(job.preset, job.scale, job.guides)]
-    return networks_at_hand(job.weights)
+        return False
+    return True

@@ -7,7 +7,8 @@ from typing import Any
 from xrds_core.version import package_version
 
 from ..planning.plan import GUIDE_CACHE, Decision
-from .job import Picture, RenderJob
+from ..planning.settings import Settings
+from .picture import Picture
 
 PREFIX = "xrds"
 # What the plan calls a decision and its value, and what was left out then.
@@ -22,16 +23,17 @@ _LEFT_OUT = {
 }
 
 
-def fields(picture: Picture, job: RenderJob, samples: int) -> dict[str, str]:
+def fields(picture: Picture, settings: Settings, samples: int) -> dict[str, str]:
     """Name and value of what made a picture; `samples` are the scene's own."""
-    job = picture.job or job
-    told = {"version": package_version(), "way": _way(job), "scale": str(_scale(job))}
-    if job.is_enlarged:
-        told["preset"] = job.preset
-    elif not job.plain:
-        told["preset"] = job.denoise
-    told["samples"] = str(job.samples or samples)
-    if job.is_enlarged:
+    settings = picture.settings or settings
+    told = {"version": package_version(), "mode": _mode(settings)}
+    told["scale"] = str(settings.scale)
+    if settings.is_enlarged:
+        told["preset"] = settings.preset
+    elif not settings.is_cycles_only:
+        told["preset"] = settings.quality
+    told["samples"] = str(settings.samples or samples)
+    if settings.is_enlarged:
         told["guide_samples"] = _decided(picture.plan, "guide samples") or "0"
     if picture.temporal is not None:
         frames = picture.temporal.frames
@@ -50,11 +52,11 @@ def line(told: dict[str, str], frame: int, layer: str) -> str:
         for name, value in told.items()
         if name not in _NAMELESS
     ]
-    head = f"XRDS {told['version']}, frame {frame}, {layer}: {told['way']}"
+    head = f"XRDS {told['version']}, frame {frame}, {layer}: {told['mode']}"
     return ", ".join([head, *rest])
 
 
-_NAMELESS = ("version", "way")
+_NAMELESS = ("version", "mode")
 
 
 def metadata(told: dict[str, str], layer: str = "") -> dict[str, str]:
@@ -73,14 +75,10 @@ def stamp(engine: Any, told: dict[str, str], layer: str) -> None:
         result.stamp_data_add_field(name, value)
 
 
-def _way(job: RenderJob) -> str:
-    if job.plain:
-        return "plain Cycles"
-    return "super-resolution" if job.is_enlarged else "full size"
-
-
-def _scale(job: RenderJob) -> int:
-    return job.scale if job.is_enlarged else 1
+def _mode(settings: Settings) -> str:
+    if settings.is_cycles_only:
+        return "Cycles only"
+    return "super-resolution" if settings.is_enlarged else "full size"
 
 
 def _decided(plan: tuple[Decision, ...], name: str) -> str | None:

@@ -62,17 +62,17 @@ class XRDSRender(bpy.types.RenderEngine):
         """Render what the scene's settings describe, and tell what was done."""
         from ..frame import record
         from ..shot.render import render_frame
-        from .properties import job_of
+        from .properties import request_of
 
-        scene, job = depsgraph.scene_eval, job_of(depsgraph.scene_eval.xrds)
+        scene, request = depsgraph.scene_eval, request_of(depsgraph.scene_eval.xrds)
         # Cycles may free the scene as it renders.
         frame, samples = scene.frame_current, scene.cycles.samples
         layer, notes = depsgraph.view_layer_eval.name, list(support.notes(scene))
-        picture = render_frame(self, depsgraph, job)
-        told = record.fields(picture, job, samples)
+        picture = render_frame(self, depsgraph, request)
+        told = record.fields(picture, request, samples)
         record.stamp(self, told, layer)
         self.report({"INFO"}, record.line(told, frame, layer))
-        for note in notes if (picture.job or job).is_enlarged else ():
+        for note in notes if (picture.job or request).is_enlarged else ():
             self.report({"INFO"}, f"XRDS: {note}")
 
     def render_frame_finish(self) -> None:

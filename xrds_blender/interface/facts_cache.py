@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..frame.facts import join_facts
-from ..frame.job import RenderJob
+from ..choosing.facts import join_facts
 from ..planning.facts import Facts, SceneFacts
+from ..planning.settings import Settings
 from ..scene.facts import scene_facts
 
 
@@ -20,12 +20,12 @@ class FactsCache:
         """For Blender's handlers: something has changed."""
         self._known.clear()
 
-    def facts(self, scene: Any, layer: Any, job: RenderJob) -> Facts:
+    def facts(self, scene: Any, layer: Any, settings: Settings) -> Facts:
         """Facts of a scene as the viewport shows it."""
         graph = layer.depsgraph
         if graph is None:
-            return join_facts(scene, job, SceneFacts())
+            return join_facts(scene, settings, SceneFacts())
         name = f"{scene.name} {layer.name}"
         if name not in self._known:
             self._known[name] = scene_facts(graph)
-        return join_facts(scene, job, self._known[name])
+        return join_facts(scene, settings, self._known[name])

@@ -7,24 +7,24 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..frame import history
-from ..frame.job import GUIDES, PRESETS, RenderJob
-from ..frame.means import means
-from ..frame.ways import best_way, outlooks
+from ..choosing import history
+from ..choosing.capabilities import capabilities
+from ..choosing.modes import best_mode, estimates
 from ..internals.engine_override import ENGINE
 from ..internals.lifetimes import FILE
-from ..planning.budget import Network
-from ..planning.ways import Means, Way
+from ..planning.modes import Capabilities
+from ..planning.request import Request
+from ..planning.settings import PRESETS, Mode
 from . import (
     cycles_panels,
+    mode_table,
     paragraph,
     presets,
     status_bar,
     summary,
     translations,
-    ways_table,
 )
-from .properties import job_of
+from .properties import request_of
 from .remarks import remarks
 from .translations import CONTEXT
 
@@ -44,7 +44,7 @@ class _RenderPanel:
 
 
 class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
-    """The way to render, and what it asks for."""
+    """The mode, and what it asks for."""
 
     bl_label = "XRDS"
     # Below the choice of the engine: Blender puts panels of add-ons last otherwise.
@@ -55,32 +55,35 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
-        settings, job = scene.xrds, job_of(scene.xrds)
-        at_hand = means(job.weights)
-        looks = outlooks(scene, job, at_hand)
-        ways_table.draw(layout, settings, best_way(scene, job), looks)
+        settings, request = scene.xrds, request_of(scene.xrds)
+        here = capabilities(request.machine.weights)
+        found = estimates(scene, request.settings, here)
+        mode_table.draw(layout, settings, best_mode(scene, request), found)
         layout.use_property_split = True
         layout.use_property_decorate = False
-        _draw_choices(layout, scene, job, at_hand)
-        for icon, text in remarks(scene, job, at_hand):
+        _draw_choices(layout, scene, request, here)
+        for icon, text in remarks(scene, request, here):
             paragraph.draw(layout, context, paragraph.translated(text), icon)
 
 
-def _draw_choices(layout: Any, scene: Any, job: RenderJob, at_hand: Means) -> None:
-    """What the way that is taken can be told."""
+def _draw_choices(
+    layout: Any, scene: Any, request: Request, here: Capabilities
+) -> None:
+    """What can be chosen in the mode that is taken."""
     settings = scene.xrds
-    if settings.way == Way.AUTOMATIC and at_hand.any_denoiser:
+    if settings.mode == Mode.AUTOMATIC and here.any_denoiser:
         _switched(layout, settings, "use_time_budget", "time_budget")
     column = layout.column()
     column.active = not settings.is_timed
-    name = "Samples per Small Pixel" if job.is_enlarged else "Samples"
+    name = "Low-Resolution Samples" if request.settings.is_enlarged else "Samples"
     column.prop(scene.cycles, "samples", text=name, text_ctxt=CONTEXT)
-    if settings.way == Way.FULL_SIZE:
+    if settings.mode == Mode.FULL_SIZE:
         column.prop(settings, "denoise")
-    if job.is_enlarged:
-        offered = [p for p in PRESETS if _network(job, preset=p) in at_hand.networks]
+    if request.settings.is_enlarged:
+        scale = request.settings.scale
+        offered = [preset for preset in PRESETS if (preset, scale) in here.networks]
         _offer(column, settings, "preset", offered)
-    if not job.plain:
+    if not request.settings.is_cycles_only:
         layout.prop(settings, "temporal_radius")
 
 
@@ -93,16 +96,12 @@ class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return super().poll(context) and Way(context.scene.xrds.way).is_enlarged
+        return super().poll(context) and Mode(context.scene.xrds.mode).is_enlarged
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, settings = self.layout, context.scene.xrds
         layout.use_property_split = True
         layout.use_property_decorate = False
-        job = job_of(settings)
-        networks = means(job.weights).networks
-        offered = [g for g in GUIDES if _network(job, guides=g) in networks]
-        _offer(layout, settings, "guides", offered)
         layout.prop(settings, "guide_samples")
 
 
@@ -116,7 +115,7 @@ class XRDS_PT_advanced(_RenderPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         settings = context.scene.xrds
-        may_enlarge = Way(settings.way).is_enlarged or settings.is_timed
+        may_enlarge = Mode(settings.mode).is_enlarged or settings.is_timed
         return super().poll(context) and may_enlarge
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -134,8 +133,9 @@ class XRDS_PT_forecast(_RenderPanel, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        scene, job = context.scene, job_of(context.scene.xrds)
-        for name, value in summary.next_render(scene, job, means(job.weights)):
+        scene, request = context.scene, request_of(context.scene.xrds)
+        here = capabilities(request.machine.weights)
+        for name, value in summary.next_render(scene, request, here):
             _row(self.layout, name, value)
 
 
@@ -155,11 +155,6 @@ class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
         assert last is not None
         for name, value in summary.last_render(last):
             _row(self.layout, name, value)
-
-
-def _network(job: RenderJob, **other: str) -> Network:
-    """The weights of a job, with another preset or other guides."""
-    return Network(job.preset, job.scale, job.guides)._replace(**other)
 
 
 def _offer(layout: Any, settings: Any, name: str, offered: list[str]) -> None:

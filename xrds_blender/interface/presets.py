@@ -31,7 +31,7 @@ class XRDS_OT_preset_add(AddPresetBase, bpy.types.Operator):
     preset_subdir = FOLDER
     preset_defines = ["scene = bpy.context.scene"]
     preset_values = [
-        "scene.xrds.way",
+        "scene.xrds.mode",
         "scene.xrds.use_time_budget",
         "scene.xrds.time_budget",
         "scene.xrds.denoise",

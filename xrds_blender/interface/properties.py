@@ -7,47 +7,47 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from xrds_core.frames import RADIUS
 
-from ..frame import ways
-from ..frame.job import RenderJob
-from ..planning.ways import Way
+from ..choosing import modes
+from ..planning.request import Request, request
+from ..planning.settings import Mode
 from .machine import machine
 from .translations import CONTEXT
 
-_WAYS = [
+_MODES = [
     (
-        Way.AUTOMATIC,
+        Mode.AUTOMATIC,
         "Automatic",
-        "XRDS takes the way that gives the best picture at the present samples. "
+        "XRDS takes the mode that gives the best picture at the present samples. "
         "With a time budget it chooses the samples as well",
     ),
     (
-        Way.FULL_SIZE,
+        Mode.FULL_SIZE,
         "Full Size",
         "Cycles renders every pixel and XRDS denoises the picture. The best choice for "
         "final frames, stills and animations alike",
     ),
     (
-        Way.X2,
+        Mode.X2,
         "Super-Resolution 2×",
         "Cycles renders a quarter of the pixels and a network adds the detail. Quicker "
         "than full size at the same samples; small reflections and sharp shadows get "
         "softer",
     ),
     (
-        Way.X4,
+        Mode.X4,
         "Super-Resolution 4×",
         "Cycles renders one pixel in 16 and a network adds the detail. For tests and "
         "look development; print and fine patterns get soft",
     ),
     (
-        Way.X8,
+        Mode.X8,
         "Super-Resolution 8×",
         "Cycles renders one pixel in 64 and a network adds the detail. For thumbnails "
         "and first looks",
     ),
     (
-        Way.PLAIN,
-        "Plain",
+        Mode.CYCLES_ONLY,
+        "Cycles Only",
         "Cycles renders alone, with its own denoiser, exactly as if it were the "
         "render engine",
     ),
@@ -100,29 +100,16 @@ DENOISE = [
         "The smallest network, for previews: the quickest, and the softest picture",
     ),
 ]
-_GUIDES = [
-    (
-        "fast",
-        "Fast",
-        "Colour and direction of the surfaces, rendered at full size without light",
-    ),
-    (
-        "full",
-        "Full",
-        "A noisy full-size picture as well: slower, but shadows and reflections get "
-        "sharper",
-    ),
-]
 
 
 class XRDSSettings(bpy.types.PropertyGroup):
     """How the engine XRDS renders a scene."""
 
-    way: EnumProperty(
-        name="Way",
+    mode: EnumProperty(
+        name="Mode",
         translation_context=CONTEXT,
-        items=_WAYS,
-        default=Way.AUTOMATIC,
+        items=_MODES,
+        default=Mode.AUTOMATIC,
         description="How XRDS makes the picture: this decides how long a frame takes "
         "and how good it gets",
     )
@@ -130,7 +117,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Network",
         translation_context=CONTEXT,
         items=_PRESETS,
-        description="The network that adds detail to the small picture; a larger one "
+        description="The network that adds detail to the low-resolution picture; a larger one "
         "takes longer",
     )
     denoise: EnumProperty(
@@ -148,16 +135,9 @@ class XRDSSettings(bpy.types.PropertyGroup):
         min=0,
         soft_max=8,
         max=32,
-        description="In an animation, how many frames before and after lend their "
+        description="In an animation, how many frames before and after give their "
         "samples to each frame. More give less noise and flicker and take more memory; "
         "0 renders every frame by itself",
-    )
-    guides: EnumProperty(
-        name="Guides",
-        translation_context=CONTEXT,
-        items=_GUIDES,
-        description="What is rendered at full size to show the network where edges "
-        "and textures are",
     )
     guide_samples: IntProperty(
         name="Samples per Pixel",
@@ -188,7 +168,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Time Budget",
         translation_context=CONTEXT,
         description="Give each frame a number of seconds: XRDS tries the scene out "
-        "and takes the way, the samples and the denoiser that give the best picture "
+        "and takes the mode, the samples and the denoiser that give the best picture "
         "in that time",
     )
     time_budget: FloatProperty(
@@ -204,17 +184,16 @@ class XRDSSettings(bpy.types.PropertyGroup):
 
     @property
     def is_timed(self) -> bool:
-        """Whether a time budget chooses way and samples."""
-        return self.way == Way.AUTOMATIC and self.use_time_budget
+        """Whether a time budget chooses mode and samples."""
+        return self.mode == Mode.AUTOMATIC and self.use_time_budget
 
 
-def job_of(settings: XRDSSettings) -> RenderJob:
-    """The job that a scene's settings and the preferences describe."""
+def request_of(settings: XRDSSettings) -> Request:
+    """What a scene's settings and the preferences describe."""
     here = machine()
-    job = RenderJob(
+    wanted = request(
         scale=1,
         guide_samples=settings.guide_samples,
-        guides=settings.guides,
         preset=settings.preset,
         denoise=settings.denoise,
         device=here.device,
@@ -224,7 +203,6 @@ def job_of(settings: XRDSSettings) -> RenderJob:
         weights=here.weights,
         threads=here.threads,
         stop_keeps=here.stop_keeps,
+        temporal_radius=settings.temporal_radius,
     )
-    return ways.on_the_way(
-        job, Way(settings.way), settings.id_data, settings.temporal_radius
-    )
+    return modes.in_mode(wanted, Mode(settings.mode), settings.id_data)

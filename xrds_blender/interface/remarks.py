@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import bpy
 
-from ..frame.job import RenderJob
-from ..frame.means import weights_headers
-from ..frame.ways import asked_of
-from ..planning.ways import WAYS, Means, Way, missing
+from ..choosing.capabilities import weights_headers
+from ..planning.modes import Capabilities, missing
+from ..planning.request import Request
+from ..planning.settings import MODES, Mode
 from . import support
 
 NO_DENOISER = (
@@ -21,7 +22,7 @@ NOISY_INPUT = (
 )
 CYCLES_CANNOT_DENOISE = (
     "This Blender has no denoiser, so Cycles may stop with an error: switch off its "
-    "Denoise, or choose another way"
+    "Denoise, or choose another mode"
 )
 NO_BUDGET = "A time budget needs a denoiser: install XRDS from its zip"
 OTHER_PASSES = (
@@ -33,47 +34,45 @@ PASSES_CHANGED = (5, 1)
 Remark = tuple[str, str]
 
 
-def remarks(scene: Any, job: RenderJob, at_hand: Means) -> list[Remark]:
+def remarks(scene: Any, request: Request, here: Capabilities) -> list[Remark]:
     """Icon and sentence: what is missing first, then what is otherwise than usual."""
-    settings = scene.xrds
-    chosen = Way.of(job.scale, job.plain)
-    asked = asked_of(scene, job)
-    lacks = {way: missing(way, asked, at_hand) for way in WAYS}
+    settings, chosen = scene.xrds, request.settings.mode
+    lacks = {m: missing(replace(request.settings, mode=m), here) for m in MODES}
     told: list[Remark] = []
     if settings.is_timed:
-        if not at_hand.any_denoiser:
+        if not here.any_denoiser:
             told.append(("ERROR", NO_BUDGET))
     elif lacks[chosen]:
         told.append(("ERROR", lacks[chosen]))
     else:
-        told += [("ERROR", sentence) for sentence in _wrong(scene, chosen, at_hand)]
-    not_offered = {text for way, text in lacks.items() if text and way is not chosen}
+        told += [("ERROR", sentence) for sentence in _wrong(scene, chosen, here)]
+    not_offered = {text for mode, text in lacks.items() if text and mode is not chosen}
     told += [
         ("INFO", text) for text in sorted(not_offered) if ("ERROR", text) not in told
     ]
-    if job.is_enlarged:
-        if not _knows_passes(job):
+    if request.settings.is_enlarged:
+        if not _knows_passes(request):
             told.append(("ERROR", OTHER_PASSES))
         told += [("INFO", sentence) for sentence in support.notes(scene)]
     return told
 
 
-def _wrong(scene: Any, way: Way, at_hand: Means) -> list[str]:
+def _wrong(scene: Any, mode: Mode, here: Capabilities) -> list[str]:
     """What spoils the picture, though it can be rendered."""
-    if way is Way.PLAIN and scene.cycles.use_denoising and not at_hand.cycles_denoiser:
+    denoises = mode is Mode.CYCLES_ONLY and scene.cycles.use_denoising
+    if denoises and not here.cycles_denoiser:
         return [CYCLES_CANNOT_DENOISE]
-    if at_hand.any_denoiser:
+    if here.any_denoiser:
         return []
-    return [NOISY_INPUT if way.is_enlarged else NO_DENOISER]
+    return [NOISY_INPUT if mode.is_enlarged else NO_DENOISER]
 
 
-def _knows_passes(job: RenderJob) -> bool:
+def _knows_passes(request: Request) -> bool:
     """Whether the weights were trained on denoising passes as this Blender has them."""
-    wanted = (job.preset, job.scale, job.guides)
     series = {
-        (each.preset, each.scale, each.guides): each.blender_series
-        for each in weights_headers(job.weights)
-    }.get(wanted, "")
+        (each.preset, each.scale): each.blender_series
+        for each in weights_headers(request.machine.weights)
+    }.get(request.settings.network, "")
     if not series:
         return True
     trained = tuple(int(part) for part in series.split(".")[:2])

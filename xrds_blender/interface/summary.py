@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
+from ..choosing.history import LastRender, scene_settings
 from ..cycles.size import frame_size
-from ..frame.history import LastRender, plain_denoiser
-from ..frame.job import RenderJob
 from ..planning import forecast
+from ..planning.modes import Capabilities
 from ..planning.plan import Plan
-from ..planning.ways import Means, Way
+from ..planning.request import Request
+from ..planning.settings import Mode, Settings
 from .machine import machine
+from .mode_table import NAMES
 from .paragraph import translated
 from .properties import DENOISE
-from .ways_table import NAMES
 
 if TYPE_CHECKING:
     from .facts_cache import FactsCache
@@ -50,67 +51,73 @@ def forget() -> None:
         _facts_cache().forget()
 
 
-def next_render(scene: Any, job: RenderJob, at_hand: Means) -> list[Row]:
+def next_render(scene: Any, request: Request, here: Capabilities) -> list[Row]:
     """Name and value of what the render will do, take and leave out; five at most."""
     size = frame_size(scene.render)
-    if job.is_picked:
-        rows = [("Picture", _size(*size)), ("About", _foreseen(scene, job, at_hand))]
-        return rows + _neighbours(size, job)
-    if job.is_enlarged:
-        return _enlarged(scene, job)
+    if request.goal is not None:
+        rows = [
+            ("Picture", _size(*size)),
+            ("Expected Settings", _foreseen(scene, request, here)),
+        ]
+        return rows + _neighbours(size, request.settings)
+    if request.settings.is_enlarged:
+        return _enlarged(scene, request)
     rows = [("Picture", _sampled(*size, scene.cycles.samples))]
-    if job.plain:
-        mode = plain_denoiser(scene)
-        named = mode and f"OIDN {mode.quality.title()}, {mode.prefilter.title()}"
+    if request.settings.is_cycles_only:
+        own = scene_settings(scene).denoising
+        named = own and f"OIDN {own.quality.title()}, {own.prefilter.title()}"
         told = named or translated("none")
         return [*rows, ("Denoising", told)]
-    rows.append(("Denoising", translated(_QUALITIES[job.denoise])))
-    return rows + _neighbours(size, job)
+    rows.append(("Denoising", translated(_QUALITIES[request.settings.quality])))
+    return rows + _neighbours(size, request.settings)
 
 
-def _neighbours(size: tuple[int, int], job: RenderJob) -> list[Row]:
+def _neighbours(size: tuple[int, int], settings: Settings) -> list[Row]:
     """How many frames an animation keeps, and the memory that they take."""
-    if not job.temporal_radius:
+    radius = settings.temporal_radius
+    if not radius:
         return []
     text = "{radius} before and after, {memory}"
-    taken = _amount(forecast.shot_memory(*size, job.temporal_radius, job.scale))
-    told = translated(text, radius=job.temporal_radius, memory=taken)
+    taken = _amount(forecast.shot_memory(*size, radius, settings.scale))
+    told = translated(text, radius=radius, memory=taken)
     return [("Neighbouring Frames", told)]
 
 
-def _foreseen(scene: Any, job: RenderJob, at_hand: Means) -> str:
+def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
     """What a time budget will about choose."""
-    from ..frame.picking import foresee
+    from ..choosing.chosen import foresee
 
-    networks = sorted(at_hand.networks) if at_hand.torch else []
-    picked = foresee(scene, job, networks) if at_hand.any_denoiser else None
-    if picked is None:
+    networks = sorted(here.networks) if here.torch else []
+    found = foresee(scene, request, networks) if here.any_denoiser else None
+    if found is None:
         return translated("known after a first render")
-    choice = picked.choice
-    is_plain = choice.scale == 1 and not choice.denoiser.is_ours
-    way = Way.of(choice.scale, is_plain)
-    return f"{translated(NAMES[way])}, {_samples(choice.samples)}"
+    return _named(found.settings)
 
 
-def _enlarged(scene: Any, job: RenderJob) -> list[Row]:
-    facts = _facts_cache().facts(scene, bpy.context.view_layer, job)
-    chosen = job.plan(facts)
+def _named(settings: Settings) -> str:
+    """Mode and samples."""
+    return f"{translated(NAMES[settings.mode])}, {_samples(settings.samples or 0)}"
+
+
+def _enlarged(scene: Any, request: Request) -> list[Row]:
+    facts = _facts_cache().facts(scene, bpy.context.view_layer, request.settings)
+    chosen = request.plan(facts)
     size = facts.width, facts.height
-    small = forecast.low_size(*size, job.scale)
+    small = forecast.low_size(*size, request.settings.scale)
     limit = machine().memory_limit
-    taken = forecast.memory(*size, job.preset, job.scale, limit)
+    taken = forecast.memory(*size, *request.settings.network, limit)
     guides = _sampled(*size, chosen.guide_samples)
     rows = [
-        ("Small Picture", _sampled(*small, scene.cycles.samples)),
+        ("Low Resolution", _sampled(*small, scene.cycles.samples)),
         ("Guides", guides if chosen.render_guides else translated("none")),
         ("Memory", f"≤ {_amount(taken)}"),
-        *_neighbours(size, job),
+        *_neighbours(size, request.settings),
     ]
-    left_out = ", ".join(translated(each) for each in _left_out(chosen))
-    return [*rows, ("Left Out", left_out)] if left_out else rows
+    skipped = ", ".join(translated(each) for each in _skipped(chosen))
+    return [*rows, ("Skipped", skipped)] if skipped else rows
 
 
-def _left_out(chosen: Plan) -> list[str]:
+def _skipped(chosen: Plan) -> list[str]:
     """What the scene does not need."""
     parts = {
         "light in the guides": chosen.render_guides and not chosen.guides.sample_world,
@@ -121,27 +128,26 @@ def _left_out(chosen: Plan) -> list[str]:
             for each in chosen.decisions
         ),
     }
-    return [name for name, is_left_out in parts.items() if is_left_out]
+    return [name for name, is_skipped in parts.items() if is_skipped]
 
 
 def last_render(last: LastRender) -> list[Row]:
     """What the last render was, and where its seconds went."""
-    way = f"{translated(NAMES[last.way])}, {_samples(last.samples)}"
-    rows = [("Way", way)]
+    rows = [("Mode", _named(last.settings))]
     for stage, name in _STAGES.items():
         spent = last.seconds.get(stage, 0.0)
         if spent >= 0.05 or stage == "total":
-            rows.append((_stage(stage, name, last.way), f"{spent:.1f} s"))
+            rows.append((_stage(stage, name, last.settings.mode), f"{spent:.1f} s"))
     return rows
 
 
-def _stage(stage: str, name: str, way: Way) -> str:
+def _stage(stage: str, name: str, mode: Mode) -> str:
     """Cycles does not tell its own denoising from its samples."""
     if stage != "beauty":
         return name
-    if way.is_enlarged:
-        return "Small Picture"
-    return "Samples and Denoising" if way is Way.PLAIN else name
+    if mode.is_enlarged:
+        return "Low Resolution"
+    return "Samples and Denoising" if mode is Mode.CYCLES_ONLY else name
 
 
 def _sampled(width: int, height: int, samples: int) -> str:

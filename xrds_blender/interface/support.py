@@ -53,15 +53,15 @@ def _has_freestyle(scene: Any) -> bool:
 _NOTES: tuple[tuple[Callable[[Any], bool], str], ...] = (
     (
         _uses_light_passes,
-        "Light passes are those of the small picture, enlarged without the network",
+        "Light passes are those of the low-resolution picture, enlarged without the network",
     ),
     (
         _has_time_limit,
-        "The time limit covers the small picture only; guides and network add to it",
+        "The time limit covers the low-resolution picture only; guides and network add to it",
     ),
     (
         _is_panorama,
-        "A panorama's small picture is resampled, so its edges are less sharp",
+        "A panorama's low-resolution picture is resampled, so its edges are less sharp",
     ),
     (
         _has_freestyle,

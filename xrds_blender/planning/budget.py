@@ -14,10 +14,11 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-from .denoiser import Denoiser
 from .plan import Decision
+from .request import Goal
+from .settings import Denoising, Mode, Network, Settings
 
 MODEL = Path(__file__).with_name("budget.json")
 # Predictions scatter; a frame that is late is worse than one that is early.
@@ -36,48 +37,6 @@ LENT = 0.5
 ACCUMULATION = 0.25
 
 
-class Network(NamedTuple):
-    """What a weights file is for."""
-
-    preset: str
-    scale: int
-    guides: str
-
-
-@dataclass(frozen=True)
-class Choice:
-    """What is rendered: scale 1 needs no network, only a denoiser, Cycles' or ours.
-
-    `samples` are per low-resolution pixel, `guide_samples` per full one.
-    """
-
-    denoiser: Denoiser
-    samples: int
-    scale: int = 1
-    preset: str = ""
-    guides: str = ""
-    guide_samples: int = 0
-
-    @property
-    def network(self) -> Network:
-        """The weights it needs."""
-        return Network(self.preset, self.scale, self.guides)
-
-    @property
-    def label(self) -> str:
-        """In a few words, as the panel and the command print it."""
-        samples = "1 sample" if self.samples == 1 else f"{self.samples} samples"
-        if self.scale == 1 and self.denoiser.is_ours:
-            return f"full size, {samples}, {self.denoiser.quality} denoising"
-        if self.scale == 1:
-            return f"plain, {samples}, OIDN {self.denoiser}"
-        guides = "full guide" if self.guides == "full" else "guide"
-        return (
-            f"{self.preset} x{self.scale}, {samples}, "
-            f"{self.guide_samples} {guides} samples, OIDN {self.denoiser}"
-        )
-
-
 @dataclass(frozen=True)
 class Costs:
     """Seconds of one frame's parts, all for the whole frame at its full size.
@@ -90,7 +49,7 @@ class Costs:
     fixed: float
     beauty: float
     guide: float
-    denoise: Mapping[Denoiser, float]
+    denoise: Mapping[Denoising, float]
     network: Mapping[Network, float]
     probes: float = 0.0
     pictures: int = 1
@@ -109,25 +68,28 @@ class Costs:
             pictures=2 if radius else 1,
         )
 
-    def seconds(self, choice: Choice) -> float:
+    def seconds(self, settings: Settings) -> float:
         """Of the whole frame; raises KeyError for an unknown denoiser or network."""
-        return self._without_samples(choice) + choice.samples * self._sample(choice)
+        assert settings.samples is not None
+        rest = self._without_samples(settings)
+        return rest + settings.samples * self._sample(settings)
 
-    def samples(self, choice: Choice, seconds: float) -> int:
-        """Most samples for which the choice keeps to `seconds`; 0 if none does."""
-        left = seconds - self._without_samples(choice)
-        return max(0, min(MOST_SAMPLES, math.floor(left / self._sample(choice))))
+    def samples(self, settings: Settings, seconds: float) -> int:
+        """Most samples for which settings keep to `seconds`; 0 if none does."""
+        left = seconds - self._without_samples(settings)
+        return max(0, min(MOST_SAMPLES, math.floor(left / self._sample(settings))))
 
-    def _sample(self, choice: Choice) -> float:
-        return self.beauty / choice.scale**2
+    def _sample(self, settings: Settings) -> float:
+        return self.beauty / settings.scale**2
 
-    def _without_samples(self, choice: Choice) -> float:
-        denoise = self.denoise[choice.denoiser]
-        if choice.scale == 1:
+    def _without_samples(self, settings: Settings) -> float:
+        denoising = settings.denoising
+        denoise = 0.0 if denoising is None else self.denoise[denoising]
+        if not settings.is_enlarged:
             return self.fixed + denoise * self.pictures
-        guide = self.beauty if choice.guides == "full" else self.guide
-        seconds = self.fixed + denoise / choice.scale**2
-        return seconds + choice.guide_samples * guide + self.network[choice.network]
+        seconds = self.fixed + denoise / settings.scale**2
+        guides = settings.guide_samples * self.guide
+        return seconds + guides + self.network[settings.network]
 
 
 @dataclass(frozen=True)
@@ -164,38 +126,37 @@ class Curve:
 
 @dataclass(frozen=True)
 class ErrorModel:
-    """Expected PSNR of every choice: one curve over samples for each of the others.
+    """Expected PSNR of every choice: one curve over samples for each family.
 
-    The keys are choices with no samples.
+    The keys are settings as `Settings.family` has them.
     """
 
-    curves: Mapping[Choice, Curve]
+    curves: Mapping[Settings, Curve]
 
-    def psnr(self, choice: Choice) -> float:
+    def psnr(self, settings: Settings) -> float:
         """In dB; raises KeyError for what was not measured."""
-        return self.curves[_without_count(choice)].at(choice.samples)
+        assert settings.samples is not None
+        return self.curves[settings.family].at(settings.samples)
 
-    def limited(self, denoisers: Collection[Denoiser]) -> ErrorModel:
-        """Without those choices at scale 1 whose denoiser is not among these."""
+    def limited(self, denoising: Collection[Denoising]) -> ErrorModel:
+        """Without those at full size whose denoising is not among these."""
         kept = {
-            choice: curve
-            for choice, curve in self.curves.items()
-            if choice.scale > 1 or choice.denoiser in denoisers
+            family: curve
+            for family, curve in self.curves.items()
+            if family.is_enlarged or family.denoising in denoising
         }
         return ErrorModel(kept)
 
     def in_shot(self, radius: int) -> ErrorModel:
-        """Of frames to which `radius` frames before and after lend their samples."""
+        """Of frames that `radius` frames before and after give their samples."""
         worth = 1 + 2 * radius * LENT
-        return ErrorModel(
-            {choice: replace(c, worth=worth) for choice, c in self.curves.items()}
-        )
+        return ErrorModel({s: replace(c, worth=worth) for s, c in self.curves.items()})
 
-    def families(self, networks: Sequence[Network]) -> Iterator[tuple[Choice, Curve]]:
-        """Everything but the sample counts, of what these weights can render."""
-        for choice, curve in self.curves.items():
-            if choice.scale == 1 or choice.network in networks:
-                yield choice, curve
+    def families(self, networks: Sequence[Network]) -> Iterator[tuple[Settings, Curve]]:
+        """Everything but the sample counts, of what these networks can render."""
+        for family, curve in self.curves.items():
+            if not family.is_enlarged or family.network in networks:
+                yield family, curve
 
 
 @dataclass(frozen=True)
@@ -203,12 +164,12 @@ class Model:
     """What `xrds bench` has learnt about all scenes and all machines.
 
     `denoiser_speed` and `network_speed` are seconds at one size over those of
-    DEFAULT_DENOISER, which a probe measures; `other_per_megapixel` seconds of reading,
+    DEFAULT_DENOISING, which a probe measures; `other_per_megapixel` seconds of reading,
     writing and all else.
     """
 
     errors: ErrorModel
-    denoiser_speed: Mapping[Denoiser, float]
+    denoiser_speed: Mapping[Denoising, float]
     network_speed: Mapping[Network, float]
     other_per_megapixel: float
     source: str = ""
@@ -218,18 +179,18 @@ class Model:
         """From the file that `xrds bench --model` writes."""
         content = json.loads(path.read_text("utf-8"))
         curves = {
-            _choice_of(entry["choice"]): Curve(
+            _family(entry["settings"]): Curve(
                 tuple(entry["samples"]), tuple(entry["psnr"])
             )
             for entry in content["curves"]
         }
         networks = {
-            Network(entry["preset"], entry["scale"], entry["guides"]): entry["speed"]
+            (entry["preset"], entry["scale"]): entry["speed"]
             for entry in content["networks"]
         }
         return cls(
             ErrorModel(curves),
-            {Denoiser(mode): x for mode, x in content["denoisers"].items()},
+            {Denoising(each): x for each, x in content["denoisers"].items()},
             networks,
             content["other_per_megapixel"],
             content["source"],
@@ -242,52 +203,54 @@ class Model:
             "other_per_megapixel": self.other_per_megapixel,
             "denoisers": dict(self.denoiser_speed),
             "networks": [
-                {"preset": preset, "scale": scale, "guides": guides, "speed": speed}
-                for (preset, scale, guides), speed in self.network_speed.items()
+                {"preset": preset, "scale": scale, "speed": speed}
+                for (preset, scale), speed in self.network_speed.items()
             ],
             "curves": [
                 {
-                    "choice": {k: v for k, v in vars(choice).items() if k != "samples"},
+                    "settings": {name: getattr(family, name) for name in _FAMILY},
                     "samples": list(curve.samples),
                     "psnr": [round(value, 3) for value in curve.psnr],
                 }
-                for choice, curve in self.errors.curves.items()
+                for family, curve in self.errors.curves.items()
             ],
         }
 
 
 @dataclass(frozen=True)
-class Picked:
-    """The choice with what is expected of it, and the best of the other kind."""
+class Selection:
+    """Settings with what is expected of them, and the best of the other kind."""
 
-    choice: Choice
+    settings: Settings
     seconds: float
     psnr: float
-    rival: Picked | None = None
+    rival: Selection | None = None
     fits: bool = True
 
-    def decision(self, goal: float, in_seconds: bool = True) -> Decision:
-        """What was chosen and why, for the plan: `goal` in seconds or in dB."""
+    def decision(self, goal: Goal) -> Decision:
+        """What was chosen and why, for the plan."""
+        in_seconds = goal.seconds is not None
         name, unit = ("time budget", "s") if in_seconds else ("quality", "dB")
+        wanted = f"{goal.seconds if in_seconds else goal.decibels:g} {unit}"
         reason = f"{self.psnr:.1f} dB expected in {self.seconds:.1f} s"
         if not self.fits and in_seconds:
-            reason = f"{goal:g} s is too short for this scene; the nearest: {reason}"
+            reason = f"{wanted} is too short for this scene; the nearest: {reason}"
         elif not self.fits:
-            reason = f"{goal:g} dB is beyond what was measured; the best: {reason}"
+            reason = f"{wanted} is beyond what was measured; the best: {reason}"
         elif self.rival is None:
-            reason += f", the only method for {goal:g} {unit}"
+            reason += f", the only method for {wanted}"
         else:
             other = self.rival
             reason += (
-                f"; best {_kind(other.choice)} for {goal:g} {unit}: "
-                f"{other.choice.label}: {other.psnr:.1f} dB in {other.seconds:.1f} s"
+                f"; best {_kind(other.settings)} for {wanted}: "
+                f"{other.settings.label}: {other.psnr:.1f} dB in {other.seconds:.1f} s"
             )
-        return Decision(name, self.choice.label, reason)
+        return Decision(name, self.settings.label, reason)
 
 
 def choose(
     budget: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
-) -> Picked:
+) -> Selection:
     """The least error expected within `budget` seconds; where none fits the fastest.
 
     Where super-resolution alone fits, but full size nearly does, the latter: it is
@@ -297,35 +260,41 @@ def choose(
     if not fitting:
         return _fastest(costs, errors, networks)
     best = max(fitting, key=_merit)
-    if best.choice.scale > 1:
+    if best.settings.is_enlarged:
         full_size = [p for p in _few(costs, errors, []) if p.seconds <= budget * ALIKE]
         late = max(full_size, key=_merit, default=best)
         if late.psnr > best.psnr:
             return replace(late, fits=False)
-    rivals = [p for p in fitting if _kind(p.choice) != _kind(best.choice)]
+    rivals = [p for p in fitting if _kind(p.settings) != _kind(best.settings)]
     rival = max(rivals, key=_merit, default=None)
-    return Picked(best.choice, best.seconds, best.psnr, rival)
+    return Selection(best.settings, best.seconds, best.psnr, rival)
 
 
 def denoiser_in_time(
-    spent: float, budget: float, choice: Choice, costs: Costs, errors: ErrorModel
-) -> Denoiser:
+    spent: float,
+    budget: float,
+    settings: Settings,
+    costs: Costs,
+    errors: ErrorModel,
+) -> Denoising:
     """Ours with the least error for the samples that are there after `spent` seconds.
 
-    `choice` at scale 1 is what was chosen for the `budget`: samples may have taken more
-    or less time than expected. Where nothing is in time, about the quickest.
+    `settings` at full size are what was chosen for the `budget`: samples may have taken
+    more or less time than expected. Where nothing is in time, about the quickest.
     """
+    assert settings.samples is not None
     psnr = {
-        family.denoiser: curve.at(choice.samples)
+        family.denoising: curve.at(settings.samples)
         for family, curve in errors.families([])
-        if family.denoiser.is_ours
+        if family.mode is Mode.FULL_SIZE and family.denoising is not None
     }
+    foreseen = psnr[settings.denoising]
     late = budget * (1 + LATE)
     ends = {mode: spent + costs.denoise[mode] for mode in psnr}
     in_time = [
         mode
         for mode, end in ends.items()
-        if end <= (budget if psnr[mode] > psnr[choice.denoiser] else late)
+        if end <= (budget if psnr[mode] > foreseen else late)
     ]
     quickest = min(ends.values())
     about = [mode for mode, end in ends.items() if end <= quickest * ALIKE]
@@ -334,42 +303,46 @@ def denoiser_in_time(
 
 def reach(
     psnr: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
-) -> Picked:
+) -> Selection:
     """The fastest choice of at least `psnr` dB; the best there is where none has it."""
     picks = []
     for family, curve in errors.families(networks):
         samples = _least_samples(curve, psnr)
-        picks.append(_picked(family, samples, costs, curve))
+        picks.append(_selection(family, samples, costs, curve))
     enough = [p for p in picks if p.psnr >= psnr]
     if not enough:
         best = max(picks, key=_merit)
-        return Picked(best.choice, best.seconds, best.psnr, None, fits=False)
+        return Selection(best.settings, best.seconds, best.psnr, None, fits=False)
     best = min(enough, key=lambda p: p.seconds)
-    rivals = [p for p in enough if _kind(p.choice) != _kind(best.choice)]
+    rivals = [p for p in enough if _kind(p.settings) != _kind(best.settings)]
     rival = min(rivals, key=lambda p: p.seconds, default=None)
-    return Picked(best.choice, best.seconds, best.psnr, rival)
+    return Selection(best.settings, best.seconds, best.psnr, rival)
 
 
 def _fitting(
     seconds: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
-) -> Iterator[Picked]:
+) -> Iterator[Selection]:
     for family, curve in errors.families(networks):
         samples = costs.samples(family, seconds)
         if samples >= curve.samples[0]:
-            yield _picked(family, samples, costs, curve)
+            yield _selection(family, samples, costs, curve)
 
 
-def _fastest(costs: Costs, errors: ErrorModel, networks: Sequence[Network]) -> Picked:
+def _fastest(
+    costs: Costs, errors: ErrorModel, networks: Sequence[Network]
+) -> Selection:
     picks = _few(costs, errors, networks)
     least = min(p.seconds for p in picks)
     best = max((p for p in picks if p.seconds <= least * ALIKE), key=_merit)
-    return Picked(best.choice, best.seconds, best.psnr, None, fits=False)
+    return Selection(best.settings, best.seconds, best.psnr, None, fits=False)
 
 
-def _few(costs: Costs, errors: ErrorModel, networks: Sequence[Network]) -> list[Picked]:
+def _few(
+    costs: Costs, errors: ErrorModel, networks: Sequence[Network]
+) -> list[Selection]:
     """Every family with the fewest samples that were measured."""
     return [
-        _picked(family, curve.samples[0], costs, curve)
+        _selection(family, curve.samples[0], costs, curve)
         for family, curve in errors.families(networks)
     ]
 
@@ -386,34 +359,29 @@ def _least_samples(curve: Curve, psnr: float) -> int:
     return low
 
 
-def _picked(family: Choice, samples: int, costs: Costs, curve: Curve) -> Picked:
-    choice = _with_count(family, samples)
-    return Picked(choice, costs.seconds(choice), curve.at(samples))
+def _selection(family: Settings, samples: int, costs: Costs, curve: Curve) -> Selection:
+    settings = replace(family, samples=samples)
+    return Selection(settings, costs.seconds(settings), curve.at(samples))
 
 
-def _merit(picked: Picked) -> tuple[float, float]:
+def _merit(selected: Selection) -> tuple[float, float]:
     """Least error first; of equals the faster."""
-    return picked.psnr, -picked.seconds
+    return selected.psnr, -selected.seconds
 
 
-def _kind(choice: Choice) -> str:
-    if choice.scale > 1:
+def _kind(settings: Settings) -> str:
+    if settings.is_enlarged:
         return "super-resolution"
-    return "full size" if choice.denoiser.is_ours else "plain"
+    return "Cycles only" if settings.is_cycles_only else "full size"
 
 
-def _choice_of(fields: Mapping[str, Any]) -> Choice:
-    """A choice with no samples, from its entry in the model's file."""
-    return Choice(samples=0, **{**fields, "denoiser": Denoiser(fields["denoiser"])})
+_FAMILY = ("mode", "denoising", "preset", "guide_samples")
 
 
-def _with_count(family: Choice, samples: int) -> Choice:
-    fields = vars(family) | {"samples": samples}
-    return Choice(**fields)
-
-
-def _without_count(choice: Choice) -> Choice:
-    return _with_count(choice, 0)
+def _family(fields: Mapping[str, Any]) -> Settings:
+    """Settings without samples, from their entry in the model's file."""
+    mode, denoising = Mode(fields["mode"]), Denoising(fields["denoising"])
+    return Settings(mode, None, denoising, fields["preset"], fields["guide_samples"])
 
 
 @lru_cache(maxsize=1)

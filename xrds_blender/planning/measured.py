@@ -9,9 +9,8 @@ from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from .budget import Choice, Costs, Model, Network
-from .denoiser import DEFAULT_DENOISER, Denoiser
-from .ways import Asked, Way, choice_of
+from .budget import Costs, Model
+from .settings import DEFAULT_DENOISING, Denoising, Mode, Network, Settings
 
 # A frame of more pixels than this many times those measured is not told of: what a
 # small one takes to begin would count too much.
@@ -36,23 +35,21 @@ class Measured:
     guide: float | None = None
     denoise: float | None = None
     networks: Mapping[Network, float] = field(default_factory=dict)
-    totals: Mapping[tuple[Way, Asked], float] = field(default_factory=dict)
+    totals: Mapping[Settings, float] = field(default_factory=dict)
 
-    def seconds(
-        self, way: Way, asked: Asked, pixels: int, model: Model
-    ) -> float | None:
-        """Those that the way will about take; `pixels` may be another number."""
+    def seconds(self, settings: Settings, pixels: int, model: Model) -> float | None:
+        """Those that resolved settings will about take; `pixels` may be others."""
         here = _resized(self, pixels)
-        if (way, asked) in here.totals:
-            return here.totals[way, asked]
-        choice = choice_of(way, asked)
+        if settings in here.totals:
+            return here.totals[settings]
         if here.beauty is None:
             return None
-        if choice is None:
-            return here.fixed + asked.samples * here.beauty
+        if settings.denoising is None:
+            assert settings.samples is not None
+            return here.fixed + settings.samples * here.beauty
         costs = here.costs(pixels, model)
         try:
-            return costs and costs.seconds(_in_process(choice))
+            return costs and costs.seconds(_in_process(settings))
         except KeyError:  # a network of which nothing is known
             return None
 
@@ -76,15 +73,15 @@ class Measured:
 
 def learn(
     known: Measured | None,
-    way: Way,
-    asked: Asked,
+    settings: Settings,
     pixels: int,
     seconds: Mapping[str, float],
     model: Model,
 ) -> Measured:
     """What is known after one more render, of these seconds by stage.
 
-    A render at another size or way adds to what the ones before have told.
+    Its settings are resolved. A render at another size or in another mode adds to what
+    the ones before have told.
     """
     seconds = defaultdict(float, seconds)
     before = _resized(known, pixels) if known else Measured(pixels)
@@ -92,45 +89,42 @@ def learn(
     now = replace(
         before,
         fixed=seconds["sync"] + seconds["write"],
-        totals={**before.totals, (way, asked): parts},
+        totals={**before.totals, settings: parts},
     )
-    if way.is_enlarged:
-        return _of_enlarged(now, way, asked, seconds, model)
-    if way is Way.FULL_SIZE:
-        mode = Denoiser(f"XRDS-{asked.denoise.upper()}")
-        denoise = seconds["denoise"] / model.denoiser_speed[mode]
-        beauty = seconds["beauty"] / asked.samples
-        return replace(now, beauty=beauty, denoise=denoise)
-    return _of_plain(now, asked, seconds["beauty"], model)
+    assert settings.samples is not None
+    sample = seconds["beauty"] / settings.samples
+    if settings.is_enlarged:
+        return _of_enlarged(now, settings, sample, seconds, model)
+    if settings.denoising is None:
+        return replace(now, beauty=sample)
+    speed = model.denoiser_speed[settings.denoising]
+    if settings.mode is Mode.FULL_SIZE:
+        return replace(now, beauty=sample, denoise=seconds["denoise"] / speed)
+    # Cycles does not tell its denoiser from its samples, so that must be known
+    if now.denoise is None or now.denoise * speed >= seconds["beauty"]:
+        return now
+    return replace(now, beauty=sample - now.denoise * speed / settings.samples)
 
 
 def _of_enlarged(
-    now: Measured, way: Way, asked: Asked, seconds: Mapping[str, float], model: Model
+    now: Measured,
+    settings: Settings,
+    sample: float,
+    seconds: Mapping[str, float],
+    model: Model,
 ) -> Measured:
-    area = way.scale**2
+    area = settings.scale**2
     denoise = now.denoise
     if denoise is None and seconds["denoise"] and area <= MOST_GROWTH:
-        denoise = seconds["denoise"] * area / model.denoiser_speed[Denoiser.XRDS_HIGH]
-    network = {asked.network(way.scale): seconds["network"]}
+        speed = model.denoiser_speed[Denoising.XRDS_HIGH]
+        denoise = seconds["denoise"] * area / speed
     return replace(
         now,
-        beauty=seconds["beauty"] * area / asked.samples,
-        guide=seconds["guides"] / asked.guide_samples,
+        beauty=sample * area,
+        guide=seconds["guides"] / settings.guide_samples,
         denoise=denoise,
-        networks={**now.networks, **network},
+        networks={**now.networks, settings.network: seconds["network"]},
     )
-
-
-def _of_plain(now: Measured, asked: Asked, spent: float, model: Model) -> Measured:
-    """Cycles does not tell its denoiser from its samples, so that must be known."""
-    if asked.plain_denoiser is None:
-        return replace(now, beauty=spent / asked.samples)
-    if now.denoise is None:
-        return now
-    denoising = now.denoise * model.denoiser_speed[asked.plain_denoiser]
-    if denoising >= spent:
-        return now
-    return replace(now, beauty=(spent - denoising) / asked.samples)
 
 
 def _resized(known: Measured, pixels: int) -> Measured:
@@ -153,8 +147,8 @@ def _resized(known: Measured, pixels: int) -> Measured:
     )
 
 
-def _in_process(choice: Choice) -> Choice:
-    """The choice with the denoiser that runs on the low-resolution picture: ours."""
-    if choice.scale == 1 or choice.denoiser is not DEFAULT_DENOISER:
-        return choice
-    return replace(choice, denoiser=Denoiser.XRDS_HIGH)
+def _in_process(settings: Settings) -> Settings:
+    """With the denoiser that runs on the low-resolution picture: ours."""
+    if settings.is_enlarged and settings.denoising is DEFAULT_DENOISING:
+        return replace(settings, denoising=Denoising.XRDS_HIGH)
+    return settings

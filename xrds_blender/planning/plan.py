@@ -22,10 +22,10 @@ __all__ = [
     "Plan",
     "SceneFacts",
     "after",
+    "cycles_only",
     "decide",
     "full_size",
     "guide_bounces",
-    "plain",
     "savings_but",
 ]
 
@@ -90,9 +90,9 @@ class Plan:
     decisions: tuple[Decision, ...]
 
 
-def plain(reason: str) -> Plan:
+def cycles_only(reason: str) -> Plan:
     """The plan where Cycles renders alone, as the file has it."""
-    decisions = (Decision("method", "plain", reason),)
+    decisions = (Decision("method", "Cycles only", reason),)
     return Plan(False, GuideRender(), 0, True, True, False, decisions)
 
 

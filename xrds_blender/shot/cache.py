@@ -22,7 +22,7 @@ from xrds_core.sequence.reading import Reading, read_frame
 from xrds_core.temporal.frame import Frame, Stored
 
 from ..cycles.size import picture_size
-from ..frame.job import RenderJob
+from ..planning.request import Request
 from .sampling import Sampled
 
 _FORM = 2  # counts up where samples of the same settings become others
@@ -96,7 +96,7 @@ class SampleCache:
 
 
 def cache_of(
-    scene: Any, job: RenderJob, folder: Path, say: Callable[[str], object]
+    scene: Any, request: Request, folder: Path, say: Callable[[str], object]
 ) -> SampleCache:
     """Make the cache of an open file's samples, and its folder.
 
@@ -109,14 +109,14 @@ def cache_of(
         views = tuple(view.name for view in scene.render.views if view.use)
     return SampleCache(
         folder,
-        Origin(_key(scene, job, layer), layer, job.temporal_radius),
+        Origin(_key(scene, request, layer), layer, request.settings.temporal_radius),
         views,
         scene.render.film_transparent,
         say,
     )
 
 
-def _key(scene: Any, job: RenderJob, layer: str) -> str:
+def _key(scene: Any, request: Request, layer: str) -> str:
     """Name what decides a frame's samples: files, settings, and Blender.
 
     Other files than the .blend are told by name, size and time of change.
@@ -137,9 +137,9 @@ def _key(scene: Any, job: RenderJob, layer: str) -> str:
         scene.camera.name_full,
         bpy.app.autoexec_fail,  # drivers of the file did not run
         picture_size(scene.render),
-        job.samples or scene.cycles.samples,
-        scene.cycles.seed if job.seed is None else job.seed,
-        job.temporal_radius,
+        request.settings.samples or scene.cycles.samples,
+        scene.cycles.seed if request.seed is None else request.seed,
+        request.settings.temporal_radius,
     )
     digest.update(repr(settings).encode())
     return digest.hexdigest()

@@ -8,8 +8,8 @@ from typing import Any
 from ..cycles import session
 from ..cycles.once import render_once
 from ..cycles.pass_names import COMBINED
-from ..frame.job import Picture
 from ..frame.memory import peak_memory
+from ..frame.picture import Picture
 from .methods import Method, Report
 from .sampling import Sampled
 
@@ -29,9 +29,9 @@ class CyclesOnly(Method):
         clock = render_once(
             engine,
             depsgraph,
-            samples=self.job.samples,
-            seed=self.job.seed,
-            denoiser=self.job.denoiser,
+            samples=self.settings.samples,
+            seed=self.request.seed,
+            denoiser=self.settings.denoising,
         )
         result = engine.get_result()
         layer, size = result.layers[name], (result.resolution_x, result.resolution_y)
@@ -49,7 +49,7 @@ class CyclesOnly(Method):
         return Picture.of(
             own.views[view],
             seconds={},
-            plan=self.job.plan().decisions,
+            plan=self.request.plan().decisions,
             peak_memory=peak_memory(),
         )
 

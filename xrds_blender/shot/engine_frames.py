@@ -66,7 +66,7 @@ class EngineFrames:
         """The frames of a scene's range."""
         found = cls(method)
         numbers = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
-        radius, begins = method.job.temporal_radius, cuts(scene, numbers)
+        radius, begins = method.request.settings.temporal_radius, cuts(scene, numbers)
         found.window = Window(Shot(tuple(numbers), radius, begins), found._load)
         return found
 
@@ -139,14 +139,14 @@ class EngineFrames:
         assert call is not None
         engine, depsgraph, passes = call.engine, call.depsgraph, call.passes
         scene = depsgraph.scene_eval
-        if not can_continue(scene, self.method.job):
+        if not can_continue(scene, self.method.request):
             return self.method.sample(engine, depsgraph, between=between)
         place = scene.frame_current // scene.frame_step
         sampled = self.method.sample(engine, depsgraph, place)
         asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
         if asked:
             others = passes.all_passes()
-            first_sample(engine, depsgraph, self.method.job, place)
+            first_sample(engine, depsgraph, self.method.request, place)
             names = set().union(*(_OF_ONE_SAMPLE[each] for each in asked))
             own = {k: x for k, x in passes.all_passes().items() if k[1] in names}
             passes.put_back(others | own)

@@ -13,7 +13,8 @@ from xrds_core.errors import OutOfMemory, WeightsError
 from ..cycles.colour import converted, to_rec709, working_space
 from ..cycles.rendered import Beauty, Guides
 from ..frame.cover import cover
-from ..frame.job import NetworkFailed, RenderJob
+from ..frame.picture import NetworkFailed
+from ..planning.request import Request
 
 if TYPE_CHECKING:
     from xrds_core import Upscaled, Upscaler
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 def enlarge(
     beauty: Beauty,
     guides: Guides,
-    job: RenderJob,
+    request: Request,
     upscaler: Upscaler,
     *,
     exposure: float | None,
@@ -56,10 +57,10 @@ def enlarge(
             placed(guides.normal),
             noisy=seen(beauty.noisy),
             guide_radiance=placed(seen(guides.radiance)),
-            guide_alpha=placed(cover(guides, job)),
+            guide_alpha=placed(cover(guides, request.machine)),
             guide_samples=guides.samples,
             exposure=exposure,
-            memory_limit=job.memory_limit,
+            memory_limit=request.machine.memory_limit,
             progress=progress,
             skip_idle=skip_idle,
         )

@@ -7,17 +7,17 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ..frame.facts import find_facts
-from ..frame.job import RenderJob
+from ..choosing.chosen import Chosen, chosen
+from ..choosing.facts import find_facts
 from ..frame.rendering import call_engine
 from ..planning.lending import lending
+from ..planning.request import Request
 from ..scene.cuts import cuts
-from .choosing import ChosenJob, chosen
 from .sampling import has_neighbours
 
 
 def explain(
-    scene: Any, job: RenderJob, frames: Sequence[int] | None = None
+    scene: Any, request: Request, frames: Sequence[int] | None = None
 ) -> dict[str, Any]:
     """Facts and decisions of the first of some frames, evaluated as for its render.
 
@@ -31,20 +31,20 @@ def explain(
     shot = frames or range(scene.frame_start, scene.frame_end + 1)
 
     def look(engine: Any, depsgraph: Any) -> dict[str, Any]:
-        is_shot = len(shot) > 1 and has_neighbours(scene, job)
-        with chosen(engine, depsgraph, job, start, is_shot) as found:
+        is_shot = len(shot) > 1 and has_neighbours(scene, request)
+        with chosen(engine, depsgraph, request, start, is_shot) as found:
             return _told(depsgraph, found, scene, shot)
 
     return call_engine(scene, look)
 
 
 def _told(
-    depsgraph: Any, choice: ChosenJob, scene: Any, shot: Sequence[int]
+    depsgraph: Any, choice: Chosen, scene: Any, shot: Sequence[int]
 ) -> dict[str, Any]:
-    job = choice.job
-    facts = find_facts(depsgraph, job)
-    decisions = job.plan(facts).decisions
-    if job.temporal_radius and len(shot) > 1:
-        decisions += lending(facts, job.temporal_radius, cuts(scene, shot))
+    request, radius = choice.request, choice.request.settings.temporal_radius
+    facts = find_facts(depsgraph, request.settings)
+    decisions = request.plan(facts).decisions
+    if radius and len(shot) > 1:
+        decisions += lending(facts, radius, cuts(scene, shot))
     decisions = choice.all_decisions(decisions)
     return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}

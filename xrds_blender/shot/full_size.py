@@ -16,9 +16,11 @@ from xrds_core.temporal.vectors import Movement
 
 from ..cycles.samples import Samples
 from ..frame.denoisers import load_denoiser
-from ..frame.job import Picture, RenderJob, Temporal
 from ..frame.memory import peak_memory
-from ..planning.plan import Decision
+from ..frame.picture import Picture, Temporal
+from ..planning.plan import Decision, full_size
+from ..planning.request import Request
+from ..planning.settings import Denoising, Settings
 from .methods import Method, Report
 from .sampling import Keep, Sampled, sample_frame
 from .stopping import quick
@@ -32,19 +34,19 @@ class FullSize(Method):
     """Samples at full size, denoised.
 
     `keep` takes each frame that is sampled. `denoise_in_time` gives the quality in the
-    place of the job's, once the samples of a still are there.
+    place of the request's, once the samples of a still are there.
     """
 
     def __init__(
         self,
-        job: RenderJob,
+        request: Request,
         keep: Keep | None = None,
         denoise_in_time: Callable[[], str] | None = None,
     ) -> None:
-        super().__init__(job)
+        super().__init__(request)
         self._keep, self._denoise_in_time = keep, denoise_in_time
-        self._foreseen = job.denoise
-        self._denoiser = load_denoiser(job)
+        self._quality = self.settings.quality
+        self._denoiser = load_denoiser(self._quality, request.machine)
         self._movement = Movement()
 
     def sample(
@@ -54,12 +56,12 @@ class FullSize(Method):
         place: int | None = None,
         between: bool = False,
     ) -> Sampled:
-        return sample_frame(engine, depsgraph, self.job, place, self._keep)
+        return sample_frame(engine, depsgraph, self.request, place, self._keep)
 
     def begin_finishing(self, engine: Any) -> Report:
         if self._denoise_in_time is not None:
-            self.job = replace(self.job, denoise=self._denoise_in_time())
-            self._denoiser = load_denoiser(self.job)
+            self._quality = self._denoise_in_time()
+            self._denoiser = load_denoiser(self._quality, self.request.machine)
         return super().begin_finishing(engine)
 
     def finish(
@@ -87,7 +89,7 @@ class FullSize(Method):
             gathered.normal,
             finished.seconds,
             decisions=(accumulation(gathered),),
-            temporal=temporal(self.job, gathered),
+            temporal=temporal(self.settings, gathered),
         )
 
     def _alone(self, samples: Samples, report: Report | None) -> Picture:
@@ -96,7 +98,7 @@ class FullSize(Method):
             samples.picture, samples.albedo, samples.normal, progress=report
         )
         seconds = {"denoise": time.perf_counter() - started}
-        decisions = in_time(self._foreseen, self.job.denoise)
+        decisions = in_time(self.settings.quality, self._quality)
         return self._picture(
             denoised, samples.albedo, samples.normal, seconds, decisions=decisions
         )
@@ -116,15 +118,15 @@ class FullSize(Method):
             albedo=albedo,
             normal=normal,
             seconds=seconds,
-            plan=(*self.job.plan().decisions, *decisions, prefilter(denoised)),
+            plan=(*full_size(self._quality).decisions, *decisions, prefilter(denoised)),
             peak_memory=peak_memory(),
             device=self._denoiser.device,
-            job=self.job,
+            settings=replace(self.settings, denoising=Denoising.ours(self._quality)),
             temporal=temporal,
         )
 
     def stopped(self, own: Sampled) -> dict[str, Array]:
-        alone = FullSize(quick(self.job))
+        alone = FullSize(quick(self.request))
         pictures = {
             view: alone.finish(_only(own, view), (), view) for view in own.views
         }
@@ -136,10 +138,11 @@ def _only(sampled: Sampled, view: str) -> Sampled:
     return replace(sampled, views={view: sampled.views[view]})
 
 
-def temporal(job: RenderJob, gathered: Accumulated) -> Temporal:
+def temporal(settings: Settings, gathered: Accumulated) -> Temporal:
     """What neighbours added to a picture, as it reports."""
     samples = float(gathered.samples.mean())
-    return Temporal(job.temporal_radius, gathered.frames, samples, gathered.rejected)
+    radius = settings.temporal_radius
+    return Temporal(radius, gathered.frames, samples, gathered.rejected)
 
 
 def accumulation(gathered: Accumulated) -> Decision:

@@ -12,7 +12,8 @@ from typing import Any
 from xrds_core.arrays import Array
 
 from ..frame import progress
-from ..frame.job import Picture, RenderJob
+from ..frame.picture import Picture
+from ..planning.request import Request
 from .sampling import Sampled
 
 Report = Callable[[float], bool]
@@ -28,8 +29,8 @@ class Method:
     stages = (progress.DENOISE, 2, 2)
     """The last stage: its name, its number and how many there are."""
 
-    def __init__(self, job: RenderJob) -> None:
-        self.job = job
+    def __init__(self, request: Request) -> None:
+        self.request, self.settings = request, request.settings
 
     def sample(
         self,
@@ -42,7 +43,8 @@ class Method:
 
         The result then holds its passes. `place` is as in `sampling_of`; what other
         frames show as well may be missing of one that lies `between` two. Raises
-        Cancelled when the user stops it; what there is then is kept as the job says.
+        Cancelled when the user stops it; what there is then is kept as the
+        request says.
         """
         raise NotImplementedError
 

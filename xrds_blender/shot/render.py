@@ -18,12 +18,14 @@ import numpy as np
 from xrds_core.arrays import Array
 from xrds_core.errors import Cancelled
 
+from ..choosing import history
+from ..choosing.chosen import Chosen, choose_for_shot, chosen
 from ..cycles import session
-from ..frame import history, progress, torch_folder
-from ..frame.job import NetworkFailed, Picture, RenderJob
+from ..frame import progress, torch_folder
+from ..frame.picture import NetworkFailed, Picture
 from ..frame.rendering import call_engine
 from ..internals.lifetimes import RENDER_JOB
-from .choosing import ChosenJob, choose_for_shot, chosen
+from ..planning.request import Request, request
 from .cycles_only import CyclesOnly
 from .engine_frames import EngineFrames
 from .full_size import FullSize
@@ -34,10 +36,10 @@ from .super_resolution import SuperResolution
 
 @dataclass(frozen=True)
 class _Animation:
-    """A view layer's frames in one render job; `asked` is what `chosen` came from."""
+    """A view layer's frames in one render job; `request` is what `chosen` came from."""
 
-    asked: RenderJob
-    chosen: ChosenJob
+    request: Request
+    chosen: Chosen
     frames: EngineFrames
 
 
@@ -48,32 +50,37 @@ class Animations:
     by_layer: dict[tuple[str, str], _Animation] = field(default_factory=dict)
 
 
-def method_of(chosen: ChosenJob, keep: Keep | None = None) -> Method:
+def method_of(chosen: Chosen, keep: Keep | None = None) -> Method:
     """What makes pictures of a job; `keep` as in `FullSize`.
 
     Raises XRDSError where its parts cannot be loaded.
     """
-    job = chosen.job
-    if job.plain:
-        return CyclesOnly(job)
-    if job.scale == 1:
-        return FullSize(job, keep, chosen.denoise_in_time)
-    return SuperResolution(job)
+    request = chosen.request
+    if request.settings.is_cycles_only:
+        return CyclesOnly(request)
+    if not request.settings.is_enlarged:
+        return FullSize(request, keep, chosen.denoise_in_time)
+    return SuperResolution(request)
 
 
 def render(
     scene: Any, scale: int = 2, *, layer: str | None = None, **choices: Any
 ) -> Picture:
     """As `xrds_blender.render`; the engine must be registered."""
-    job, start = RenderJob(scale=scale, **choices), time.perf_counter()
+    return render_scene(scene, request(scale, **choices), layer)
+
+
+def render_scene(scene: Any, request: Request, layer: str | None = None) -> Picture:
+    """Render the scene's current frame, one layer of it, by itself."""
+    start = time.perf_counter()
 
     def work(engine: Any, depsgraph: Any) -> Picture:
-        return render_alone(engine, depsgraph, job, start)
+        return render_alone(engine, depsgraph, request, start)
 
     return call_engine(scene, work, layer)
 
 
-def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
+def render_frame(engine: Any, depsgraph: Any, request: Request) -> Picture:
     """Render what Blender asks for: a frame by itself, or one of an animation.
 
     As `render_alone`; in an animation with the samples of its neighbours.
@@ -82,13 +89,13 @@ def render_frame(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
         scene = depsgraph.scene_eval
         left = (scene.frame_end - scene.frame_current) // scene.frame_step
         progress.begin_frame(scene.frame_current, left)
-        if not _renders_single_frames() and has_neighbours(scene, job):
-            return _render_in_animation(engine, depsgraph, job)
-    return render_alone(engine, depsgraph, job)
+        if not _renders_single_frames() and has_neighbours(scene, request):
+            return _render_in_animation(engine, depsgraph, request)
+    return render_alone(engine, depsgraph, request)
 
 
 def render_alone(
-    engine: Any, depsgraph: Any, job: RenderJob, start: float | None = None
+    engine: Any, depsgraph: Any, request: Request, start: float | None = None
 ) -> Picture:
     """Render the layer into the engine's result; the picture is of its first view.
 
@@ -98,32 +105,32 @@ def render_alone(
     low-resolution picture in the result, enlarged.
     """
     start = time.perf_counter() if start is None else start
-    alone, place = replace(job, temporal_radius=0), history.place_of(depsgraph)
-    layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
+    layer = history.layer_of(depsgraph)
+    alone = request.with_settings(temporal_radius=0)
     try:
         with chosen(engine, depsgraph, alone, start) as found:
-            if found.job.is_enlarged and torch_folder.loaded() is None:
+            if found.request.settings.is_enlarged and torch_folder.loaded() is None:
                 progress.begin(engine, progress.LOADING, 0)  # which takes some seconds
             method = method_of(found)  # first: missing weights are to cost no render
             own = method.sample(engine, depsgraph)
-            picture = _finish(engine, layer_name, method, own)
+            picture = _finish(engine, layer.name, method, own)
     finally:
         progress.end()
-    return _told(found, picture, job, place, start)
+    return _told(found, picture, layer, start)
 
 
-def _render_in_animation(engine: Any, depsgraph: Any, job: RenderJob) -> Picture:
+def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Picture:
     """Render the frame with its neighbours; every pass but Combined is Cycles' own."""
-    start, place = time.perf_counter(), history.place_of(depsgraph)
-    key = depsgraph.scene_eval.name, depsgraph.view_layer_eval.name
+    start, layer = time.perf_counter(), history.layer_of(depsgraph)
+    key = layer.scene, layer.name
     number = depsgraph.scene_eval.frame_current
     try:
         animations = RENDER_JOB.of(Animations).by_layer
         animation = animations.get(key)
-        if animation is None or animation.asked != job:
-            choice = choose_for_shot(engine, depsgraph, job)
+        if animation is None or animation.request != request:
+            choice = choose_for_shot(engine, depsgraph, request)
             frames = EngineFrames.of(depsgraph.scene_eval, method_of(choice))
-            animation = animations[key] = _Animation(job, choice, frames)
+            animation = animations[key] = _Animation(request, choice, frames)
         frames = animation.frames
         try:
             found = frames.neighbourhood(engine, depsgraph)
@@ -136,20 +143,17 @@ def _render_in_animation(engine: Any, depsgraph: Any, job: RenderJob) -> Picture
         picture = _finish(engine, key[1], frames.method, found.own, others)
     finally:
         progress.end()
-    return _told(animation.chosen, picture, job, place, start)
+    return _told(animation.chosen, picture, layer, start)
 
 
 def _told(
-    choice: ChosenJob,
-    picture: Picture,
-    job: RenderJob,
-    place: history.Place,
-    start: float,
+    choice: Chosen, picture: Picture, layer: history.Layer, start: float
 ) -> Picture:
     """The picture with what it was rendered by and how long; it is remembered."""
     picture = choice.told(picture)
     picture.seconds["total"] = time.perf_counter() - start
-    history.keep(place, picture.job or job, picture)
+    assert picture.settings is not None
+    history.keep(layer, picture.settings, picture.seconds)
     return picture
 
 
@@ -182,8 +186,8 @@ def _finish(
 
 
 def _leave_stopped(engine: Any, layer_name: str, method: Method, own: Sampled) -> None:
-    """Leave what there is of a frame that was stopped, if the job asks for it."""
-    if method.job.stop_keeps:
+    """Leave what there is of a frame that was stopped, if the request asks for it."""
+    if method.request.stop_keeps:
         _write(engine, layer_name, method, own, method.stopped(own))
 
 

@@ -18,7 +18,7 @@ from ..cycles.samples import COUNTS, GEOMETRY, LATE_DEPTH, Samples, sample_layer
 from ..cycles.settings import has_subsets
 from ..cycles.view import cameras_of, can_track
 from ..frame import denoisers, progress
-from ..frame.job import RenderJob
+from ..planning.request import Request
 from ..scene.facts import scene_facts, shapes_move, stands_still
 from .stopping import keep_samples
 
@@ -96,31 +96,31 @@ class Sampling:
         return (self.seed + self.number * SEED_STEP) % LARGEST_SEED
 
 
-def has_neighbours(scene: Any, job: RenderJob) -> bool:
+def has_neighbours(scene: Any, request: Request) -> bool:
     """Whether frames of a shot are to use, and can use, each other's samples.
 
     Not under most panoramic cameras. What a time budget will choose can where it may
     choose our denoiser.
     """
-    if job.plain or not job.temporal_radius:
+    if request.settings.is_cycles_only or not request.settings.temporal_radius:
         return False
-    if job.is_picked and not denoisers.is_there():
-        return False
-    if job.is_enlarged and job.guides != "fast" and not job.is_picked:
+    if request.goal is not None and not denoisers.is_there():
         return False
     return scene.camera is not None and can_track(scene)
 
 
-def can_continue(scene: Any, job: RenderJob) -> bool:
+def can_continue(scene: Any, request: Request) -> bool:
     """Whether frames can take parts of one sequence: where pixels stand still.
 
     And where the file does not let Cycles decide how many samples a pixel takes.
     """
-    return stands_still(scene.camera) and has_subsets(scene) and _is_even(scene, job)
+    return (
+        stands_still(scene.camera) and has_subsets(scene) and _is_even(scene, request)
+    )
 
 
 def sampling_of(
-    engine: Any, depsgraph: Any, job: RenderJob, place: int | None
+    engine: Any, depsgraph: Any, request: Request, place: int | None
 ) -> Sampling:
     """How the frame that the dependency graph is at is to be sampled.
 
@@ -130,44 +130,44 @@ def sampling_of(
     a camera that no matrix describes.
     """
     scene = depsgraph.scene_eval
-    if not job.temporal_radius:
+    if not request.settings.temporal_radius:
         return Sampling(scene.frame_current)
     cameras = cameras_of(engine, depsgraph)
     if not cameras:
         raise SceneError("such panoramas lend nothing; set the temporal radius to 0")
-    is_even = _is_even(scene, job)
-    if not can_continue(scene, job):
+    is_even = _is_even(scene, request)
+    if not can_continue(scene, request):
         place = None
     geometry = [*_geometry(depsgraph), *([] if is_even else [COUNTS])]
-    count = job.samples or session.samples_of(depsgraph)
+    count = request.settings.samples or session.samples_of(depsgraph)
     blurred = scene.render.use_motion_blur
     return Sampling(
         number=scene.frame_current,
         cameras=cameras,
         count=count,
-        seed=scene.cycles.seed if job.seed is None else job.seed,
+        seed=scene.cycles.seed if request.seed is None else request.seed,
         geometry=geometry if place is None else [LATE_DEPTH, *geometry[1:]],
         place=place,
-        radius=job.temporal_radius,
+        radius=request.settings.temporal_radius,
         still=not scene_facts(depsgraph).moving,
-        has_halves=_has_halves(scene, job, count),
+        has_halves=_has_halves(scene, request, count),
         needs_motion=blurred and shapes_move(depsgraph),
     )
 
 
-def _is_even(scene: Any, job: RenderJob) -> bool:
+def _is_even(scene: Any, request: Request) -> bool:
     """Whether every pixel takes as many samples as it is asked to."""
     cycles = scene.cycles
     decides = cycles.use_adaptive_sampling or cycles.time_limit
-    return job.samples is not None or not decides
+    return request.settings.samples is not None or not decides
 
 
-def _has_halves(scene: Any, job: RenderJob, count: int) -> bool:
+def _has_halves(scene: Any, request: Request, count: int) -> bool:
     """Whether a frame's samples can be had in two halves that add up to all."""
     if count < 2 or not has_subsets(scene):
         return False
     cycles = scene.cycles
-    return job.samples is not None or not (
+    return request.settings.samples is not None or not (
         cycles.use_sample_subset or cycles.time_limit
     )
 
@@ -175,7 +175,7 @@ def _has_halves(scene: Any, job: RenderJob, count: int) -> bool:
 def sample_frame(
     engine: Any,
     depsgraph: Any,
-    job: RenderJob,
+    request: Request,
     place: int | None = None,
     keep: Keep | None = None,
 ) -> Sampled:
@@ -185,10 +185,10 @@ def sample_frame(
     window; `keep` takes its views before that. Raises what `noisy_frame` does.
     """
     number = depsgraph.scene_eval.frame_current
-    if not job.temporal_radius:
-        samples, seconds = _alone(engine, depsgraph, job)
+    if not request.settings.temporal_radius:
+        samples, seconds = _alone(engine, depsgraph, request)
         return Sampled(number, dict(samples), seconds)
-    frames, seconds = noisy_frame(engine, depsgraph, job, place)
+    frames, seconds = noisy_frame(engine, depsgraph, request, place)
     if keep is not None:
         keep(frames)
     views = {view: store(frame, np.float16) for view, frame in frames.items()}
@@ -196,23 +196,23 @@ def sample_frame(
 
 
 def _alone(
-    engine: Any, depsgraph: Any, job: RenderJob
+    engine: Any, depsgraph: Any, request: Request
 ) -> tuple[dict[str, Samples], dict[str, float]]:
     """Render a frame without neighbours, as `noisy_frame` does; seed as in the file."""
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     progress.begin(engine, progress.SAMPLES, 1, 2)
     try:
         found, clock = sample_layer(
-            engine, depsgraph, samples=job.samples, seed=job.seed
+            engine, depsgraph, samples=request.settings.samples, seed=request.seed
         )
     except Cancelled:
-        keep_samples(engine, layer_name, job)
+        keep_samples(engine, layer_name, request)
         raise
     return found, {"sync": clock.sync, "beauty": clock.render}
 
 
 def noisy_frame(
-    engine: Any, depsgraph: Any, job: RenderJob, place: int | None = None
+    engine: Any, depsgraph: Any, request: Request, place: int | None = None
 ) -> tuple[dict[str, Frame], dict[str, float]]:
     """Render the frame that the dependency graph is at; the result holds its passes.
 
@@ -220,7 +220,7 @@ def noisy_frame(
     of its own, whatever the file's seed says; `place` is as in `sampling_of`. Raises
     Cancelled when the user stops it, and what `sampling_of` does.
     """
-    how = sampling_of(engine, depsgraph, job, place)
+    how = sampling_of(engine, depsgraph, request, place)
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     progress.begin(engine, how.named(progress.SAMPLES), 1, 2)
     try:
@@ -229,13 +229,13 @@ def noisy_frame(
         noisy, clock = sample_layer(
             engine,
             depsgraph,
-            samples=job.samples,
+            samples=request.settings.samples,
             seed=how.own_seed,
             portion=how.portion(how.count),
             geometry=how.geometry,
         )
     except Cancelled:
-        keep_samples(engine, layer_name, job)
+        keep_samples(engine, layer_name, request)
         raise
     if clock.samples:  # where Cycles stopped before the most it was allowed
         how = replace(how, count=min(clock.samples, how.count))
@@ -268,12 +268,12 @@ def _frames_of_halves(
     return frames, {stage: seconds[stage] + more[stage] for stage in seconds}
 
 
-def first_sample(engine: Any, depsgraph: Any, job: RenderJob, place: int) -> None:
+def first_sample(engine: Any, depsgraph: Any, request: Request, place: int) -> None:
     """Render the first sample of the sequence that a frame continues.
 
     The result then holds its passes. `place` is as in `sampling_of`.
     """
-    how = sampling_of(engine, depsgraph, job, place)
+    how = sampling_of(engine, depsgraph, request, place)
     portion = how.portion(how.count)
     assert portion is not None
     sample_layer(engine, depsgraph, portion=replace(portion, offset=0, length=1))

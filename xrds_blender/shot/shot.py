@@ -12,12 +12,13 @@ from typing import Any
 
 from xrds_core.temporal.window import Shot, Window, place_of
 
+from ..choosing.chosen import Chosen, choose_for_shot
 from ..frame import progress
-from ..frame.job import Picture, RenderJob
+from ..frame.picture import Picture
 from ..frame.rendering import call_engine
+from ..planning.request import Request
 from ..scene.cuts import cuts
 from .cache import SampleCache
-from .choosing import ChosenJob, choose_for_shot
 from .methods import Method
 from .render import method_of
 from .sampling import Sampled
@@ -25,7 +26,7 @@ from .sampling import Sampled
 
 def render_shot(
     scene: Any,
-    job: RenderJob,
+    request: Request,
     frames: Sequence[int],
     is_done: Callable[[int], bool] = lambda _: False,
     cache: SampleCache | None = None,
@@ -36,16 +37,19 @@ def render_shot(
     needed. A `cache` keeps the samples of every frame rendered; what it has already is
     not rendered again, and may lie beyond the ends of these frames. Yields numbers and
     pictures, of stereo the first view's; the scene stays at the last frame rendered.
-    What the job leaves open is chosen at the first frame to render. Raises what
+    What the request leaves open is chosen at the first frame to render. Raises what
     `render` raises.
     """
     todo = tuple(number for number in frames if not is_done(number))
-    chosen = _chosen(scene, job, todo)
-    job = chosen.job
+    chosen = _chosen(scene, request, todo)
+    request = chosen.request
     method = method_of(chosen, cache and cache.write)
-    cached = cache.beside(frames, job.temporal_radius) if cache else []
+    radius = request.settings.temporal_radius
+    cached = cache.beside(frames, radius) if cache else []
     there = tuple(sorted({*frames, *cached}))
-    shot = Shot(todo, job.temporal_radius, cuts(scene, there), others=there)
+    shot = Shot(
+        todo, request.settings.temporal_radius, cuts(scene, there), others=there
+    )
 
     def load(number: int) -> Sampled | None:
         if cache and (found := cache.read(number)):
@@ -67,21 +71,21 @@ def render_shot(
         yield number, chosen.told(replace(picture, seconds=seconds))
 
 
-def _chosen(scene: Any, job: RenderJob, todo: Sequence[int]) -> ChosenJob:
-    if not (job.is_picked and todo):
-        return ChosenJob(job)
+def _chosen(scene: Any, request: Request, todo: Sequence[int]) -> Chosen:
+    if request.goal is None or not todo:
+        return Chosen(request)
     scene.frame_set(todo[0])
-    return call_engine(scene, lambda *given: choose_for_shot(*given, job))
+    return call_engine(scene, lambda *given: choose_for_shot(*given, request))
 
 
 def cache_samples(
-    scene: Any, job: RenderJob, frames: Sequence[int], cache: SampleCache
+    scene: Any, request: Request, frames: Sequence[int], cache: SampleCache
 ) -> Iterator[int]:
     """Render the samples of frames that are not cached yet; yields their numbers.
 
     Raises what `render` raises.
     """
-    method = method_of(ChosenJob(job), cache.write)
+    method = method_of(Chosen(request), cache.write)
     for number in frames:
         if cache.read(number) is None:
             _sample(scene, method, frames, number)

@@ -6,7 +6,6 @@ taken, and nothing can stop it: the user waits for Blender to be free again.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from ..cycles import session
@@ -14,15 +13,16 @@ from ..cycles.low_samples import LowSamples
 from ..cycles.rendered import Beauty
 from ..cycles.samples import samples_in
 from ..frame.denoisers import in_process, load_denoiser
-from ..frame.job import RenderJob
+from ..planning.request import Request
+from ..planning.settings import Denoising
 from .enlarging import enlarged
 
 
-def keep_samples(engine: Any, layer_name: str, job: RenderJob) -> None:
-    """Denoise the full-size samples that are in the result, if the job asks for it."""
-    if not job.stop_keeps:
+def keep_samples(engine: Any, layer_name: str, request: Request) -> None:
+    """Denoise the full-size samples in the result, if the request asks for it."""
+    if not request.stop_keeps:
         return
-    denoiser = load_denoiser(quick(job))
+    denoiser = load_denoiser("fast", request.machine)
     noisy = samples_in(engine, layer_name)
     pictures = {
         view: denoiser(each.picture, each.albedo, each.normal).radiance
@@ -33,15 +33,15 @@ def keep_samples(engine: Any, layer_name: str, job: RenderJob) -> None:
 
 
 def keep_low_samples(
-    engine: Any, layer_name: str, job: RenderJob, light: dict[str, LowSamples]
+    engine: Any, layer_name: str, request: Request, light: dict[str, LowSamples]
 ) -> None:
-    """Denoise low-resolution samples, if the job asks for it, and as `keep_beauties`.
+    """Denoise low-resolution samples, if it is asked for, and as `keep_beauties`.
 
     Views without any are left out.
     """
-    if not job.stop_keeps:
+    if not request.stop_keeps:
         return
-    denoise = in_process(quick(job))
+    denoise = in_process(Denoising.XRDS_FAST, request.machine)
     beauties = {
         view: low.place.beauty(low.samples.picture)
         if denoise is None
@@ -49,20 +49,20 @@ def keep_low_samples(
         for view, low in light.items()
         if low.samples.picture.any()
     }
-    keep_beauties(engine, layer_name, job, beauties)
+    keep_beauties(engine, layer_name, request, beauties)
 
 
 def keep_beauties(
-    engine: Any, layer_name: str, job: RenderJob, beauties: dict[str, Beauty]
+    engine: Any, layer_name: str, request: Request, beauties: dict[str, Beauty]
 ) -> None:
-    """Make low-resolution pictures the result, enlarged, if the job asks for it."""
-    if job.stop_keeps:
+    """Make low-resolution pictures the result, enlarged, if the request asks for it."""
+    if request.stop_keeps:
         result = engine.get_result()
         size = result.resolution_y, result.resolution_x
-        pictures = enlarged(beauties, job.scale, size)
+        pictures = enlarged(beauties, request.settings.scale, size)
         session.write_combined(engine, layer_name, pictures)
 
 
-def quick(job: RenderJob) -> RenderJob:
-    """The job with the quickest denoiser, for somebody who waits."""
-    return replace(job, denoise="fast", denoiser=None)
+def quick(request: Request) -> Request:
+    """The request with the quickest denoiser, for somebody who waits."""
+    return request.with_settings(denoising=Denoising.XRDS_FAST)

@@ -21,6 +21,7 @@ from xrds_core.temporal.stand_in import stand_in
 from xrds_core.temporal.takes import same_take
 from xrds_core.temporal.vectors import Movement
 
+from ..choosing.facts import find_facts
 from ..cycles import live
 from ..cycles.low_samples import LowPlace, LowSamples
 from ..cycles.pass_names import COMBINED, is_light
@@ -29,20 +30,21 @@ from ..cycles.rendered import Beauty, Guides
 from ..cycles.view import low_view
 from ..frame import progress
 from ..frame.denoisers import in_process, load_denoiser
-from ..frame.facts import find_facts
 from ..frame.guide_cache import GuideName
 from ..frame.guides import GuideSource
-from ..frame.job import NetworkFailed, Picture, RenderJob, Temporal
 from ..frame.memory import peak_memory
 from ..frame.networks import load_upscaler
+from ..frame.picture import NetworkFailed, Picture, Temporal
 from ..planning import plan
 from ..planning.plan import GUIDE_CACHE, Decision, Facts, Plan
+from ..planning.request import Machine, Request
+from ..planning.settings import Settings
 from ..scene.facts import shapes_move
 from .enlarging import enlarge, enlarged, enlarged_lights
 from .full_size import accumulation, temporal
 from .methods import Method, Report
 from .sampling import Sampled, Sampling, light_of, sampling_of
-from .stopping import keep_beauties, keep_low_samples, quick
+from .stopping import keep_beauties, keep_low_samples
 
 if TYPE_CHECKING:
     from xrds_core.denoising import Denoiser
@@ -107,11 +109,13 @@ class SuperResolution(Method):
 
     stages = (progress.NETWORK, 3, 3)
 
-    def __init__(self, job: RenderJob) -> None:
-        super().__init__(job)
-        self._upscaler = load_upscaler(job)
+    def __init__(self, request: Request) -> None:
+        super().__init__(request)
+        settings, machine = request.settings, request.machine
+        self._upscaler = load_upscaler(settings.network, machine)
         # of light that neighbours add to; a still's is denoised as it is rendered
-        self._denoiser = load_denoiser(job) if job.temporal_radius else None
+        radius, quality = settings.temporal_radius, settings.quality
+        self._denoiser = load_denoiser(quality, machine) if radius else None
         self._movement = Movement()
 
     def sample(
@@ -126,17 +130,17 @@ class SuperResolution(Method):
         A frame `between` two others takes its guides from them where that costs no
         detail.
         """
-        how = sampling_of(engine, depsgraph, self.job, place)
+        how = sampling_of(engine, depsgraph, self.request, place)
         layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
         with CyclesPasses(
             engine, depsgraph, noisy=True, geometry=how.geometry
         ) as passes:
-            facts = find_facts(depsgraph, self.job)
-            chosen = self.job.plan(facts)
+            facts = find_facts(depsgraph, self.settings)
+            chosen = self.request.plan(facts)
             if not chosen.motion_blur:
                 passes.hold_still()
             renders = _Renders(
-                engine, depsgraph, self.job, how, passes, facts, chosen, layer_name
+                engine, depsgraph, self.request, how, passes, facts, chosen, layer_name
             )
             return renders.alone() if how.is_alone else renders.of_shot(between)
 
@@ -159,14 +163,14 @@ class SuperResolution(Method):
             assert self._denoiser is not None
             neighbours = own.neighbours(view, others)
             inputs = gathered_inputs(
-                inputs, neighbours, self.job, self._denoiser, self._movement
+                inputs, neighbours, self.settings, self._denoiser, self._movement
             )
         started = time.perf_counter()
         try:
             picture = enlarge(
                 inputs.beauty,
                 inputs.guides,
-                self.job,
+                self.request,
                 self._upscaler,
                 exposure=inputs.exposure,
                 skip_idle=inputs.skip_idle,
@@ -191,20 +195,21 @@ class SuperResolution(Method):
     def light_passes(self, own: Sampled, view: str) -> dict[str, Array]:
         each = own.views[view]
         lights, offset = each.place.others, each.place.offset
-        return enlarged_lights(lights, self.job.scale, offset, each.shape)
+        return enlarged_lights(lights, self.settings.scale, offset, each.shape)
 
     def stopped(self, own: Sampled) -> dict[str, Array]:
         first = next(iter(own.views.values()))
-        beauties = {view: _alone(each, self.job) for view, each in own.views.items()}
-        return enlarged(beauties, self.job.scale, first.shape)
+        machine = self.request.machine
+        beauties = {view: _alone(each, machine) for view, each in own.views.items()}
+        return enlarged(beauties, self.settings.scale, first.shape)
 
 
-def _alone(view: View | Inputs, job: RenderJob) -> Beauty:
+def _alone(view: View | Inputs, machine: Machine) -> Beauty:
     """The light of a view with its own samples alone, denoised."""
     if isinstance(view, Inputs):
         return view.beauty
     own = accumulate(view.light, (), Movement())
-    return _denoised(view, own, load_denoiser(quick(job)))
+    return _denoised(view, own, load_denoiser("fast", machine))
 
 
 # --- Sampling ------------------------------------------------------------------------
@@ -216,12 +221,16 @@ class _Renders:
 
     engine: Any
     depsgraph: Any
-    job: RenderJob
+    request: Request
     how: Sampling
     passes: CyclesPasses
     facts: Facts
     chosen: Plan
     layer_name: str
+
+    @property
+    def settings(self) -> Settings:
+        return self.request.settings
 
     def alone(self) -> Sampled:
         """The light of a still, denoised, and its guides: what the network takes."""
@@ -229,11 +238,11 @@ class _Renders:
         try:
             beauties = self._beauties()
             exposure = self._exposure()
-            source = self._source(self.job, self.chosen.guide_samples)
+            source = self._source(self.request, self.chosen.guide_samples)
             guides = self._guides(source, beauties)
         except Cancelled:
             if beauties:
-                keep_beauties(self.engine, self.layer_name, self.job, beauties)
+                keep_beauties(self.engine, self.layer_name, self.request, beauties)
             else:
                 self._keep_light()
             raise
@@ -270,43 +279,44 @@ class _Renders:
         )
 
     def _keep_light(self, light: Mapping[str, LowSamples] | None = None) -> None:
-        light = light or self.passes.stopped_samples(self.job.scale)
-        keep_low_samples(self.engine, self.layer_name, self.job, light)
+        light = light or self.passes.stopped_samples(self.settings.scale)
+        keep_low_samples(self.engine, self.layer_name, self.request, light)
 
     def _beauties(self) -> dict[str, Beauty]:
         """The denoised low-resolution light by view."""
         self._begin(progress.LOW, 1)
-        job = self.job
+        settings, denoising = self.settings, self.settings.denoising
         beauties = self.passes.beauties(
-            job.scale,
-            job.samples,
+            settings.scale,
+            settings.samples,
             denoise=self.chosen.denoise,
-            seed=job.seed,
-            denoiser=job.denoiser,
-            in_process=in_process(job),
+            seed=self.request.seed,
+            denoiser=None if denoising is None or denoising.is_ours else denoising,
+            in_process=in_process(denoising, self.request.machine),
         )
         first = next(iter(beauties.values()))
-        live.show(np.dstack((first.radiance, first.alpha)), job.scale, first.offset)
+        picture = np.dstack((first.radiance, first.alpha))
+        live.show(picture, settings.scale, first.offset)
         return beauties
 
     def _noisy_light(self) -> dict[str, LowSamples]:
         """The noisy low-resolution light by view."""
         self._begin(progress.LOW, 1)
-        how, job = self.how, self.job
+        how, settings = self.how, self.settings
         portion = how.portion(how.count)
         return self.passes.low_samples(
-            job.scale, job.samples, seed=how.own_seed, portion=portion
+            settings.scale, settings.samples, seed=how.own_seed, portion=portion
         )
 
     def _exposure(self) -> float | None:
-        return self.job.exposure or self.passes.border_exposure()
+        return self.request.exposure or self.passes.border_exposure()
 
     def _views(self, light: Mapping[str, LowSamples]) -> dict[str, View]:
         """The views without guides."""
         exposure, region = self._exposure(), self.passes.region
         return {
             view: View(
-                light=_stored_light(self.how, self.job, low, view),
+                light=_stored_light(self.how, self.settings.scale, low, view),
                 guides=None,
                 camera=self.how.cameras[view],
                 shape=(region.height, region.width),
@@ -320,7 +330,10 @@ class _Renders:
 
     def _is_shown_by_others(self) -> bool:
         """Whether guides of the frames beside this one show what its own would show."""
-        if _OF_OTHERS.decision not in self.job.savings or not self.chosen.render_guides:
+        if (
+            _OF_OTHERS.decision not in self.request.savings
+            or not self.chosen.render_guides
+        ):
             return False
         spare = {name for _, name in self.engine.spare_passes}
         asked = set(self.passes.pass_names()) - spare - {COMBINED}
@@ -334,7 +347,7 @@ class _Renders:
     ) -> tuple[dict[str, View], Decision, dict[str, float]]:
         """The views with guides, rendered or cached, why, and the seconds."""
         samples = self.chosen.guide_samples
-        source = self._source(_guide_job(self.job, self.how, samples), samples)
+        source = self._source(_guide_request(self.request, self.how, samples), samples)
         noisy = {v: low.place.beauty(low.samples.picture) for v, low in light.items()}
         guides = self._guides(source, noisy)
         found = {
@@ -343,15 +356,15 @@ class _Renders:
             )
             for view, each in views.items()
         }
-        is_kept = self.how.place is not None or self.job.guide_cache is not None
+        is_kept = self.how.place is not None or self.request.guide_cache is not None
         decision = source.decision if is_kept else _NOT_KEPT
         return found, decision, next(iter(guides.values())).seconds
 
-    def _source(self, job: RenderJob, samples: int) -> GuideSource:
+    def _source(self, request: Request, samples: int) -> GuideSource:
         return GuideSource(
             self.passes,
             self.depsgraph,
-            job,
+            request,
             self.chosen,
             self.facts,
             self.engine.report,
@@ -397,23 +410,23 @@ def _with_decision(views: dict[str, View], decision: Decision) -> dict[str, View
     return {name: replace(v, plan=decided(v.plan)) for name, v in views.items()}
 
 
-def _guide_job(job: RenderJob, how: Sampling, samples: int) -> RenderJob:
+def _guide_request(request: Request, how: Sampling, samples: int) -> Request:
     """Under a camera that stands still guides are kept until they are as many.
 
     Under another no frame finds what one before it has left, so memory is spared.
     """
     if how.place is not None:
         enough = samples * (2 * how.radius + 1)
-        return replace(job, guide_limit=max(job.guide_limit, enough))
-    kept = job.savings
-    if job.guide_cache is None:
+        return replace(request, guide_limit=max(request.guide_limit, enough))
+    kept = request.savings
+    if request.guide_cache is None:
         kept = tuple(name for name in kept if name != _NOT_KEPT.decision)
-    return replace(job, seed=how.own_seed, savings=kept)
+    return replace(request, seed=how.own_seed, savings=kept)
 
 
-def _stored_light(how: Sampling, job: RenderJob, low: LowSamples, view: str) -> Stored:
+def _stored_light(how: Sampling, scale: int, low: LowSamples, view: str) -> Stored:
     window = low.place.window.x, low.place.window.y
-    camera = low_view(how.cameras[view], job.scale, window)
+    camera = low_view(how.cameras[view], scale, window)
     return store(light_of(how, camera, low.samples), np.float16)
 
 
@@ -429,7 +442,7 @@ def _summed(rendered: Sequence[Mapping[str, float]]) -> dict[str, float]:
 def gathered_inputs(
     own: View,
     others: Sequence[View],
-    job: RenderJob,
+    settings: Settings,
     denoiser: Denoiser,
     movement: Movement,
 ) -> Inputs:
@@ -450,7 +463,7 @@ def gathered_inputs(
         own.plan.skip_idle,
         (*own.plan.decisions, accumulation(gathered)),
         seconds,
-        temporal(job, gathered),
+        temporal(settings, gathered),
     )
 
 

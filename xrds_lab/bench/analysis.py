@@ -5,10 +5,11 @@ from __future__ import annotations
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning import budget
-from xrds_blender.planning.budget import Choice, Curve
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 from xrds_blender.planning.ways import ALIKE
+
+from xrds_blender.planning import budget
+from xrds_blender.planning.budget import Choice, Curve
 
 from . import hindsight, pareto, same_picture
 from .stages import PLAIN_FRAME, XRDS_FRAME, in_process_name

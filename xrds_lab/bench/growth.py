@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 

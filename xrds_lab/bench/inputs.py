@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
+
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError

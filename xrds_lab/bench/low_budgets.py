@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.command import streams
 from xrds_blender.planning.denoiser import Denoiser
+
+from xrds_blender.command import streams
 from xrds_core.atomic import replacing, write_json
 
 from ..progress import report_line

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.frame.picking import probe, with_guides
-from xrds_blender.planning import budget
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
+
+from xrds_blender.planning import budget
 from xrds_core.atomic import read_json, write_json
 
 from . import tasks, workload

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 
 from xrds_blender.command import console
 from xrds_blender.planning.budget import Choice, Curve, ErrorModel, Model
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 from xrds_core.atomic import read_json, write_json
 
 from .. import metrics

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_blender.planning.denoiser import Denoiser as Mode
+
+from xrds_blender.planning.budget import Network
 from xrds_core import denoising, exr
 from xrds_core.atomic import replacing
 from xrds_core.denoising import Denoiser

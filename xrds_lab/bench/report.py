@@ -8,6 +8,7 @@ from string import Template
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.ways import ALIKE
+
 from xrds_core.atomic import replacing
 
 from . import analysis, plots

@@ -15,8 +15,9 @@ from dataclasses import asdict
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
+
+from xrds_blender.planning.budget import Network
 from xrds_core.atomic import write_json
 
 from ..progress import silent

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
 from xrds_core.atomic import read_json, write_json
 
 from . import machine

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.budget import Network
 from xrds_blender.planning.denoiser import (
     CYCLES_DENOISERS,
     DEFAULT_DENOISER,
@@ -14,6 +13,8 @@ from xrds_blender.planning.denoiser import (
     OUR_DENOISERS,
     Denoiser,
 )
+
+from xrds_blender.planning.budget import Network
 
 from .inputs import OFF, Mode, Request
 

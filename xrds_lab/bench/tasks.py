@@ -6,9 +6,9 @@ from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
+
 from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
 
 from .inputs import Request, open_scene, sample_adaptively
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from xrds_blender.frame.job import Picture
+
     from xrds_blender.planning.budget import Network
     from xrds_core.arrays import Array
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
-from xrds_blender import render
 from xrds_blender.frame.job import RenderJob
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
+
+from xrds_blender import render
 from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
 from xrds_blender.shot.shot import render_shot
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from xrds_blender.frame.job import RenderJob
 
 import xrds_core
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.arrays import Array

@@ -63,6 +63,7 @@ def render(
 def _render(scene: Any, request: Request, store: Store) -> None:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
     from xrds_blender.frame.job import RenderJob
+
     from xrds_blender.frame.rendering import call_engine
     from xrds_blender.shot.sampling import noisy_frame, sample_frame
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from xrds_blender.frame.job import RenderJob
 
 import xrds_core
-from xrds_blender.frame.job import RenderJob
 from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.atomic import write_json
@@ -29,6 +29,7 @@ from .motions import MOTIONS
 
 if TYPE_CHECKING:
     from xrds_blender.planning.denoiser import Denoiser
+
     from xrds_core.arrays import Array
     from xrds_core.temporal.frame import Frame
 

@@ -6,8 +6,8 @@ import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
 from xrds_core.atomic import replacing
 
 from ..metrics import to_srgb

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
 from xrds_core.errors import SceneError
 
 from .. import packing
@@ -148,6 +148,7 @@ class ShotFrames:
 def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
     from xrds_blender.frame.job import RenderJob
+
     from xrds_blender.frame.rendering import call_engine
     from xrds_blender.shot.sampling import noisy_frame
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from xrds_blender.planning.denoiser import CYCLES_DENOISERS, DEFAULT_DENOISER, Denoiser
+
 from xrds_core.temporal.frame import store
 from xrds_core.temporal.motion import carry, grid, passage
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
 from xrds_core.atomic import write_json
 
 from ..bench.inputs import open_scene
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from xrds_blender.frame.job import RenderJob
+
     from xrds_core.temporal.frame import Stored
 
     from ..bench.windows import Shot
@@ -59,8 +61,9 @@ class SceneSeconds:
 
 def timed(shot: Shot, samples: int, radii: Sequence[int], rounds: int) -> Timed:
     """Time a panning shot of whole frames: seconds by stage, `total` and `cpu`."""
-    from xrds_blender import render
     from xrds_blender.frame.job import RenderJob
+
+    from xrds_blender import render
 
     reach = max(*radii, rounds // 2, 1)
     scene = open_scene(shot.path, shot.window.whole)

@@ -51,10 +51,11 @@ class Filmed:
 
 def film(name: str) -> Filmed:
     """Render a shot's frames by the product, and references of those judged."""
-    from xrds_blender import run_job
     from xrds_blender.frame.job import RenderJob
-    from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
+    from xrds_blender import run_job
+    from xrds_blender.frame.rendering import call_engine
     from xrds_blender.shot.sampling import sample_frame
 
     from .moving_scenes import FRAMES, JUDGED, build, set_frame
@@ -100,9 +101,9 @@ def fisheye() -> Iterator[Measured]:
     from pathlib import Path
 
     import bpy
+    from xrds_blender.frame.job import RenderJob
 
     from xrds_blender.command.render_file import render_file
-    from xrds_blender.frame.job import RenderJob
 
     from .moving_scenes import build
 
@@ -119,6 +120,7 @@ def fisheye() -> Iterator[Measured]:
 def finished(frames: dict[int, Stored], number: int, radius: int) -> Array:
     """A frame (H, W, 3) as the product finishes it."""
     from xrds_blender.frame.job import RenderJob
+
     from xrds_blender.shot.full_size import FullSize
     from xrds_core.temporal.window import Shot
 

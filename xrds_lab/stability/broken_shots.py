@@ -131,6 +131,7 @@ def crashes(frames: Frames) -> int:
 def long(frames: Frames) -> Measured:
     """Growth of memory in KiB per frame over a thousand frames, one after the other."""
     from xrds_blender.frame.job import RenderJob
+
     from xrds_blender.shot.full_size import FullSize
 
     originals = list(frames.values())

@@ -10,8 +10,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
 from xrds_core.atomic import replacing
 
 from .. import metrics

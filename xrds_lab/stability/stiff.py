@@ -10,8 +10,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+
 from xrds_core.atomic import replacing
 from xrds_core.superres import front_end
 

@@ -25,10 +25,10 @@ from typing import Any
 import bpy
 import numpy as np
 from tqdm import tqdm
+from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
 from xrds_blender import run_job
 from xrds_blender.cycles.passes import CyclesPasses
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 

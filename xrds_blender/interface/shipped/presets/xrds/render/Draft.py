@@ -4,7 +4,7 @@ import bpy
 
 scene = bpy.context.scene
 
-scene.xrds.way = "full_size"
+scene.xrds.mode = "full_size"
 scene.xrds.use_time_budget = False
 scene.xrds.time_budget = 60.0
 scene.xrds.denoise = "balanced"

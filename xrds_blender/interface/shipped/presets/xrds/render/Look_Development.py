@@ -4,7 +4,7 @@ import bpy
 
 scene = bpy.context.scene
 
-scene.xrds.way = "x2"
+scene.xrds.mode = "x2"
 scene.xrds.use_time_budget = False
 scene.xrds.time_budget = 60.0
 scene.xrds.denoise = "high"

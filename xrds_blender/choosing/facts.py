@@ -1,4 +1,4 @@
-"""What the plan of a frame rests on: facts of its scene, its job and this Blender."""
+"""What the plan of a frame rests on: facts of scene, settings and this Blender."""
 
 from __future__ import annotations
 
@@ -8,36 +8,35 @@ from typing import Any
 from ..cycles import low_camera, session
 from ..cycles.size import frame_size
 from ..cycles.view import can_track
+from ..frame import denoisers
 from ..planning.facts import Facts, SceneFacts
+from ..planning.settings import Settings
 from ..scene.facts import scene_facts
-from . import denoisers
-from .job import RenderJob
 
 # Core-seconds of a million guide samples with nothing left out: docs/performance.md.
 CORE_SECONDS = 4.8
 
 
-def find_facts(depsgraph: Any, job: RenderJob) -> Facts:
+def find_facts(depsgraph: Any, settings: Settings) -> Facts:
     """The facts of a frame, from an evaluated scene."""
-    return join_facts(depsgraph.scene_eval, job, scene_facts(depsgraph))
+    return join_facts(depsgraph.scene_eval, settings, scene_facts(depsgraph))
 
 
-def join_facts(scene: Any, job: RenderJob, scene_facts: SceneFacts) -> Facts:
+def join_facts(scene: Any, settings: Settings, scene_facts: SceneFacts) -> Facts:
     """The facts of a frame, with those of its scene at hand."""
     width, height = frame_size(scene.render)
     camera = scene.camera
     return Facts(
-        scale=job.scale,
+        scale=settings.scale,
         width=width,
         height=height,
-        guides=job.guides,
         max_bounces=scene.cycles.max_bounces,
         has_denoiser=session.has_denoiser() or denoisers.is_there(),
         lends=camera is None or can_track(scene),
         exact_camera=camera is None or low_camera.is_exact(camera.data),
-        guide_samples=job.guide_samples,
+        guide_samples=settings.guide_samples,
         scene=scene_facts,
-        guide_seconds=_guide_seconds(scene, width * height * job.guide_samples),
+        guide_seconds=_guide_seconds(scene, width * height * settings.guide_samples),
     )
 
 

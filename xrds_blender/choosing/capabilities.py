@@ -7,14 +7,14 @@ from pathlib import Path
 from xrds_core.superres.weights_header import WeightsHeader, headers, read_header
 
 from ..cycles import session
-from ..planning.budget import Network
-from ..planning.ways import Means
-from . import denoisers, torch_folder
+from ..frame import denoisers, torch_folder
+from ..planning.modes import Capabilities
+from ..planning.settings import Network
 
 
-def means(weights: str | Path | None = None) -> Means:
-    """What is installed; nothing of it is loaded. `weights` as in a RenderJob."""
-    return Means(
+def capabilities(weights: str | Path | None = None) -> Capabilities:
+    """What is installed; nothing of it is loaded. `weights` as in a Machine."""
+    return Capabilities(
         denoiser=denoisers.is_there(),
         cycles_denoiser=session.has_denoiser(),
         torch=torch_folder.is_there(),
@@ -24,8 +24,7 @@ def means(weights: str | Path | None = None) -> Means:
 
 def networks_at_hand(weights: str | Path | None = None) -> list[Network]:
     """Those whose weights are there."""
-    found = weights_headers(weights)
-    return [Network(each.preset, each.scale, each.guides) for each in found]
+    return [(each.preset, each.scale) for each in weights_headers(weights)]
 
 
 def weights_headers(weights: str | Path | None = None) -> list[WeightsHeader]:

@@ -14,29 +14,26 @@ from ..cycles.size import picture_size
 from ..internals.lifetimes import FILE
 from ..planning import budget
 from ..planning.budget import Costs
-from ..planning.denoiser import Denoiser
 from ..planning.measured import Measured, learn
-from ..planning.ways import Asked, Way
-from .job import Picture, RenderJob
+from ..planning.modes import SceneSettings, resolved
+from ..planning.settings import Denoising, Settings
 
 
 @dataclass(frozen=True)
-class Place:
-    """What a render is of; read before Cycles frees the evaluated scene."""
+class Layer:
+    """A view layer that is rendered; read before Cycles frees the evaluated scene."""
 
     scene: str
-    layer: str
+    name: str
     pixels: int
-    samples: int
-    plain_denoiser: Denoiser | None
+    settings: SceneSettings
 
 
 @dataclass(frozen=True)
 class LastRender:
-    """The way and the samples that were taken, and the seconds by stage."""
+    """What the last render was, with nothing left open, and its seconds by stage."""
 
-    way: Way
-    samples: int
+    settings: Settings
     seconds: Mapping[str, float]
 
 
@@ -48,55 +45,37 @@ class _Known:
     measured: dict[str, dict[str, Measured]] = field(default_factory=dict)
 
 
-def place_of(depsgraph: Any) -> Place:
-    """The place of a render, from its dependency graph."""
+def layer_of(depsgraph: Any) -> Layer:
+    """The layer that a dependency graph is of."""
     scene = depsgraph.scene_eval
     width, height = picture_size(scene.render)
-    return Place(
-        scene.name,
-        depsgraph.view_layer_eval.name,
-        width * height,
-        scene.cycles.samples,
-        plain_denoiser(scene),
-    )
+    name = depsgraph.view_layer_eval.name
+    return Layer(scene.name, name, width * height, scene_settings(scene))
 
 
-def plain_denoiser(scene: Any) -> Denoiser | None:
-    """Cycles' mode in a plain render; None where it denoises by none of them."""
+def scene_settings(scene: Any) -> SceneSettings:
+    """What a scene has where settings leave it open."""
+    return SceneSettings(scene.cycles.samples, _denoising(scene))
+
+
+def _denoising(scene: Any) -> Denoising | None:
+    """Cycles' own; None where it denoises by none of its modes."""
     cycles = scene.cycles
     if not (cycles.use_denoising and session.has_denoiser()):
         return None
     if cycles.denoiser != "OPENIMAGEDENOISE":
         return None
-    return Denoiser(f"{cycles.denoising_quality}-{cycles.denoising_prefilter}")
+    return Denoising(f"{cycles.denoising_quality}-{cycles.denoising_prefilter}")
 
 
-def asked_of(
-    job: RenderJob, samples: int, plain_denoiser: Denoiser | None = None
-) -> Asked:
-    """A job's settings, as far as ways differ by them."""
-    return Asked(
-        samples=job.samples or samples,
-        denoise=job.denoise,
-        preset=job.preset,
-        guides=job.guides,
-        guide_samples=job.guide_samples,
-        plain_denoiser=job.denoiser or plain_denoiser,
-    )
-
-
-def keep(place: Place, job: RenderJob, picture: Picture) -> None:
+def keep(layer: Layer, settings: Settings, seconds: Mapping[str, float]) -> None:
     """Remember a finished render."""
-    way = Way.of(job.scale, job.plain)
-    asked = asked_of(job, place.samples, place.plain_denoiser)
-    seconds = dict(picture.seconds)
-    done = LastRender(way, asked.samples, seconds)
+    settings, seconds = resolved(settings, layer.settings), dict(seconds)
     known = FILE.of(_Known)
-    known.last.setdefault(place.scene, {})[place.layer] = done
-    layers = known.measured.setdefault(place.scene, {})
-    layers[place.layer] = learn(
-        layers.get(place.layer), way, asked, place.pixels, seconds, budget.shipped()
-    )
+    known.last.setdefault(layer.scene, {})[layer.name] = LastRender(settings, seconds)
+    layers = known.measured.setdefault(layer.scene, {})
+    before, model = layers.get(layer.name), budget.shipped()
+    layers[layer.name] = learn(before, settings, layer.pixels, seconds, model)
 
 
 def last(scene: Any) -> LastRender | None:
@@ -110,8 +89,11 @@ def last(scene: Any) -> LastRender | None:
     return replace(done[-1], seconds=seconds)
 
 
-def seconds(scene: Any, way: Way, asked: Asked) -> float | None:
-    """What a frame of the scene will about take; None where nothing is known."""
+def seconds(scene: Any, settings: Settings) -> float | None:
+    """What a frame of the scene will about take; None where nothing is known.
+
+    The settings are resolved.
+    """
     width, height = picture_size(scene.render)
     known = FILE.of(_Known).measured.get(scene.name, {})
     total = 0.0
@@ -120,7 +102,7 @@ def seconds(scene: Any, way: Way, asked: Asked) -> float | None:
             continue
         if layer.name not in known:
             return None
-        spent = known[layer.name].seconds(way, asked, width * height, budget.shipped())
+        spent = known[layer.name].seconds(settings, width * height, budget.shipped())
         if spent is None:
             return None
         total += spent

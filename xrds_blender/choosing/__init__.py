@@ -1,0 +1,1 @@
+"""Which mode, quality and samples: what is asked for becomes what is rendered."""

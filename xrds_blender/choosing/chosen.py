@@ -1,0 +1,193 @@
+"""What a time budget or a quality becomes, for a still or for all frames of a shot.
+
+Settings that changed from frame to frame would be seen, and frames of other settings
+could not use each other's samples.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from xrds_core.errors import XRDSError
+
+from ..cycles.passes import CyclesPasses
+from ..cycles.session import has_denoiser
+from ..frame import denoisers, progress
+from ..frame.networks import is_ready
+from ..frame.picture import Picture
+from ..planning import budget
+from ..planning.budget import Costs, ErrorModel, Selection
+from ..planning.plan import Decision
+from ..planning.request import Request
+from ..planning.settings import (
+    CYCLES_DENOISING,
+    OUR_DENOISING,
+    Denoising,
+    Mode,
+    Network,
+)
+from . import history
+from .capabilities import networks_at_hand
+from .probing import probe, with_guides, with_network
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """The request as it is rendered, with nothing left to choose, and why it is this.
+
+    `denoise_in_time` gives the quality of our denoiser once the samples are there, by
+    the seconds that are left then; None where nothing is left to choose.
+    """
+
+    request: Request
+    decisions: tuple[Decision, ...] = ()
+    denoise_in_time: Callable[[], str] | None = None
+
+    def all_decisions(self, rest: tuple[Decision, ...]) -> tuple[Decision, ...]:
+        """Why it is this, and the rest; of Cycles alone the choice says all."""
+        alone = self.decisions and self.request.settings.is_cycles_only
+        return self.decisions if alone else (*self.decisions, *rest)
+
+    def told(self, picture: Picture) -> Picture:
+        """A picture with what it was rendered by."""
+        settings = picture.settings or self.request.settings
+        return replace(
+            picture, plan=self.all_decisions(picture.plan), settings=settings
+        )
+
+
+@contextmanager
+def chosen(
+    engine: Any, depsgraph: Any, request: Request, start: float, shot: bool = False
+) -> Iterator[Chosen]:
+    """Choose what a request leaves open, by probes of the frame.
+
+    Inside the `with` Cycles has the session of the probes, with its scene. `start` and
+    `shot` are as in `select`, which says what is raised.
+    """
+    if request.goal is None:
+        yield Chosen(request)
+        return
+    with CyclesPasses(engine, depsgraph) as passes:
+        found = select(passes, request, start, shot=shot)
+        (decision,) = found.decisions
+        engine.report({"INFO"}, f"XRDS: {decision.value}: {decision.reason}")
+        yield found
+
+
+def choose_for_shot(engine: Any, depsgraph: Any, request: Request) -> Chosen:
+    """Choose what the request of a shot leaves open; raises what `select` raises."""
+    try:
+        with chosen(
+            engine, depsgraph, request, time.perf_counter(), shot=True
+        ) as found:
+            return found
+    finally:
+        progress.end()
+
+
+def select(
+    passes: CyclesPasses, request: Request, start: float, *, shot: bool = False
+) -> Chosen:
+    """The settings for the goal of a request.
+
+    `start` is the perf_counter reading from which a time budget counts; what has passed
+    since then and what the probes take is part of it. Where the request is for all
+    frames of a `shot`, which give each other their samples, the budget is what a frame
+    takes on the mean, and the probes come on top once.
+    Raises XRDSError where nothing can denoise.
+    """
+    assert request.goal is not None
+    model, machine = budget.shipped(), request.machine
+    radius = request.settings.temporal_radius
+    errors = model.errors.limited(_denoising())
+    networks = [n for n in _networks(request) if n in model.network_speed]
+    if shot:
+        errors = errors.in_shot(radius)
+
+    def choose() -> Selection:
+        known = costs.in_shot(radius) if shot else costs
+        return _choose(request, known, errors, networks)
+
+    costs = probe(passes, model, networks, start, machine)
+    found = choose()
+    if found.settings.is_enlarged:  # guides and network were guesses so far
+        costs = with_guides(costs, passes)
+        found = choose()
+    if found.settings.is_enlarged:  # the other networks are slower by as much
+        costs = with_network(costs, found.settings.network, machine, passes)
+        found = choose()
+    settings, seconds = found.settings, request.goal.seconds
+    decision = found.decision(request.goal)
+    settings = replace(settings, temporal_radius=radius)
+    result = Chosen(replace(request, settings=settings, goal=None), (decision,))
+    is_ours = settings.mode is Mode.FULL_SIZE
+    if seconds is None or shot or not is_ours or not found.fits:  # or late by intent
+        return result
+
+    def denoise_in_time() -> str:
+        spent = time.perf_counter() - start
+        return budget.denoiser_in_time(spent, seconds, settings, costs, errors).quality
+
+    return replace(result, denoise_in_time=denoise_in_time)
+
+
+def foresee(
+    scene: Any, request: Request, networks: Sequence[Network]
+) -> Selection | None:
+    """What will about be chosen, by the scene's last renders; None without any.
+
+    `networks` are those whose weights are there.
+    """
+    costs = history.costs(scene)
+    if costs is None:
+        return None
+    known = [n for n in networks if n in costs.network]
+    errors = budget.shipped().errors.limited(_denoising())
+    return _choose(request, costs, errors, known)
+
+
+def _networks(request: Request) -> list[Network]:
+    """Those whose weights are there; none where Cycles is to be alone, or no PyTorch.
+
+    By the files' headers alone: a budget has no seconds for the rest of them.
+    """
+    weights = request.machine.weights
+    if request.settings.is_cycles_only or not is_ready():
+        return []
+    if weights is not None and not Path(weights).is_dir():
+        return [request.settings.network]
+    return networks_at_hand(weights)
+
+
+def _denoising() -> tuple[Denoising, ...]:
+    """Those to choose from: ours, or Cycles' where ours is missing.
+
+    Ours has every network of Cycles' and is no slower. Raises XRDSError where nothing
+    can denoise: every expected error is of a denoised picture.
+    """
+    if denoisers.is_there():
+        return OUR_DENOISING
+    if has_denoiser():
+        return CYCLES_DENOISING
+    raise XRDSError(
+        "neither this Blender nor its Python has Open Image Denoise, without which "
+        "nothing is known of a picture's quality: install XRDS from its zip, or "
+        "choose the settings yourself in place of a time budget or a quality"
+    )
+
+
+def _choose(
+    request: Request, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
+) -> Selection:
+    goal = request.goal
+    assert goal is not None
+    if goal.seconds is not None:
+        return budget.choose(goal.seconds, costs, errors, networks)
+    assert goal.decibels is not None
+    return budget.reach(goal.decibels, costs, errors, networks)

@@ -1,0 +1,50 @@
+"""The modes that can render a scene here, and the request in one of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ..planning import budget, modes
+from ..planning.modes import Capabilities, Estimate
+from ..planning.request import Request
+from ..planning.settings import Denoising, Mode, Settings
+from . import history
+from .capabilities import capabilities
+
+BEST = Denoising.XRDS_HIGH
+"""What automatic takes: `best` doubles the seconds for a tenth of a decibel."""
+
+
+def estimates(scene: Any, settings: Settings, here: Capabilities) -> list[Estimate]:
+    """What to expect of each mode that can work, at the scene's present samples."""
+
+    def seconds(resolved: Settings) -> float | None:
+        return history.seconds(scene, resolved)
+
+    known = history.scene_settings(scene)
+    return modes.estimates(settings, known, here, budget.shipped(), seconds)
+
+
+def best_mode(scene: Any, request: Request) -> Mode:
+    """The mode with the least error expected at the scene's present samples.
+
+    Whatever the denoising that is asked for at full size: that is chosen along.
+    """
+    settings = replace(request.settings, denoising=BEST)
+    return modes.best(estimates(scene, settings, capabilities(request.machine.weights)))
+
+
+def in_mode(request: Request, mode: Mode, scene: Any) -> Request:
+    """The request in a mode; automatic is the best there is for the scene.
+
+    What a goal will choose stays open.
+    """
+    if request.goal is not None:
+        return request
+    if mode is Mode.AUTOMATIC:
+        mode = best_mode(scene, request)
+        request = request.with_settings(denoising=BEST)
+    if mode is Mode.CYCLES_ONLY:
+        return request.with_settings(mode=mode, denoising=None, temporal_radius=0)
+    return request.with_settings(mode=mode)

@@ -1,0 +1,77 @@
+"""What a render returns."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from xrds_core.errors import XRDSError
+
+from ..planning.plan import Decision
+from ..planning.settings import Settings
+
+if TYPE_CHECKING:
+    from xrds_core.arrays import Array
+
+
+class NetworkFailed(XRDSError):
+    """The network failed; what Cycles rendered for it is kept.
+
+    `radiance` (h, w, 3), premultiplied, and `alpha` (h, w): low resolution, as
+    `Picture.low_resolution`; of a shot, of the frame `number`.
+    """
+
+    number: int | None = None
+
+    def __init__(self, message: str, radiance: Array, alpha: Array) -> None:
+        super().__init__(message)
+        self.radiance, self.alpha = radiance, alpha
+
+
+@dataclass(frozen=True)
+class Temporal:
+    """What neighbouring frames lent to a picture.
+
+    `frames`: the numbers of those whose samples went in, its own too; `mean_samples`
+    per pixel after accumulation; `rejected`: the share of the neighbours' samples that
+    were left out.
+    """
+
+    radius: int
+    frames: tuple[int, ...]
+    mean_samples: float
+    rejected: float
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A rendered region: arrays float32, scene-linear, row 0 on top.
+
+    `radiance` (H, W, 3) is premultiplied by `alpha` (H, W); `albedo` and `normal`
+    (H, W, 3) and `low_resolution` (h, w, 3) are None for Cycles alone. `seconds` by
+    stage: total, sync, beauty, denoise, guides, network, write; Cycles does not tell
+    its own denoising from sampling, so `beauty` holds both then. `peak_memory`
+    is the largest in bytes that the process has taken so far; `device` is what the
+    network ran on, empty for Cycles alone; `settings` are what it was rendered
+    by, as a time budget chose them.
+    """
+
+    radiance: Array
+    alpha: Array
+    albedo: Array | None = None
+    normal: Array | None = None
+    low_resolution: Array | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    plan: tuple[Decision, ...] = ()
+    peak_memory: int = 0
+    device: str = ""
+    settings: Settings | None = None
+    temporal: Temporal | None = None
+
+    @classmethod
+    def of(cls, pixels: Array, **rest: Any) -> Picture:
+        """The picture of radiance and alpha in one array (H, W, 4)."""
+        import numpy as np  # here: Blender starts faster without it
+
+        radiance, alpha = pixels[..., :3], pixels[..., 3]
+        return cls(np.ascontiguousarray(radiance), np.ascontiguousarray(alpha), **rest)

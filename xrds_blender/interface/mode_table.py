@@ -1,0 +1,83 @@
+"""The choice of the mode, with what to expect of each beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from xrds_core.time_left import duration
+
+from ..planning.modes import Estimate
+from ..planning.settings import MODES, Mode
+from .paragraph import translated
+from .translations import CONTEXT
+
+NAMES = {
+    Mode.AUTOMATIC: "Automatic",
+    Mode.FULL_SIZE: "Full Size",
+    Mode.X2: "Super-Resolution 2×",
+    Mode.X4: "Super-Resolution 4×",
+    Mode.X8: "Super-Resolution 8×",
+    Mode.CYCLES_ONLY: "Cycles Only",
+}
+SAME = 0.05  # dB: what is shown as one decimal of zero
+
+
+def draw(layout: Any, settings: Any, best: Mode, estimates: list[Estimate]) -> None:
+    """Draw one button for each mode that can work, and the chosen one in any case."""
+    column = layout.column(align=True)
+    text = f"{translated('Automatic')} ({_automatic(settings, best)})"
+    column.prop_enum(settings, "mode", Mode.AUTOMATIC.value, text=text, translate=False)
+    timed = any(each.seconds is not None for each in estimates)
+    mode, seconds, quality = _cells(column, timed)
+    mode.label(text="")
+    if timed:
+        seconds.label(text="Estimated Time", text_ctxt=CONTEXT)
+    quality.label(text="Quality", text_ctxt=CONTEXT)
+    found = {each.mode: each for each in estimates}
+    shown = [mode for mode in MODES if mode in found or settings.mode == mode]
+    enlarged = [mode for mode in shown if mode.is_enlarged]
+    for each in shown:
+        if each is Mode.CYCLES_ONLY:
+            column.separator(factor=0.5)
+        if each in enlarged[:1]:
+            column.label(text="Super-Resolution", text_ctxt=CONTEXT)
+        _draw_mode(column, settings, found.get(each, Estimate(each)), timed)
+
+
+def _draw_mode(column: Any, settings: Any, estimate: Estimate, timed: bool) -> None:
+    cell, seconds, quality = _cells(column, timed)
+    mode = estimate.mode
+    # Short: in a narrow panel three buttons would else read the same.
+    name = f"{mode.scale}×" if mode.is_enlarged else translated(NAMES[mode])
+    cell.prop_enum(settings, "mode", mode.value, text=name, translate=False)
+    if timed:
+        spent = estimate.seconds
+        told = "" if spent is None else duration(spent)
+        seconds.label(text=told, translate=False)
+    quality.label(text=_quality(estimate), translate=False)
+
+
+def _cells(layout: Any, timed: bool) -> tuple[Any, Any, Any]:
+    """Three columns, or the outer two where no seconds are known."""
+    split = layout.split(factor=0.42 if timed else 0.6, align=True)
+    first = split.row(align=True)
+    rest = split.split(factor=0.44) if timed else split
+    cells = [rest.row() for _ in range(2 if timed else 1)]
+    for cell in cells:
+        cell.alignment = "RIGHT"
+    return first, cells[0], cells[-1]
+
+
+def _automatic(settings: Any, best: Mode) -> str:
+    if settings.is_timed:
+        return translated("within {time}", time=duration(settings.time_budget))
+    return translated(NAMES[best])
+
+
+def _quality(estimate: Estimate) -> str:
+    if estimate.decibels is None:
+        return translated("noisy") if estimate.mode is Mode.CYCLES_ONLY else "?"
+    if estimate.decibels > -SAME:
+        return translated("best")
+    digits = 1 if estimate.decibels > -1 else 0
+    return f"{estimate.decibels:.{digits}f} dB".replace("-", "−")

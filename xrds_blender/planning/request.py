@@ -1,0 +1,162 @@
+"""What a render is asked for, as the panel, the command and scripts describe it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from xrds_core.errors import UsageError
+
+from .plan import SAVINGS, Facts, Plan, cycles_only, decide, full_size
+from .settings import (
+    CYCLES_DENOISING,
+    QUALITIES,
+    SCALES,
+    Denoising,
+    Mode,
+    Settings,
+)
+
+_SAMPLES = 1 << 24  # the most that Cycles takes
+_RANGES = {
+    "samples": (1, _SAMPLES),
+    "guide_samples": (1, _SAMPLES),
+    "guide_limit": (0, _SAMPLES),
+    "seed": (0, 2**31 - 1),
+    "threads": (1, 1024),
+    "temporal_radius": (0, 1000),
+    "memory_limit": (0, 2**63 - 1),
+    "exposure": (1e-30, 1e30),
+}
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What a frame is to have: `seconds` it may take, or `decibels` of PSNR."""
+
+    seconds: float | None = None
+    decibels: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.seconds is not None and self.decibels is not None:
+            raise UsageError("give a time budget or a quality, not both")
+        if self.seconds is not None and not self.seconds > 0:
+            raise UsageError(f"time budget {self.seconds} s must be above 0")
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What the network and our denoiser run on.
+
+    `device` as `xrds info` lists them, or auto; `memory_limit` in bytes; `weights` is a
+    folder of weights files or one file, in the place of the shipped ones.
+    """
+
+    device: str = "auto"
+    memory_limit: int | None = None
+    threads: int | None = None
+    weights: str | Path | None = None
+
+
+@dataclass(frozen=True)
+class Request:
+    """A render as it is asked for: where there is a goal, settings follow from it.
+
+    `seed` None leaves Cycles' own; `exposure` None is found in the picture; `savings`
+    names what the plan may leave out where the scene does not need it. `guide_cache` is
+    a folder for guides beside those in memory; each render of the same view adds its
+    samples to them until they are `guide_limit`. `stop_keeps` leaves what there is in
+    the result when the user stops the render.
+    """
+
+    settings: Settings = field(default_factory=Settings)
+    goal: Goal | None = None
+    machine: Machine = field(default_factory=Machine)
+    seed: int | None = None
+    exposure: float | None = None
+    savings: tuple[str, ...] = SAVINGS
+    guide_cache: str | Path | None = None
+    guide_limit: int = 0
+    stop_keeps: bool = False
+
+    def __post_init__(self) -> None:
+        unknown = set(self.savings) - set(SAVINGS)
+        if unknown:
+            known = ", ".join(SAVINGS)
+            raise UsageError(
+                f"unknown savings {', '.join(sorted(unknown))}; choose from {known}"
+            )
+        for record in (self, self.settings, self.machine):
+            for name in _RANGES.keys() & vars(record).keys():
+                _check_range(name, getattr(record, name))
+
+    def with_settings(self, **changes: Any) -> Request:
+        """The same with other settings."""
+        return replace(self, settings=replace(self.settings, **changes))
+
+    def plan(self, facts: Facts | None = None) -> Plan:
+        """What is decided for it; at full size it rests on no facts."""
+        if self.settings.is_cycles_only:
+            return cycles_only("as requested")
+        if self.settings.mode is Mode.FULL_SIZE:
+            return full_size(self.settings.quality)
+        assert facts is not None
+        return decide(facts, self.savings)
+
+
+def request(
+    scale: int = 2,
+    *,
+    plain: bool = False,
+    denoise: str = "high",
+    denoiser: str | None = None,
+    time_budget: float | None = None,
+    quality: float | None = None,
+    **others: Any,
+) -> Request:
+    """The request of what scripts and the command call their choices.
+
+    `plain` is Cycles alone; `denoise` the quality of our denoiser, one of QUALITIES;
+    `denoiser` a mode of Cycles', for `plain` and for the low-resolution picture;
+    `time_budget` in seconds and `quality` in dB are goals; `others` are fields of
+    Settings, Machine and Request by their names. Raises UsageError on what is out of
+    range, TypeError on
+    unknown names.
+    """
+    if scale not in SCALES:
+        raise UsageError(f"scale {scale} is not one of {', '.join(map(str, SCALES))}")
+    if denoise not in QUALITIES:
+        raise UsageError(f"denoise {denoise!r} is not one of {', '.join(QUALITIES)}")
+    mode = Mode.CYCLES_ONLY if plain else Mode.of(scale)
+    denoising = None if plain else Denoising.ours(denoise)
+    if denoiser is not None and mode is not Mode.FULL_SIZE:
+        denoising = _of_cycles(denoiser)
+    goal = None
+    if (time_budget, quality) != (None, None):
+        goal = Goal(time_budget, quality)
+    settings = Settings(mode, denoising=denoising, **_taken(others, Settings))
+    machine = Machine(**_taken(others, Machine))
+    unknown = others.keys() - {each.name for each in fields(Request)}
+    if unknown:
+        raise TypeError(f"a render has no {', '.join(sorted(unknown))}")
+    return Request(settings, goal, machine, **others)
+
+
+def _taken(choices: dict[str, Any], record: Any) -> dict[str, Any]:
+    """Take the fields of a record out of the choices."""
+    names = {each.name for each in fields(record)} & choices.keys()
+    return {name: choices.pop(name) for name in names}
+
+
+def _of_cycles(name: str) -> Denoising:
+    if name not in CYCLES_DENOISING:
+        known = ", ".join(CYCLES_DENOISING)
+        raise UsageError(f"denoiser {name!r} is not one of {known}")
+    return Denoising(name)
+
+
+def _check_range(name: str, value: float | None) -> None:
+    least, most = _RANGES[name]
+    if value is not None and not least <= value <= most:
+        raise UsageError(f"{name} is {value}; it must be from {least} to {most}")

@@ -1,0 +1,158 @@
+"""How a frame is rendered: the one record of it, that everything else is keyed by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+PRESETS = ("fast", "balanced", "paper")
+
+Network = tuple[str, int]
+"""A network by its preset and the enlargement that it is for."""
+
+
+class Mode(StrEnum):
+    """What makes the picture; automatic is one of the others, for the scene at hand."""
+
+    AUTOMATIC = "automatic"
+    FULL_SIZE = "full_size"
+    X2 = "x2"
+    X4 = "x4"
+    X8 = "x8"
+    CYCLES_ONLY = "cycles_only"
+
+    @property
+    def scale(self) -> int:
+        """Enlargement along each side."""
+        return int(self.value[1:]) if self.is_enlarged else 1
+
+    @property
+    def is_enlarged(self) -> bool:
+        """Whether a network makes the picture."""
+        return self.value.startswith("x")
+
+    @classmethod
+    def of(cls, scale: int) -> Mode:
+        """The mode of XRDS at a scale; raises ValueError where there is none."""
+        return cls.FULL_SIZE if scale == 1 else cls(f"x{scale}")
+
+
+MODES = tuple(mode for mode in Mode if mode is not Mode.AUTOMATIC)
+"""In the order of the panel; of equally good ones the first is the best."""
+SCALES = tuple(mode.scale for mode in MODES if mode is not Mode.CYCLES_ONLY)
+
+
+class Denoising(StrEnum):
+    """Cycles' OpenImageDenoise as QUALITY-PREFILTER, or ours as XRDS-QUALITY."""
+
+    HIGH_ACCURATE = "HIGH-ACCURATE"
+    HIGH_FAST = "HIGH-FAST"
+    HIGH_NONE = "HIGH-NONE"
+    BALANCED_ACCURATE = "BALANCED-ACCURATE"
+    BALANCED_FAST = "BALANCED-FAST"
+    BALANCED_NONE = "BALANCED-NONE"
+    FAST_ACCURATE = "FAST-ACCURATE"
+    FAST_FAST = "FAST-FAST"
+    FAST_NONE = "FAST-NONE"
+    XRDS_BEST = "XRDS-BEST"
+    XRDS_HIGH = "XRDS-HIGH"
+    XRDS_MEDIUM = "XRDS-MEDIUM"
+    XRDS_BALANCED = "XRDS-BALANCED"
+    XRDS_FAST = "XRDS-FAST"
+
+    @classmethod
+    def ours(cls, quality: str) -> Denoising:
+        """XRDS' own of a quality, best to fast; raises ValueError for others."""
+        return cls(f"XRDS-{quality.upper()}")
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether XRDS denoises, in this process."""
+        return self.value.startswith("XRDS-")
+
+    @property
+    def quality(self) -> str:
+        """High, balanced or fast, as Cycles has it too; best to fast of ours."""
+        first, _, second = self.value.partition("-")
+        return (second if self.is_ours else first).lower()
+
+    @property
+    def prefilter(self) -> str:
+        """How Cycles treats the guides: ACCURATE, FAST or NONE; empty for ours."""
+        return "" if self.is_ours else self.value.partition("-")[2]
+
+
+CYCLES_DENOISING = tuple(each for each in Denoising if not each.is_ours)
+OUR_DENOISING = tuple(each for each in Denoising if each.is_ours)
+QUALITIES = tuple(each.quality for each in OUR_DENOISING)
+DEFAULT_DENOISING = Denoising.HIGH_ACCURATE
+"""Blender's own default."""
+LOW_DENOISING = (
+    Denoising.HIGH_ACCURATE,
+    Denoising.HIGH_FAST,
+    Denoising.BALANCED_ACCURATE,
+)
+"""Those worth trying on the low-resolution picture."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a frame is rendered.
+
+    `samples` per pixel, low-resolution ones where a network enlarges; None leaves
+    Cycles' own. `denoising` None is the scene's own, of Cycles alone. `preset` names
+    the network and `guide_samples` are per full-size pixel: both for enlargements.
+    `temporal_radius` frames before and after give their samples, in a shot.
+    """
+
+    mode: Mode = Mode.X2
+    samples: int | None = None
+    denoising: Denoising | None = Denoising.XRDS_HIGH
+    preset: str = "fast"
+    guide_samples: int = 4
+    temporal_radius: int = 0
+
+    @property
+    def scale(self) -> int:
+        """Enlargement along each side."""
+        return self.mode.scale
+
+    @property
+    def is_enlarged(self) -> bool:
+        """Whether a network makes the picture."""
+        return self.mode.is_enlarged
+
+    @property
+    def is_cycles_only(self) -> bool:
+        """Whether Cycles makes the picture by itself."""
+        return self.mode is Mode.CYCLES_ONLY
+
+    @property
+    def network(self) -> Network:
+        """The network that an enlargement needs."""
+        return self.preset, self.scale
+
+    @property
+    def quality(self) -> str:
+        """Of our denoiser, one of QUALITIES; that of Cycles' mode in its place."""
+        return "high" if self.denoising is None else self.denoising.quality
+
+    @property
+    def family(self) -> Settings:
+        """All but how many samples, and nothing that the mode does not use."""
+        if self.is_enlarged:
+            return replace(self, samples=None, temporal_radius=0)
+        return Settings(self.mode, None, self.denoising, "", 0)
+
+    @property
+    def label(self) -> str:
+        """In a few words, as the panel and the command print it."""
+        samples = "1 sample" if self.samples == 1 else f"{self.samples} samples"
+        if self.mode is Mode.FULL_SIZE:
+            return f"full size, {samples}, {self.quality} denoising"
+        if self.is_cycles_only:
+            return f"Cycles only, {samples}, OIDN {self.denoising}"
+        return (
+            f"{self.preset} x{self.scale}, {samples}, "
+            f"{self.guide_samples} guide samples, OIDN {self.denoising}"
+        )
