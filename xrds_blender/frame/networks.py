@@ -32,7 +32,7 @@ def load_upscaler(job: RenderJob) -> Upscaler:
 def _load(
     preset: str, scale: int, guides: str, device: str, weights: str | None
 ) -> Upscaler:
-    upscaler_class: type[Upscaler] = torch_folder.load("upscaler").Upscaler
+    upscaler_class: type[Upscaler] = torch_folder.load("superres.upscaler").Upscaler
     return upscaler_class(preset, scale, guides, device, weights=weights)
 
 
@@ -44,7 +44,7 @@ def known_networks(job: RenderJob) -> list[Network]:
     if job.plain:
         return []
     try:
-        torch_folder.load("weights")
+        torch_folder.load("superres.weights")
     except XRDSError:
         return []
     if job.weights is not None and not Path(job.weights).is_dir():
