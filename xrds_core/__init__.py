@@ -28,12 +28,12 @@ if TYPE_CHECKING:
     from .superres.upscaler import upscale as upscale
 
 _LAZY = {
-    "XRDS": ".network",
-    "NetworkConfig": ".network",
-    "Upscaled": ".upscaler",
-    "Upscaler": ".upscaler",
-    "upscale": ".upscaler",
-    "upscale_file": ".exr_upscale",
+    "XRDS": ".superres.network",
+    "NetworkConfig": ".superres.network",
+    "Upscaled": ".superres.upscaler",
+    "Upscaler": ".superres.upscaler",
+    "upscale": ".superres.upscaler",
+    "upscale_file": ".superres.exr_upscale",
 }
 
 __all__ = [

@@ -105,11 +105,12 @@ _PASS_HELP = {
 
 def _denoise(options: argparse.Namespace) -> dict[str, Any]:
     from xrds_core.denoising import Denoiser
+    from xrds_core.exr import limits
     from xrds_core.sequence.cameras import read_cameras
     from xrds_core.sequence.denoise import Files, denoise_sequence
     from xrds_core.sequence.reading import Reading
 
-    exr_limits.allow(options.read_limit)
+    limits.allow(options.read_limit)
     reading = Reading(
         PassNames(**{name: getattr(options, name) for name in PASSES}),
         cameras=read_cameras(options.camera) if options.camera else None,

@@ -63,6 +63,7 @@ def save(
     if path.suffix.lower() == ".png":
         _write_png(path, radiance, alpha, scene, metadata or {})
         return
+    from xrds_core import exr
 
     channels = {name: radiance[..., i] for i, name in enumerate("RGB")}
     if scene.render.film_transparent:

@@ -56,11 +56,12 @@ def add_upscale(commands: Any) -> argparse.ArgumentParser:
 
 
 def _upscale(options: argparse.Namespace) -> dict[str, Any]:
+    from xrds_core.exr import limits
 
     from ..frame.torch_folder import load
 
-    exr_limits.allow(options.read_limit)
-    return load("exr_upscale").upscale_file(
+    limits.allow(options.read_limit)
+    return load("superres.exr_upscale").upscale_file(
         options.beauty,
         options.guide_file,
         options.out,

@@ -41,6 +41,7 @@ def png_size(path: Path) -> tuple[int, int] | None:
 
 
 def _exr_size(path: Path) -> tuple[int, int]:
+    from xrds_core import exr
 
     height, width = exr.read_beauty(path).radiance.shape[:2]
     return width, height
