@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from .cycles.passes import CyclesPasses
-    from .frame.job import Picture
+    from .frame.picture import Picture
 
 __all__ = ["register", "render", "run_job", "unregister"]
 
@@ -42,7 +42,7 @@ def render(scene: Any, scale: int = 2, **choices: Any) -> Picture:
     """Render the current frame of `scene` and return its picture.
 
     `choices` are `layer`, the name of a view layer (the first that is used by default),
-    and the other fields of `xrds_blender.frame.job.RenderJob`. The scene's own `xrds`
+    and the others of `xrds_blender.planning.request.request`. The scene's own `xrds`
     settings and its compositor play no part, and everything in it is as before
     afterwards.
 
@@ -57,7 +57,7 @@ def render(scene: Any, scale: int = 2, **choices: Any) -> Picture:
 
 
 def run_job(
-    scene: Any, request: Callable[[CyclesPasses], T], *, layer: str | None = None
+    scene: Any, job: Callable[[CyclesPasses], T], *, layer: str | None = None
 ) -> T:
     """Call `job` inside a render of `scene` and return what it returns.
 
@@ -70,4 +70,4 @@ def run_job(
     from .interface.registration import ensure_registered
 
     ensure_registered()
-    return rendering.run_job(scene, request, layer=layer)
+    return rendering.run_job(scene, job, layer=layer)

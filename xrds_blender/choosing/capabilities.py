@@ -24,7 +24,7 @@ def capabilities(weights: str | Path | None = None) -> Capabilities:
 
 def networks_at_hand(weights: str | Path | None = None) -> list[Network]:
     """Those whose weights are there."""
-    return [(each.preset, each.scale) for each in weights_headers(weights)]
+    return [Network(each.preset, each.scale) for each in weights_headers(weights)]
 
 
 def weights_headers(weights: str | Path | None = None) -> list[WeightsHeader]:

@@ -186,9 +186,8 @@ def _write(
 ) -> dict[str, Any]:
     """Write one frame; returns its entry for the JSON."""
     target = frame_path(output, number)
-    metadata = record.metadata(
-        record.fields(picture, request.settings, scene.cycles.samples)
-    )
+    settings = picture.settings or request.settings
+    metadata = record.metadata(record.fields(picture, settings, scene.cycles.samples))
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated

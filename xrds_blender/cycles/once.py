@@ -8,7 +8,7 @@ from xrds_core.temporal.samples import Portion
 
 from ..internals import spare_passes
 from ..internals.borrowed import Borrowed
-from ..planning.denoiser import Denoiser
+from ..planning.settings import Denoising
 from . import live, session
 from .clock import StageClock
 from .pass_names import GUIDE_PASSES
@@ -21,7 +21,7 @@ def render_once(
     *,
     samples: int | None = None,
     seed: int | None = None,
-    denoiser: Denoiser | None = None,
+    denoiser: Denoising | None = None,
     noisy: bool = False,
     portion: Portion | None = None,
     is_even: bool = True,

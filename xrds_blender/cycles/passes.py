@@ -14,8 +14,8 @@ import numpy as np
 from xrds_core.temporal.samples import Portion
 
 from ..internals.borrowed import Borrowed
-from ..planning.denoiser import Denoiser
 from ..planning.plan import GuideRender
+from ..planning.settings import Denoising
 from . import live, session
 from .guide_settings import guide_settings
 from .layer_session import LayerSession
@@ -51,7 +51,7 @@ class CyclesPasses(LayerSession):
         *,
         denoise: bool = True,
         seed: int | None = None,
-        denoiser: Denoiser | None = None,
+        denoiser: Denoising | None = None,
         in_process: InProcess | None = None,
     ) -> Beauty:
         """Render the beauty at 1/scale of the size, filtered by a box of one pixel.
@@ -77,7 +77,7 @@ class CyclesPasses(LayerSession):
         *,
         denoise: bool = True,
         seed: int | None = None,
-        denoiser: Denoiser | None = None,
+        denoiser: Denoising | None = None,
         in_process: InProcess | None = None,
     ) -> dict[str, Beauty]:
         """As `beauty`, for every view by name (one without stereo)."""

@@ -8,7 +8,7 @@ from typing import Any
 from xrds_core.temporal.samples import Portion
 
 from ..internals.borrowed import Borrowed
-from ..planning.denoiser import Denoiser
+from ..planning.settings import Denoising
 
 
 def set_sampling(
@@ -111,7 +111,7 @@ def set_denoising(
     scene: Any,
     layer: Any,
     denoise: bool,
-    denoiser: Denoiser | None = None,
+    denoiser: Denoising | None = None,
 ) -> None:
     """Switch the denoiser; `denoiser` None keeps the scene's own mode."""
     borrowed.set(scene.cycles, use_denoising=denoise)

@@ -25,7 +25,6 @@ _LEFT_OUT = {
 
 def fields(picture: Picture, settings: Settings, samples: int) -> dict[str, str]:
     """Name and value of what made a picture; `samples` are the scene's own."""
-    settings = picture.settings or settings
     told = {"version": package_version(), "mode": _mode(settings)}
     told["scale"] = str(settings.scale)
     if settings.is_enlarged:

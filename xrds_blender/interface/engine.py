@@ -69,10 +69,11 @@ class XRDSRender(bpy.types.RenderEngine):
         frame, samples = scene.frame_current, scene.cycles.samples
         layer, notes = depsgraph.view_layer_eval.name, list(support.notes(scene))
         picture = render_frame(self, depsgraph, request)
-        told = record.fields(picture, request, samples)
+        settings = picture.settings or request.settings
+        told = record.fields(picture, settings, samples)
         record.stamp(self, told, layer)
         self.report({"INFO"}, record.line(told, frame, layer))
-        for note in notes if (picture.job or request).is_enlarged else ():
+        for note in notes if settings.is_enlarged else ():
             self.report({"INFO"}, f"XRDS: {note}")
 
     def render_frame_finish(self) -> None:

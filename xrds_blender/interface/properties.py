@@ -117,8 +117,8 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Network",
         translation_context=CONTEXT,
         items=_PRESETS,
-        description="The network that adds detail to the low-resolution picture; a larger one "
-        "takes longer",
+        description="The network that adds detail to the low-resolution picture; a "
+        "larger one takes longer",
     )
     denoise: EnumProperty(
         name="Denoising",

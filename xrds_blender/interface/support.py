@@ -53,11 +53,13 @@ def _has_freestyle(scene: Any) -> bool:
 _NOTES: tuple[tuple[Callable[[Any], bool], str], ...] = (
     (
         _uses_light_passes,
-        "Light passes are those of the low-resolution picture, enlarged without the network",
+        "Light passes are those of the low-resolution picture, enlarged without the "
+        "network",
     ),
     (
         _has_time_limit,
-        "The time limit covers the low-resolution picture only; guides and network add to it",
+        "The time limit covers the low-resolution picture only; guides and network add "
+        "to it",
     ),
     (
         _is_panorama,

@@ -185,7 +185,7 @@ class Model:
             for entry in content["curves"]
         }
         networks = {
-            (entry["preset"], entry["scale"]): entry["speed"]
+            Network(entry["preset"], entry["scale"]): entry["speed"]
             for entry in content["networks"]
         }
         return cls(
@@ -288,6 +288,7 @@ def denoiser_in_time(
         for family, curve in errors.families([])
         if family.mode is Mode.FULL_SIZE and family.denoising is not None
     }
+    assert settings.denoising is not None
     foreseen = psnr[settings.denoising]
     late = budget * (1 + LATE)
     ends = {mode: spent + costs.denoise[mode] for mode in psnr}

@@ -49,7 +49,7 @@ class Measured:
             return here.fixed + settings.samples * here.beauty
         costs = here.costs(pixels, model)
         try:
-            return costs and costs.seconds(_in_process(settings))
+            return None if costs is None else costs.seconds(_in_process(settings))
         except KeyError:  # a network of which nothing is known
             return None
 

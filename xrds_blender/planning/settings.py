@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from typing import NamedTuple
 
 PRESETS = ("fast", "balanced", "paper")
 
-Network = tuple[str, int]
-"""A network by its preset and the enlargement that it is for."""
+
+class Network(NamedTuple):
+    """What a weights file is for."""
+
+    preset: str
+    scale: int
 
 
 class Mode(StrEnum):
@@ -130,7 +135,7 @@ class Settings:
     @property
     def network(self) -> Network:
         """The network that an enlargement needs."""
-        return self.preset, self.scale
+        return Network(self.preset, self.scale)
 
     @property
     def quality(self) -> str:
