@@ -104,14 +104,14 @@ def select(
     """
     assert request.goal is not None
     model, machine = budget.shipped(), request.machine
-    radius = request.settings.temporal_radius
+    wanted = request.settings
     errors = model.errors.limited(_denoising())
     networks = [n for n in _networks(request) if n in model.network_speed]
     if shot:
-        errors = errors.in_shot(radius)
+        errors = errors.in_shot(wanted.temporal_radius)
 
     def choose() -> Selection:
-        known = costs.in_shot(radius) if shot else costs
+        known = costs.in_shot(wanted.temporal_radius) if shot else costs
         return _choose(request, known, errors, networks)
 
     costs = probe(passes, model, networks, start, machine)
@@ -124,7 +124,10 @@ def select(
         found = choose()
     settings, seconds = found.settings, request.goal.seconds
     decision = found.decision(request.goal)
-    settings = replace(settings, temporal_radius=radius)
+    settings = replace(settings, temporal_radius=wanted.temporal_radius)
+    if not settings.is_enlarged:
+        unused = {"preset": wanted.preset, "guide_samples": wanted.guide_samples}
+        settings = replace(settings, **unused)
     result = Chosen(replace(request, settings=settings, goal=None), (decision,))
     is_ours = settings.mode is Mode.FULL_SIZE
     if seconds is None or shot or not is_ours or not found.fits:  # or late by intent

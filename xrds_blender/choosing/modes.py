@@ -46,5 +46,5 @@ def in_mode(request: Request, mode: Mode, scene: Any) -> Request:
         mode = best_mode(scene, request)
         request = request.with_settings(denoising=BEST)
     if mode is Mode.CYCLES_ONLY:
-        return request.with_settings(mode=mode, denoising=None, temporal_radius=0)
+        return request.with_settings(mode=mode, temporal_radius=0)
     return request.with_settings(mode=mode)

@@ -125,7 +125,7 @@ def set_denoising(
         if denoiser is not None:
             borrowed.set(
                 scene.cycles,
-                denoising_quality=denoiser.quality,
+                denoising_quality=denoiser.quality.upper(),
                 denoising_prefilter=denoiser.prefilter,
             )
         borrowed.set(layer.cycles, use_denoising=True)

@@ -67,15 +67,12 @@ class SceneSettings:
 def resolved(settings: Settings, scene: SceneSettings) -> Settings:
     """The settings with nothing left open, and nothing that the mode does not use."""
     denoising = settings.denoising
-    if settings.is_cycles_only and (denoising is None or denoising.is_ours):
-        denoising = scene.denoising
+    if settings.is_cycles_only:
+        denoising = settings.cycles_denoising or scene.denoising
     elif settings.mode is Mode.FULL_SIZE:
         denoising = Denoising.ours(settings.quality)
-    return replace(
-        replace(settings, denoising=denoising).family,
-        samples=settings.samples or scene.samples,
-        temporal_radius=0 if settings.is_cycles_only else settings.temporal_radius,
-    )
+    family = replace(settings, denoising=denoising).family
+    return replace(family, samples=settings.samples or scene.samples)
 
 
 def missing(settings: Settings, here: Capabilities) -> str:

@@ -129,7 +129,7 @@ def request(
     if denoise not in QUALITIES:
         raise UsageError(f"denoise {denoise!r} is not one of {', '.join(QUALITIES)}")
     mode = Mode.CYCLES_ONLY if plain else Mode.of(scale)
-    denoising = None if plain else Denoising.ours(denoise)
+    denoising = Denoising.ours(denoise)
     if denoiser is not None and mode is not Mode.FULL_SIZE:
         denoising = _of_cycles(denoiser)
     goal = None

@@ -76,6 +76,12 @@ class Denoising(StrEnum):
         return self.value.startswith("XRDS-")
 
     @property
+    def cycles_denoising(self) -> Denoising | None:
+        """The mode of Cycles that is asked for; None leaves what the scene has."""
+        asked = self.denoising
+        return None if asked is None or asked.is_ours else asked
+
+    @property
     def quality(self) -> str:
         """High, balanced or fast, as Cycles has it too; best to fast of ours."""
         first, _, second = self.value.partition("-")
@@ -105,8 +111,8 @@ class Settings:
     """How a frame is rendered.
 
     `samples` per pixel, low-resolution ones where a network enlarges; None leaves
-    Cycles' own. `denoising` None is the scene's own, of Cycles alone. `preset` names
-    the network and `guide_samples` are per full-size pixel: both for enlargements.
+    Cycles' own. `denoising` is ours or Cycles'; where Cycles is alone, ours leaves what
+    the scene has, and None is no denoising at all. `preset` names the network and `guide_samples` are per full-size pixel: both for enlargements.
     `temporal_radius` frames before and after give their samples, in a shot.
     """
 
@@ -136,6 +142,12 @@ class Settings:
     def network(self) -> Network:
         """The network that an enlargement needs."""
         return Network(self.preset, self.scale)
+
+    @property
+    def cycles_denoising(self) -> Denoising | None:
+        """The mode of Cycles that is asked for; None leaves what the scene has."""
+        asked = self.denoising
+        return None if asked is None or asked.is_ours else asked
 
     @property
     def quality(self) -> str:

@@ -31,7 +31,7 @@ class CyclesOnly(Method):
             depsgraph,
             samples=self.settings.samples,
             seed=self.request.seed,
-            denoiser=self.settings.denoising,
+            denoiser=self.settings.cycles_denoising,
         )
         result = engine.get_result()
         layer, size = result.layers[name], (result.resolution_x, result.resolution_y)

@@ -285,14 +285,14 @@ class _Renders:
     def _beauties(self) -> dict[str, Beauty]:
         """The denoised low-resolution light by view."""
         self._begin(progress.LOW, 1)
-        settings, denoising = self.settings, self.settings.denoising
+        settings = self.settings
         beauties = self.passes.beauties(
             settings.scale,
             settings.samples,
             denoise=self.chosen.denoise,
             seed=self.request.seed,
-            denoiser=None if denoising is None or denoising.is_ours else denoising,
-            in_process=in_process(denoising, self.request.machine),
+            denoiser=settings.cycles_denoising,
+            in_process=in_process(settings.denoising, self.request.machine),
         )
         first = next(iter(beauties.values()))
         picture = np.dstack((first.radiance, first.alpha))

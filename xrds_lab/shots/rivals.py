@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from xrds_core.temporal.frame import Frame
 
 MODES: tuple[Denoiser, ...] = CYCLES_DENOISERS
-_QUALITY = {"HIGH": "High", "BALANCED": "Balanced", "FAST": "Fast"}
 
 
 def cycles_oidn(frame: Frame, mode: Denoiser = DEFAULT_DENOISER) -> Array:
@@ -30,7 +29,7 @@ def cycles_oidn(frame: Frame, mode: Denoiser = DEFAULT_DENOISER) -> Array:
     """
     images = {"albedo": frame.albedo, "normal": frame.normal}
     images = {name: _upwards(image) for name, image in images.items()}
-    quality = _QUALITY[mode.quality]
+    quality = mode.quality.capitalize()
     if mode.prefilter == "ACCURATE":
         images = {k: _run(quality, False, **{k: image}) for k, image in images.items()}
     colour = _upwards(frame.radiance)
