@@ -230,7 +230,7 @@ bpy.data.scenes[0].cycles.use_adaptive_sampling = False
 
 SAMPLES_ARE_TAKEN = """
 import sys
-progress = sys.modules.get('xrds_blender.frame.progress')
+progress = sys.modules.get('xrds_blender.frame.stages')
 lifetimes = sys.modules.get('xrds_blender.internals.lifetimes')
 run = progress and lifetimes.RENDER_JOB.of(progress.Current).run
 status = sys.modules.get('xrds_blender.internals.status')
@@ -284,7 +284,7 @@ bpy.context.preferences.view.render_display_type = 'AREA'
     window.wait(
         """
 import sys
-progress = sys.modules.get('xrds_blender.frame.progress')
+progress = sys.modules.get('xrds_blender.frame.stages')
 progress and 'frame 2' in (progress.current() or '')
 """
     )

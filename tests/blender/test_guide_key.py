@@ -12,7 +12,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.scene.facts import scene_facts
+from xrds_blender.scene.contents import scene_facts
 from xrds_blender.scene.guide_key import NotFollowed, guide_key
 from xrds_lab.studio import traps
 from xrds_lab.studio.builder import Builder

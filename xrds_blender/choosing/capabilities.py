@@ -8,7 +8,7 @@ from xrds_core.superres.weights_header import WeightsHeader, headers, read_heade
 
 from ..cycles import session
 from ..frame import denoisers, torch_folder
-from ..planning.modes import Capabilities
+from ..planning.estimates import Capabilities
 from ..planning.settings import Network
 
 

@@ -17,7 +17,7 @@ from xrds_core.errors import XRDSError
 
 from ..cycles.passes import CyclesPasses
 from ..cycles.session import has_denoiser
-from ..frame import denoisers, progress
+from ..frame import denoisers, stages
 from ..frame.networks import is_ready
 from ..frame.picture import Picture
 from ..planning import budget
@@ -88,7 +88,7 @@ def choose_for_shot(engine: Any, depsgraph: Any, request: Request) -> Chosen:
         ) as found:
             return found
     finally:
-        progress.end()
+        stages.end()
 
 
 def select(

@@ -14,8 +14,8 @@ from ..cycles.size import picture_size
 from ..internals.lifetimes import FILE
 from ..planning import budget
 from ..planning.budget import Costs
+from ..planning.estimates import SceneSettings, resolved
 from ..planning.measured import Measured, learn
-from ..planning.modes import SceneSettings, resolved
 from ..planning.settings import Denoising, Settings
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ..planning import budget, modes
-from ..planning.modes import Capabilities, Estimate
+from ..planning import budget
+from ..planning import estimates as estimating
+from ..planning.estimates import Capabilities, Estimate
 from ..planning.request import Request
 from ..planning.settings import Denoising, Mode, Settings
 from . import history
@@ -23,7 +24,7 @@ def estimates(scene: Any, settings: Settings, here: Capabilities) -> list[Estima
         return history.seconds(scene, resolved)
 
     known = history.scene_settings(scene)
-    return modes.estimates(settings, known, here, budget.shipped(), seconds)
+    return estimating.estimates(settings, known, here, budget.shipped(), seconds)
 
 
 def best_mode(scene: Any, request: Request) -> Mode:
@@ -32,7 +33,8 @@ def best_mode(scene: Any, request: Request) -> Mode:
     Whatever the denoising that is asked for at full size: that is chosen along.
     """
     settings = replace(request.settings, denoising=BEST)
-    return modes.best(estimates(scene, settings, capabilities(request.machine.weights)))
+    here = capabilities(request.machine.weights)
+    return estimating.best(estimates(scene, settings, here))
 
 
 def in_mode(request: Request, mode: Mode, scene: Any) -> Request:

@@ -75,3 +75,12 @@ class Picture:
 
         radiance, alpha = pixels[..., :3], pixels[..., 3]
         return cls(np.ascontiguousarray(radiance), np.ascontiguousarray(alpha), **rest)
+
+
+def peak_memory() -> int:
+    """The largest memory in bytes that this process has taken; 0 where not known."""
+    try:
+        import resource
+    except ImportError:  # Windows
+        return 0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024

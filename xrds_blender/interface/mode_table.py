@@ -6,7 +6,7 @@ from typing import Any
 
 from xrds_core.time_left import duration
 
-from ..planning.modes import Estimate
+from ..planning.estimates import Estimate
 from ..planning.settings import MODES, Mode
 from .paragraph import translated
 from .translations import CONTEXT

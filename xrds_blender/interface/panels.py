@@ -12,7 +12,7 @@ from ..choosing.capabilities import capabilities
 from ..choosing.modes import best_mode, estimates
 from ..internals.engine_override import ENGINE
 from ..internals.lifetimes import FILE
-from ..planning.modes import Capabilities
+from ..planning.estimates import Capabilities
 from ..planning.request import Request
 from ..planning.settings import PRESETS, Mode
 from . import (

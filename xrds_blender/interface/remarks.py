@@ -8,7 +8,7 @@ from typing import Any
 import bpy
 
 from ..choosing.capabilities import weights_headers
-from ..planning.modes import Capabilities, missing
+from ..planning.estimates import Capabilities, missing
 from ..planning.request import Request
 from ..planning.settings import MODES, Mode
 from . import support

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..frame import progress
+from ..frame import stages
 
 
 def draw(self: Any, context: Any) -> None:
     """Draw the stage into the status bar, before Blender draws its progress bar."""
-    stage = progress.current()
+    stage = stages.current()
     if stage is not None:
-        progress.show()
+        stages.show()
         self.layout.label(text=stage)

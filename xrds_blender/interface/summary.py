@@ -10,7 +10,7 @@ import bpy
 from ..choosing.history import LastRender, scene_settings
 from ..cycles.size import frame_size
 from ..planning import forecast
-from ..planning.modes import Capabilities
+from ..planning.estimates import Capabilities
 from ..planning.plan import Plan
 from ..planning.request import Request
 from ..planning.settings import Mode, Settings

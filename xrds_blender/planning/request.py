@@ -9,14 +9,7 @@ from typing import Any
 from xrds_core.errors import UsageError
 
 from .plan import SAVINGS, Facts, Plan, cycles_only, decide, full_size
-from .settings import (
-    CYCLES_DENOISING,
-    QUALITIES,
-    SCALES,
-    Denoising,
-    Mode,
-    Settings,
-)
+from .settings import CYCLES_DENOISING, QUALITIES, SCALES, Denoising, Mode, Settings
 
 _SAMPLES = 1 << 24  # the most that Cycles takes
 _RANGES = {

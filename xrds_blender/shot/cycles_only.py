@@ -8,8 +8,7 @@ from typing import Any
 from ..cycles import session
 from ..cycles.once import render_once
 from ..cycles.pass_names import COMBINED
-from ..frame.memory import peak_memory
-from ..frame.picture import Picture
+from ..frame.picture import Picture, peak_memory
 from .methods import Method, Report
 from .sampling import Sampled
 

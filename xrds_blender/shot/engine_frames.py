@@ -15,9 +15,9 @@ from xrds_core.temporal.window import Neighbourhood, Shot, Window
 
 from ..cycles import session
 from ..cycles.passes import CyclesPasses
-from ..frame import progress
+from ..frame import stages
+from ..scene.contents import requested_passes
 from ..scene.cuts import cuts
-from ..scene.facts import requested_passes
 from .methods import Method
 from .sampling import Sampled, can_continue, first_sample
 from .visiting import go_to
@@ -115,7 +115,7 @@ class EngineFrames:
             each = (time.perf_counter() - self.began) / self.count
             last = number - step if newest is None else newest
             seconds = each * ((end - last) // step + 1)
-        progress.begin_frame(number, (end - number) // step, seconds)
+        stages.begin_frame(number, (end - number) // step, seconds)
 
     def _load(self, number: int) -> Sampled:
         """Sample a frame, and keep its passes where others overwrite them."""

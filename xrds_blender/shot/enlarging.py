@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from xrds_core.arrays import Array
-from xrds_core.errors import OutOfMemory, WeightsError
+from xrds_core.errors import OutOfMemory, WeightsError, XRDSError
 
 from ..cycles.colour import converted, to_rec709, working_space
 from ..cycles.rendered import Beauty, Guides
-from ..frame.cover import cover
+from ..frame.denoisers import load_denoiser
 from ..frame.picture import NetworkFailed
-from ..planning.request import Request
+from ..planning.request import Machine, Request
 
 if TYPE_CHECKING:
     from xrds_core import Upscaled, Upscaler
@@ -57,7 +57,7 @@ def enlarge(
             placed(guides.normal),
             noisy=seen(beauty.noisy),
             guide_radiance=placed(seen(guides.radiance)),
-            guide_alpha=placed(cover(guides, request.machine)),
+            guide_alpha=placed(clean_alpha(guides, request.machine)),
             guide_samples=guides.samples,
             exposure=exposure,
             memory_limit=request.machine.memory_limit,
@@ -107,3 +107,30 @@ def _bilinear(
     rows, columns = offset
     large = to_picture(upsample_bilinear(to_planes(low), scale))
     return large[rows : rows + shape[0], columns : columns + shape[1]]
+
+
+def clean_alpha(guides: Guides, machine: Machine) -> Array:
+    """Alpha (H, W) of the guides, denoised; as it is where nothing can denoise.
+
+    Alpha is the share of samples that met something, so of four samples silhouettes
+    are ragged and glass is mottled. The denoiser takes alpha for a grey picture. Where
+    it is 0 or 1 all around a pixel it stays so.
+    """
+    alpha = np.clip(guides.alpha, 0.0, 1.0)
+    if guides.samples is None or alpha.min() >= 1.0:
+        return guides.alpha
+    try:
+        denoiser = load_denoiser("fast", machine)
+    except XRDSError:
+        return guides.alpha
+    grey = np.repeat(alpha[..., None], 3, axis=2)
+    smooth = np.clip(denoiser(grey).radiance[..., :3].mean(-1), 0.0, 1.0)
+    return np.where(_is_even(alpha), alpha, smooth).astype(np.float32)
+
+
+def _is_even(alpha: Array) -> Array:
+    """Where a pixel and its eight neighbours are all 0 or all 1."""
+    around = np.pad(alpha, 1, mode="edge")
+    rows, columns = alpha.shape
+    parts = [around[y : y + rows, x : x + columns] for y in range(3) for x in range(3)]
+    return (np.min(parts, axis=0) >= 1.0) | (np.max(parts, axis=0) <= 0.0)

@@ -8,9 +8,9 @@ from dataclasses import asdict
 from typing import Any
 
 from ..choosing.chosen import Chosen, chosen
-from ..choosing.facts import find_facts
+from ..choosing.plan_facts import find_facts
 from ..frame.rendering import call_engine
-from ..planning.lending import lending
+from ..planning.plan import neighbours
 from ..planning.request import Request
 from ..scene.cuts import cuts
 from .sampling import has_neighbours
@@ -45,6 +45,6 @@ def _told(
     facts = find_facts(depsgraph, request.settings)
     decisions = request.plan(facts).decisions
     if radius and len(shot) > 1:
-        decisions += lending(facts, radius, cuts(scene, shot))
+        decisions += neighbours(facts, radius, cuts(scene, shot))
     decisions = choice.all_decisions(decisions)
     return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}

@@ -16,8 +16,7 @@ from xrds_core.temporal.vectors import Movement
 
 from ..cycles.samples import Samples
 from ..frame.denoisers import load_denoiser
-from ..frame.memory import peak_memory
-from ..frame.picture import Picture, Temporal
+from ..frame.picture import Picture, Temporal, peak_memory
 from ..planning.plan import Decision, full_size
 from ..planning.request import Request
 from ..planning.settings import Denoising, Settings

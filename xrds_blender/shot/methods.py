@@ -11,7 +11,7 @@ from typing import Any
 
 from xrds_core.arrays import Array
 
-from ..frame import progress
+from ..frame import stages
 from ..frame.picture import Picture
 from ..planning.request import Request
 from .sampling import Sampled
@@ -26,7 +26,7 @@ class Method:
     Raises XRDSError, when it is made, where what it needs cannot be loaded.
     """
 
-    stages = (progress.DENOISE, 2, 2)
+    stages = (stages.DENOISE, 2, 2)
     """The last stage: its name, its number and how many there are."""
 
     def __init__(self, request: Request) -> None:
@@ -54,8 +54,8 @@ class Method:
 
     def begin_finishing(self, engine: Any) -> Report:
         """Show the last stage; returns what shows how far it is."""
-        progress.begin(engine, *self.stages)
-        return progress.reporter(engine)
+        stages.begin(engine, *self.last_stage)
+        return stages.reporter(engine)
 
     def finish(
         self,

@@ -21,7 +21,7 @@ from xrds_core.errors import Cancelled
 from ..choosing import history
 from ..choosing.chosen import Chosen, choose_for_shot, chosen
 from ..cycles import session
-from ..frame import progress, torch_folder
+from ..frame import stages, torch_folder
 from ..frame.picture import NetworkFailed, Picture
 from ..frame.rendering import call_engine
 from ..internals.lifetimes import RENDER_JOB
@@ -88,7 +88,7 @@ def render_frame(engine: Any, depsgraph: Any, request: Request) -> Picture:
     if engine.is_animation:
         scene = depsgraph.scene_eval
         left = (scene.frame_end - scene.frame_current) // scene.frame_step
-        progress.begin_frame(scene.frame_current, left)
+        stages.begin_frame(scene.frame_current, left)
         if not _renders_single_frames() and has_neighbours(scene, request):
             return _render_in_animation(engine, depsgraph, request)
     return render_alone(engine, depsgraph, request)
@@ -110,12 +110,12 @@ def render_alone(
     try:
         with chosen(engine, depsgraph, alone, start) as found:
             if found.request.settings.is_enlarged and torch_folder.loaded() is None:
-                progress.begin(engine, progress.LOADING, 0)  # which takes some seconds
+                stages.begin(engine, stages.LOADING, 0)  # which takes some seconds
             method = method_of(found)  # first: missing weights are to cost no render
             own = method.sample(engine, depsgraph)
             picture = _finish(engine, layer.name, method, own)
     finally:
-        progress.end()
+        stages.end()
     return _told(found, picture, layer, start)
 
 
@@ -142,7 +142,7 @@ def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Pictu
         others = list(found.neighbours.values())
         picture = _finish(engine, key[1], frames.method, found.own, others)
     finally:
-        progress.end()
+        stages.end()
     return _told(animation.chosen, picture, layer, start)
 
 
@@ -178,7 +178,7 @@ def _finish(
     started = time.perf_counter()
     combined = {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
     _write(engine, layer_name, method, own, combined)
-    seconds = dict.fromkeys(progress.STAGES, 0.0) | own.seconds
+    seconds = dict.fromkeys(stages.STAGES, 0.0) | own.seconds
     for stage in {stage for p in pictures.values() for stage in p.seconds}:
         seconds[stage] += sum(p.seconds.get(stage, 0.0) for p in pictures.values())
     seconds["write"] = time.perf_counter() - started

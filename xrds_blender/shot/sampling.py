@@ -17,9 +17,9 @@ from ..cycles.halves import sample_halves, sample_motion
 from ..cycles.samples import COUNTS, GEOMETRY, LATE_DEPTH, Samples, sample_layer
 from ..cycles.settings import has_subsets
 from ..cycles.view import cameras_of, can_track
-from ..frame import denoisers, progress
+from ..frame import denoisers, stages
 from ..planning.request import Request
-from ..scene.facts import scene_facts, shapes_move, stands_still
+from ..scene.contents import scene_facts, shapes_move, stands_still
 from .stopping import keep_samples
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
@@ -200,7 +200,7 @@ def _alone(
 ) -> tuple[dict[str, Samples], dict[str, float]]:
     """Render a frame without neighbours, as `noisy_frame` does; seed as in the file."""
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
-    progress.begin(engine, progress.SAMPLES, 1, 2)
+    stages.begin(engine, stages.SAMPLES, 1, 2)
     try:
         found, clock = sample_layer(
             engine, depsgraph, samples=request.settings.samples, seed=request.seed
@@ -222,7 +222,7 @@ def noisy_frame(
     """
     how = sampling_of(engine, depsgraph, request, place)
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
-    progress.begin(engine, how.named(progress.SAMPLES), 1, 2)
+    stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
     try:
         if how.has_halves:
             return _frames_of_halves(engine, depsgraph, how)

@@ -13,7 +13,7 @@ from typing import Any
 from xrds_core.temporal.window import Shot, Window, place_of
 
 from ..choosing.chosen import Chosen, choose_for_shot
-from ..frame import progress
+from ..frame import stages
 from ..frame.picture import Picture
 from ..frame.rendering import call_engine
 from ..planning.request import Request
@@ -66,7 +66,7 @@ def render_shot(
         if method.lacks(own, others):
             own = _sample(scene, method, frames, number)
         picture = method.finish(own, others, view)
-        seconds = dict.fromkeys(progress.STAGES, 0.0) | own.seconds | picture.seconds
+        seconds = dict.fromkeys(stages.STAGES, 0.0) | own.seconds | picture.seconds
         seconds["total"] = sum(seconds.values())
         yield number, chosen.told(replace(picture, seconds=seconds))
 
@@ -107,6 +107,6 @@ def _sample(
         try:
             return method.sample(engine, depsgraph, place, between)
         finally:
-            progress.end()
+            stages.end()
 
     return call_engine(scene, work)

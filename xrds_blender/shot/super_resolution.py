@@ -21,25 +21,24 @@ from xrds_core.temporal.stand_in import stand_in
 from xrds_core.temporal.takes import same_take
 from xrds_core.temporal.vectors import Movement
 
-from ..choosing.facts import find_facts
+from ..choosing.plan_facts import find_facts
 from ..cycles import live
 from ..cycles.low_samples import LowPlace, LowSamples
 from ..cycles.pass_names import COMBINED, is_light
 from ..cycles.passes import CyclesPasses
 from ..cycles.rendered import Beauty, Guides
 from ..cycles.view import low_view
-from ..frame import progress
+from ..frame import stages
 from ..frame.denoisers import in_process, load_denoiser
 from ..frame.guide_cache import GuideName
 from ..frame.guides import GuideSource
-from ..frame.memory import peak_memory
 from ..frame.networks import load_upscaler
-from ..frame.picture import NetworkFailed, Picture, Temporal
+from ..frame.picture import NetworkFailed, Picture, Temporal, peak_memory
 from ..planning import plan
 from ..planning.plan import GUIDE_CACHE, Decision, Facts, Plan
 from ..planning.request import Machine, Request
 from ..planning.settings import Settings
-from ..scene.facts import shapes_move
+from ..scene.contents import shapes_move
 from .enlarging import enlarge, enlarged, enlarged_lights
 from .full_size import accumulation, temporal
 from .methods import Method, Report
@@ -107,7 +106,7 @@ class View:
 class SuperResolution(Method):
     """Light at low resolution, guides at full size, and the network."""
 
-    stages = (progress.NETWORK, 3, 3)
+    stages = (stages.NETWORK, 3, 3)
 
     def __init__(self, request: Request) -> None:
         super().__init__(request)
@@ -284,7 +283,7 @@ class _Renders:
 
     def _beauties(self) -> dict[str, Beauty]:
         """The denoised low-resolution light by view."""
-        self._begin(progress.LOW, 1)
+        self._begin(stages.LOW, 1)
         settings = self.settings
         beauties = self.passes.beauties(
             settings.scale,
@@ -301,7 +300,7 @@ class _Renders:
 
     def _noisy_light(self) -> dict[str, LowSamples]:
         """The noisy low-resolution light by view."""
-        self._begin(progress.LOW, 1)
+        self._begin(stages.LOW, 1)
         how, settings = self.how, self.settings
         portion = how.portion(how.count)
         return self.passes.low_samples(
@@ -374,7 +373,7 @@ class _Renders:
     def _guides(
         self, source: GuideSource, light: dict[str, Beauty]
     ) -> dict[str, Guides]:
-        self._begin(progress.GUIDES, 2)
+        self._begin(stages.GUIDES, 2)
         return source.guides(light)
 
     def _stored(self, guides: Guides, view: str) -> Stored:
@@ -397,7 +396,7 @@ class _Renders:
         return store(frame, np.float16)
 
     def _begin(self, stage: str, number: int) -> None:
-        progress.begin(self.engine, self.how.named(stage), number)
+        stages.begin(self.engine, self.how.named(stage), number)
 
 
 def _with_decision(views: dict[str, View], decision: Decision) -> dict[str, View]:
@@ -432,8 +431,8 @@ def _stored_light(how: Sampling, scale: int, low: LowSamples, view: str) -> Stor
 
 def _summed(rendered: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Seconds by stage of all renders together."""
-    stages = {stage for each in rendered for stage in each}
-    return {s: sum(each.get(s, 0.0) for each in rendered) for s in stages}
+    names = {stage for each in rendered for stage in each}
+    return {s: sum(each.get(s, 0.0) for each in rendered) for s in names}
 
 
 # --- Finishing -----------------------------------------------------------------------

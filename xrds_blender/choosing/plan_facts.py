@@ -11,7 +11,7 @@ from ..cycles.view import can_track
 from ..frame import denoisers
 from ..planning.facts import Facts, SceneFacts
 from ..planning.settings import Settings
-from ..scene.facts import scene_facts
+from ..scene.contents import scene_facts
 
 # Core-seconds of a million guide samples with nothing left out: docs/performance.md.
 CORE_SECONDS = 4.8
