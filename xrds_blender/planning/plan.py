@@ -304,7 +304,8 @@ def _in_part(scene: SceneFacts) -> tuple[Decision, ...]:
     causes = {
         "motion blur": (
             scene.motion_blur,
-            "Cycles gives no vectors with motion blur: what moves is reused where it fits",
+            "Cycles gives no vectors with motion blur: samples of moving things are rarely "
+            "reused",
         ),
         "depth of field": (scene.depth_of_field, "blurred pixels mix many depths"),
         "volumes": (

@@ -112,8 +112,9 @@ class Settings:
 
     `samples` per pixel, low-resolution ones where a network enlarges; None leaves
     Cycles' own. `denoising` is ours or Cycles'; where Cycles is alone, ours leaves what
-    the scene has, and None is no denoising at all. `preset` names the network and `guide_samples` are per full-size pixel: both for enlargements.
-    `temporal_radius` frames before and after give their samples, in a shot.
+    the scene has, and None is no denoising at all. `preset` names the network and
+    `guide_samples` are per full-size pixel: both are for enlargements. In a shot,
+    samples of `temporal_radius` frames before and after are reused.
     """
 
     mode: Mode = Mode.X2

@@ -26,7 +26,7 @@ class Method:
     Raises XRDSError, when it is made, where what it needs cannot be loaded.
     """
 
-    stages = (stages.DENOISE, 2, 2)
+    last_stage = (stages.DENOISE, 2, 2)
     """The last stage: its name, its number and how many there are."""
 
     def __init__(self, request: Request) -> None:

@@ -106,7 +106,7 @@ class View:
 class SuperResolution(Method):
     """Light at low resolution, guides at full size, and the network."""
 
-    stages = (stages.NETWORK, 3, 3)
+    last_stage = (stages.NETWORK, 3, 3)
 
     def __init__(self, request: Request) -> None:
         super().__init__(request)
