@@ -1,1 +1,1 @@
-"""Which mode, quality and samples: what is asked for becomes what is rendered."""
+"""Which mode, quality and samples: what is requested becomes what is rendered."""

@@ -53,7 +53,7 @@ class Chosen:
         alone = self.decisions and self.request.settings.is_cycles_only
         return self.decisions if alone else (*self.decisions, *rest)
 
-    def told(self, picture: Picture) -> Picture:
+    def described(self, picture: Picture) -> Picture:
         """A picture with what it was rendered by."""
         settings = picture.settings or self.request.settings
         return replace(

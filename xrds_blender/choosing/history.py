@@ -1,6 +1,6 @@
 """The last renders of each scene: what they were, and what they tell of the next.
 
-Kept for as long as Blender runs and the file is open, for the panel to show.
+Remembered for as long as Blender runs and the file is open, for the panel to show.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _denoising(scene: Any) -> Denoising | None:
     return Denoising(f"{cycles.denoising_quality}-{cycles.denoising_prefilter}")
 
 
-def keep(layer: Layer, settings: Settings, seconds: Mapping[str, float]) -> None:
+def remember(layer: Layer, settings: Settings, seconds: Mapping[str, float]) -> None:
     """Remember a finished render."""
     settings, seconds = resolved(settings, layer.settings), dict(seconds)
     known = FILE.of(_Known)

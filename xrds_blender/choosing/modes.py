@@ -30,7 +30,7 @@ def estimates(scene: Any, settings: Settings, here: Capabilities) -> list[Estima
 def best_mode(scene: Any, request: Request) -> Mode:
     """The mode with the least error expected at the scene's present samples.
 
-    Whatever the denoising that is asked for at full size: that is chosen along.
+    Whatever the denoising that is requested at full size: it is chosen too.
     """
     settings = replace(request.settings, denoising=BEST)
     here = capabilities(request.machine.weights)

@@ -33,7 +33,7 @@ def join_facts(scene: Any, settings: Settings, scene_facts: SceneFacts) -> Facts
         height=height,
         max_bounces=scene.cycles.max_bounces,
         has_denoiser=session.has_denoiser() or denoisers.is_there(),
-        lends=camera is None or can_track(scene),
+        reprojects=camera is None or can_track(scene),
         exact_camera=camera is None or low_camera.is_exact(camera.data),
         guide_samples=settings.guide_samples,
         scene=scene_facts,

@@ -43,8 +43,8 @@ def _cameras(options: argparse.Namespace) -> dict[str, Any]:
     scene = open_scene(options.scene, choice_of(options))
     whole = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
     cameras = shot_cameras(scene, options.frames or whole)
-    told = {str(number): to_json(camera) for number, camera in cameras.items()}
-    write_json(options.out, told)
+    entries = {str(number): to_json(camera) for number, camera in cameras.items()}
+    write_json(options.out, entries)
     return {"output": str(options.out), "frames": list(cameras)}
 
 

@@ -57,8 +57,8 @@ def status_with_json(work: Callable[[], Any], check: Check | None = None) -> int
     """
     with streams.stdout_to_stderr():
         end = _ended(work)
-    told = end.value if end.status == DONE else _error(end.line, end.status)
-    print(json.dumps(told, indent=1), flush=True)
+    result = end.value if end.status == DONE else _error(end.line, end.status)
+    print(json.dumps(result, indent=1), flush=True)
     return _checked(end, check)
 
 
@@ -73,7 +73,7 @@ def _error(line: str, status: int) -> dict[str, Any]:
 
 
 def _ended(work: Callable[[], Any]) -> _End:
-    """Run `work`; an error is told on stderr."""
+    """Run `work`; an error is reported on stderr."""
     try:
         return _End(value=work())
     except (KeyboardInterrupt, Cancelled):
@@ -124,11 +124,11 @@ def end_at_once_by_signals() -> None:
     woken, wake = os.pipe()
     os.set_blocking(wake, False)
     heeded = {}
-    for name, told in _SIGNALS.items():
+    for name, text in _SIGNALS.items():
         number = getattr(signal, name, None)  # Windows has not all
         if number and signal.getsignal(number) != signal.SIG_IGN:  # as nohup asks
             signal.signal(number, lambda *_: None)
-            heeded[int(number)] = told
+            heeded[int(number)] = text
     signal.set_wakeup_fd(wake, warn_on_full_buffer=False)
 
     def wait() -> None:

@@ -36,7 +36,7 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         "--temporal-radius",
         type=arguments.whole,
         metavar="N",
-        help="frames before and after that lend their samples (default: 4)",
+        help="neighbour frames on each side whose samples are reused (default: 4)",
     )
     add(
         "--denoise",
@@ -73,7 +73,7 @@ def _add_reading(command: argparse.ArgumentParser) -> None:
     group = command.add_argument_group("passes, where they have unusual names")
     for name in PASSES:
         group.add_argument(f"--{name}", metavar="NAME", help=_PASS_HELP[name])
-    add = command.add_argument_group("what files may not tell").add_argument
+    add = command.add_argument_group("what files may not say").add_argument
     add("--camera", type=Path, metavar="FILE.json", help="cameras, by frame number")
     add(
         "--samples",
@@ -141,10 +141,10 @@ def _lines(result: dict[str, Any]) -> list[str]:
     from xrds_core.holes import told
 
     done = [entry["frame"] for entry in result["frames"]]
-    ways = {"denoised": done, "skipped, complete": result["kept"]}
+    outcomes = {"denoised": done, "skipped, complete": result["kept"]}
     lines = [
         f"{result['output']}: frames {in_words(numbers)} {what}"
-        for what, numbers in ways.items()
+        for what, numbers in outcomes.items()
         if numbers
     ]
     return lines + [
@@ -155,7 +155,7 @@ def _lines(result: dict[str, Any]) -> list[str]:
 
 
 def _check(result: dict[str, Any]) -> None:
-    """Fail, after all that could be done, where a frame asked for is not there."""
+    """Fail, after all that could be done, where a requested frame is missing."""
     missing = [each["frame"] for each in result["left_out"]]
     if missing:
         raise XRDSError(

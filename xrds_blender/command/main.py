@@ -65,7 +65,7 @@ def _refusal(error: UsageError) -> Callable[[argparse.Namespace], NoReturn]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Raises wrong usage, so that it is told like every other error."""
+    """Raises wrong usage, so that it is reported like every other error."""
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message}; see {self.prog} --help")
@@ -121,10 +121,10 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
             help="print JSON on stdout and everything else on stderr",
         )
     parser.epilog = apart.listing()
-    asked = words[0] if words else ""
-    if asked in LABORATORY and asked not in commands.choices:
+    command = words[0] if words else ""
+    if command in LABORATORY and command not in commands.choices:
         raise UsageError(
-            f"{asked} belongs to the laboratory, which is not installed: "
+            f"{command} belongs to the laboratory, which is not installed: "
             "run pip install ./xrds_lab in a source tree of XRDS"
         )
     return parser

@@ -36,7 +36,7 @@ def add_request(command: argparse.ArgumentParser) -> None:
         "--time-budget",
         type=arguments.factor,
         metavar="SECONDS",
-        help="time for a frame; XRDS chooses the best settings that keep to it",
+        help="time for a frame; XRDS chooses the best settings that stay within it",
     )
     size.add_argument(
         "--quality",
@@ -59,7 +59,7 @@ def add_request(command: argparse.ArgumentParser) -> None:
         "--temporal-radius",
         type=arguments.whole,
         metavar="N",
-        help="frames before and after that lend their samples (default: 4 for several "
+        help="neighbour frames on each side whose samples are reused (default: 4 for several "
         "frames)",
     )
     add(
@@ -75,7 +75,9 @@ def add_request(command: argparse.ArgumentParser) -> None:
         default=0,
         help="samples up to which repeated renders improve the cached guides",
     )
-    add("--keep-all", action="store_true", help="skip nothing that could be skipped")
+    add(
+        "--skip-nothing", action="store_true", help="skip nothing that could be skipped"
+    )
     add(
         "--seed",
         type=arguments.whole,
@@ -199,27 +201,27 @@ def request_of(options: argparse.Namespace) -> Request:
         threads=options.threads,
         denoise=options.denoise,
         temporal_radius=_temporal_radius(options),
-        savings=() if options.keep_all else SAVINGS,
+        savings=() if options.skip_nothing else SAVINGS,
         guide_cache=options.guide_cache,
         guide_limit=options.guide_limit,
     )
 
 
 def _temporal_radius(options: argparse.Namespace) -> int:
-    """The radius asked for; by default one that pays, where frames can lend."""
-    asked: int | None = options.temporal_radius
-    hindrance = _hindrance(options)
-    if asked is not None:
-        if asked and hindrance:
-            raise UsageError(f"--temporal-radius cannot be had with {hindrance}")
-        return asked
+    """The requested radius; by default one that pays, where frames can be reused."""
+    requested: int | None = options.temporal_radius
+    incompatible = _incompatible(options)
+    if requested is not None:
+        if requested and incompatible:
+            raise UsageError(f"--temporal-radius cannot be had with {incompatible}")
+        return requested
     several = len(getattr(options, "frames", None) or ()) > 1
-    several |= getattr(options, "keep_samples", None) is not None
-    return RADIUS if several and not hindrance else 0
+    several |= getattr(options, "sample_cache", None) is not None
+    return RADIUS if several and not incompatible else 0
 
 
-def _hindrance(options: argparse.Namespace) -> str:
-    """The option under which frames cannot lend to each other; empty if they can."""
+def _incompatible(options: argparse.Namespace) -> str:
+    """The option that rules out reuse between frames; empty if none does."""
     if options.plain:
         return "--plain: Cycles renders each frame alone"
     return ""

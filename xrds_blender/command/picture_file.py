@@ -115,11 +115,11 @@ def _png_settings(scene: Any) -> Iterator[None]:
         "color_mode": "RGBA" if scene.render.film_transparent else "RGB",
     }
     wanted = {name: value for name, value in wanted.items() if hasattr(settings, name)}
-    kept = {name: getattr(settings, name) for name in wanted}
+    old = {name: getattr(settings, name) for name in wanted}
     try:
         for name, value in wanted.items():
             setattr(settings, name, value)
         yield
     finally:
-        for name, value in kept.items():
+        for name, value in old.items():
             setattr(settings, name, value)

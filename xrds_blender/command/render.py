@@ -23,7 +23,7 @@ def add_render(commands: Any) -> argparse.ArgumentParser:
     add("--explain", action="store_true", help="print the plan without rendering")
     add("--resume", action="store_true", help="skip frames whose files are complete")
     add(
-        "--keep-samples",
+        "--sample-cache",
         type=Path,
         metavar="DIR",
         help="folder for frames' samples, which are not rendered again then; without "
@@ -59,7 +59,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
     if options.explain:
         return _plan(options)
     need_blender("render")
-    if options.out is None and options.keep_samples is None:
+    if options.out is None and options.sample_cache is None:
         raise UsageError("name the output with -o, or ask for the plan with --explain")
     from .render_file import render_file
 
@@ -71,7 +71,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
         choice=choice_of(options),
         encoding=encoding_of(options),
         resume=options.resume,
-        keep_samples=options.keep_samples,
+        sample_cache=options.sample_cache,
     )
 
 
@@ -111,7 +111,7 @@ def _lines(result: dict[str, Any]) -> list[str]:
 
 
 def _outcome(decision: dict[str, Any]) -> str:
-    """A decision after a render: with its reason where this tells what was found."""
-    told = _decision(decision)
+    """A decision after a render: with its reason where this says what was found."""
+    line = _decision(decision)
     found = decision["decision"] == GUIDE_CACHE
-    return f"{told}: {decision['reason']}" if found else told
+    return f"{line}: {decision['reason']}" if found else line

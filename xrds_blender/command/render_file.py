@@ -40,7 +40,7 @@ def render_file(
     choice: SceneChoice = AS_SAVED,
     encoding: Encoding = FLOAT_ZIP,
     resume: bool = False,
-    keep_samples: Path | None = None,
+    sample_cache: Path | None = None,
 ) -> dict[str, Any]:
     """Render frames of a .blend file and return what `xrds render --json` prints.
 
@@ -53,7 +53,7 @@ def render_file(
         choice: what comes in the place of what the file was saved with.
         encoding: of .exr files.
         resume: leave frames as they are that lie there whole and of their size.
-        keep_samples: a folder for the samples of every frame, at scale 1; those that
+        sample_cache: a folder for the samples of every frame, at scale 1; those that
             it has already are read, not rendered.
 
     Raises:
@@ -62,18 +62,18 @@ def render_file(
             cannot be written, NetworkFailed; both name the file that holds what was
             rendered, and the frames before are complete.
     """
-    if keep_samples is not None:
-        _check_keeping(request)
+    if sample_cache is not None:
+        _check_cache(request)
     if output is not None:
         picture_file.check_output(output, frames or [0])
     scene = open_scene(path, choice)
     _check_libraries(request)
     numbers = list(frames or [scene.frame_current])
     size = picture_size(scene.render)
-    cache = keep_samples and _cache(scene, request, keep_samples)
+    cache = sample_cache and _cache(scene, request, sample_cache)
 
     def is_done(number: int) -> bool:
-        # asked anew for each: another render may be writing the same frames
+        # checked anew for each: another render may be writing the same frames
         return resume and is_whole(frame_path(str(output), number), size)
 
     written, last = [], None
@@ -81,7 +81,7 @@ def render_file(
         for number, last in _pictures(scene, request, output, numbers, is_done, cache):
             written.append(_write(scene, output, number, last, request, encoding))
     if cache:
-        _keep_others(scene, request, numbers, cache)
+        _cache_others(scene, request, numbers, cache)
     settings = (last and last.settings) or request.settings
     rendered = {entry["frame"] for entry in written}
     return {
@@ -92,7 +92,7 @@ def render_file(
         "device": last.device if last else "",
         "frames": written,
         "kept": [n for n in numbers if n not in rendered] if output else [],
-        "samples": cache and cache.told(numbers),
+        "samples": cache and cache.report(numbers),
         "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
     }
 
@@ -122,42 +122,42 @@ def _pictures(
         try:
             yield from render_shot(scene, request, numbers, is_done, cache)
         except NetworkFailed as error:
-            raise _kept(error, scene, output, error.number or 0) from error
+            raise _network_error(error, scene, output, error.number or 0) from error
         return
     for number in numbers:
         if not is_done(number):
             yield number, _picture(scene, request, output, number)
 
 
-def _check_keeping(request: Request) -> None:
-    """Raise UsageError for a request that has no samples to keep."""
+def _check_cache(request: Request) -> None:
+    """Raise UsageError for a request that has no samples to cache."""
     if request.goal is not None or request.settings.mode is not Mode.FULL_SIZE:
         raise UsageError(
-            "--keep-samples needs --scale 1, without --plain, --time-budget and "
+            "--sample-cache needs --scale 1, without --plain, --time-budget and "
             "--quality"
         )
     if not request.settings.temporal_radius:
-        raise UsageError("--keep-samples needs a --temporal-radius of 1 or more")
+        raise UsageError("--sample-cache needs a --temporal-radius of 1 or more")
 
 
 def _cache(scene: Any, request: Request, folder: Path) -> SampleCache:
     """The cache of samples; raises UsageError where no frame could use them."""
     if not has_neighbours(scene, request):
         raise UsageError(
-            "frames of such a panoramic camera lend nothing to each other: leave out "
-            "--keep-samples"
+            "frames of such a panoramic camera cannot reuse samples: leave out "
+            "--sample-cache"
         )
     return cache_of(scene, request, folder, warn)
 
 
-def _keep_others(
+def _cache_others(
     scene: Any, request: Request, numbers: Sequence[int], cache: SampleCache
 ) -> None:
     """Render the samples of frames that no picture has asked for."""
     clock = Clock()
     for number in cache_samples(scene, request, numbers, cache):
         left = sum(n > number for n in numbers)
-        warn(f"frame {number}: samples kept, {clock.lap(left)}")
+        warn(f"frame {number}: samples cached, {clock.lap(left)}")
 
 
 def _picture(scene: Any, request: Request, output: str, number: int) -> Picture:
@@ -165,14 +165,16 @@ def _picture(scene: Any, request: Request, output: str, number: int) -> Picture:
     try:
         return render_scene(scene, request)
     except NetworkFailed as error:
-        raise _kept(error, scene, output, number) from error
+        raise _network_error(error, scene, output, number) from error
 
 
-def _kept(error: NetworkFailed, scene: Any, output: str, number: int) -> XRDSError:
+def _network_error(
+    error: NetworkFailed, scene: Any, output: str, number: int
+) -> XRDSError:
     """The error that ends the command, with what was rendered in a file."""
     target = frame_path(output, number)
     low = target.with_stem(f"{target.stem}_low")
-    place = _keep(low, error.radiance, error.alpha, scene)
+    place = _save_aside(low, error.radiance, error.alpha, scene)
     return XRDSError(f"frame {number}: {error}, {place}")
 
 
@@ -195,7 +197,7 @@ def _write(
         pixels = picture.radiance, picture.alpha
         picture_file.save(target, *pixels, scene, encoding, metadata)
     except PictureError as error:
-        place = _keep_elsewhere(target, picture.radiance, picture.alpha, scene)
+        place = _save_elsewhere(target, picture.radiance, picture.alpha, scene)
         raise PictureError(f"{error}; the frame was {place}") from error
     written = time.perf_counter() - start
     seconds = dict(picture.seconds)
@@ -210,16 +212,16 @@ def _write(
     }
 
 
-def _keep(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
+def _save_aside(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
     """Write what was rendered; say where, to end an error's line."""
     try:
         picture_file.save(target, radiance, alpha, scene)
     except PictureError:
-        return _keep_elsewhere(target, radiance, alpha, scene)
+        return _save_elsewhere(target, radiance, alpha, scene)
     return f"saved as {target}"
 
 
-def _keep_elsewhere(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
+def _save_elsewhere(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:
     """Write into the temporary folder what cannot be written in place."""
     try:
         place = Path(tempfile.mkdtemp(prefix="xrds-")) / target.name

@@ -34,7 +34,7 @@ def open_scene(path: Path, choice: SceneChoice = AS_SAVED) -> Any:
     """Open a .blend file and return its scene, ready to render.
 
     Whatever Blender has open is replaced. Python in a file that is not trusted is left
-    alone, which a line on stderr tells.
+    alone, which a line on stderr reports.
 
     Raises SceneError if there is no such file, Blender cannot read it, it has nothing
     of a chosen name, or no camera.
@@ -55,7 +55,7 @@ def open_scene(path: Path, choice: SceneChoice = AS_SAVED) -> Any:
     _apply(choice, scene, path)
     if scene.camera is None:
         raise SceneError(f"{path} has no camera in scene {scene.name!r}; add one")
-    _tell_what_did_not_run(scene, path)
+    _report_what_did_not_run(scene, path)
     return scene
 
 
@@ -77,14 +77,14 @@ def _apply(choice: SceneChoice, scene: Any, path: Path) -> None:
 
 
 def _named(kind: str, name: str, known: Any, path: Path) -> Any:
-    """The entry of that name; raises SceneError, telling the names that there are."""
+    """The entry of that name; raises SceneError, with the names that there are."""
     if name not in known:
         names = ", ".join(known.keys()) or "none"
         raise SceneError(f"{path} has no {kind} {name!r}; there are: {names}")
     return known[name]
 
 
-def _tell_what_did_not_run(scene: Any, path: Path) -> None:
+def _report_what_did_not_run(scene: Any, path: Path) -> None:
     """Say on stderr which Python of the file Blender did not run, if any."""
     import bpy
 

@@ -36,13 +36,13 @@ def prepare() -> None:
 
     A closed one would give its number to the next file that is opened, and Cycles would
     print into that. As in GNU's tools the null device comes in its place, opened the
-    other way round so that writing still fails and is told.
+    other way round so that writing still fails and is reported.
     """
-    for number, way in ((0, os.O_WRONLY), (1, os.O_RDONLY), (2, os.O_RDONLY)):
+    for number, mode in ((0, os.O_WRONLY), (1, os.O_RDONLY), (2, os.O_RDONLY)):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, way)  # takes the lowest number that is free
+            os.open(os.devnull, mode)  # takes the lowest number that is free
     sys.stdout, sys.stderr = (
         io.TextIOWrapper(
             io.BufferedWriter(_Stream(number, "w", closefd=False)),
@@ -103,10 +103,10 @@ def write_at_once(text: str, result: str) -> None:
 def _moved() -> Iterator[int]:
     """Yield a copy of stdout's descriptor, which is put back at the end."""
     flush_all()
-    kept = os.dup(1)
+    saved = os.dup(1)
     try:
-        yield kept
+        yield saved
     finally:
         flush_all()
-        os.dup2(kept, 1)
-        os.close(kept)
+        os.dup2(saved, 1)
+        os.close(saved)

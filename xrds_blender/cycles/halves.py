@@ -1,4 +1,4 @@
-"""Two halves of a frame's samples out of one kept Cycles session.
+"""Two halves of a frame's samples out of one Cycles session.
 
 They are two parts of one sample sequence, so their mean is what one render of all
 samples gives, and the scene is synced once. The result then holds the means of both.

@@ -11,8 +11,12 @@ SAMPLE_COUNT = "Debug Sample Count"
 # from the low-resolution render.
 _LIGHTS = ("Diffuse", "Glossy", "Transmission", "Volume")
 LIGHT_PASSES = frozenset(
-    [f"{light} {way}" for light in _LIGHTS for way in ("Direct", "Indirect")]
-    + [f"{kind}{way}" for kind in ("Diff", "Gloss", "Trans") for way in ("Dir", "Ind")]
+    [f"{light} {bounce}" for light in _LIGHTS for bounce in ("Direct", "Indirect")]
+    + [
+        f"{kind}{bounce}"
+        for kind in ("Diff", "Gloss", "Trans")
+        for bounce in ("Dir", "Ind")
+    ]
     + ["VolumeDir", "VolumeInd", "AO", "Ambient Occlusion"]
     + ["Shadow Catcher", "Noisy Shadow Catcher", "Noisy Image"]
 )

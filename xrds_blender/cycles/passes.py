@@ -216,9 +216,9 @@ class CyclesPasses(LayerSession):
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             self._run_low(borrowed, grid, exact=False)
         window = grid.rendered(self._size)
-        kept = [self._radiance(view, False)[..., 3:] for view in self.views]
-        kept += [pixels for _, pixels in sorted(self.data_passes().items())]
-        values = [self._read_corner(pixels, window).ravel() for pixels in kept]
+        found = [self._radiance(view, False)[..., 3:] for view in self.views]
+        found += [pixels for _, pixels in sorted(self.data_passes().items())]
+        values = [self._read_corner(pixels, window).ravel() for pixels in found]
         seconds = time.perf_counter() - started
         return Probe(np.concatenate(values), window.width, window.height, seconds)
 

@@ -26,12 +26,12 @@ from .pass_names import (
 )
 
 GEOMETRY = ((FIRST_HIT, "Z"), (MOTION, "XYZW"))
-"""Passes that tell where a pixel was in another frame."""
+"""Passes for reprojection into another frame."""
 LATE_DEPTH = (DEPTH, "Z")
 """In the place of the first hit's depth where a sequence is continued: that one is
 written by its first sample alone."""
 COUNTS = (SAMPLE_COUNT, "X")
-"""Pass that tells how many samples each pixel took, where Cycles decides that."""
+"""Pass with how many samples each pixel took, where Cycles decides that."""
 Reader = Callable[[str], Array | None]
 """Pixels (H, W, channels) of a pass by name, None where there is none."""
 

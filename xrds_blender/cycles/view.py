@@ -17,7 +17,7 @@ from .size import border_start, frame_size, picture_size
 def cameras_of(engine: Any, depsgraph: Any) -> dict[str, Camera]:
     """The cameras of a render by view; without stereo there is one view.
 
-    Empty under a camera whose frames cannot lend to each other: see `can_track`.
+    Empty under a camera whose frames cannot be reprojected: see `can_track`.
     """
     camera = depsgraph.scene_eval.camera
     if camera is None or not can_track(depsgraph.scene_eval):

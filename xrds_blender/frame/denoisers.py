@@ -1,4 +1,4 @@
-"""Our denoiser, loaded and kept from frame to frame."""
+"""Our denoiser, loaded and cached from frame to frame."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def is_there() -> bool:
 def in_process(denoising: Denoising | None, machine: Machine) -> InProcess | None:
     """Our denoiser for the low-resolution picture, in the place of Cycles'.
 
-    None where Cycles' own is asked for and there, or ours cannot be loaded.
+    None where Cycles' own is requested and there, or ours cannot be loaded.
     """
     if denoising is None:
         denoising = Denoising.XRDS_HIGH

@@ -1,4 +1,4 @@
-"""Guides kept from earlier renders, in memory and on request in a folder.
+"""Guides of earlier renders, in memory and on request in a folder.
 
 Both are bounded: what was not used for the longest time goes first. In the folder only
 files that were written here are touched: they lie in a folder of their own and are
@@ -101,7 +101,7 @@ class GuideCache:
         self, memory_limit: int = MEMORY_LIMIT, folder_limit: int = FOLDER_LIMIT
     ) -> None:
         self.memory_limit, self.folder_limit = memory_limit, folder_limit
-        self._kept: OrderedDict[str, CachedGuides] = OrderedDict()
+        self._cached: OrderedDict[str, CachedGuides] = OrderedDict()
         self.hits = self.misses = self.holes = 0
 
     def get(
@@ -114,26 +114,26 @@ class GuideCache:
         """The guides of a key, from memory or from the folder; None if there are none.
 
         A damaged file, or one of another `size` (height, width), counts as none and is
-        told of on stderr. Guides of another probe count as none, too, and as a hole.
+        reported on stderr. Guides of another probe count as none, too, and as a hole.
         """
-        kept = self._kept.get(key)
-        if kept is None and folder is not None:
-            kept = _find(key, folder, size)
-        if kept is None or not kept.is_of(probe):
+        cached = self._cached.get(key)
+        if cached is None and folder is not None:
+            cached = _find(key, folder, size)
+        if cached is None or not cached.is_of(probe):
             self.misses += 1
-            self.holes += kept is not None
+            self.holes += cached is not None
             return None
         self.hits += 1
-        self._keep(key, kept)
-        return kept.copy()
+        self._store(key, cached)
+        return cached.copy()
 
     def put(self, key: str, guides: CachedGuides, folder: Path | None = None) -> None:
-        """Keep guides in place of what the key had.
+        """Store guides in place of what the key had.
 
         Guides with bad pixels go into memory alone. Raises OSError where the folder
         does not take them; memory then has them.
         """
-        self._keep(key, guides.copy())
+        self._store(key, guides.copy())
         if (
             folder is not None
             and guides.nbytes <= self.folder_limit
@@ -146,16 +146,16 @@ class GuideCache:
 
     def clear(self) -> None:
         """Forget what is in memory."""
-        self._kept.clear()
+        self._cached.clear()
         self.hits = self.misses = self.holes = 0
 
-    def _keep(self, key: str, guides: CachedGuides) -> None:
-        self._kept.pop(key, None)
+    def _store(self, key: str, guides: CachedGuides) -> None:
+        self._cached.pop(key, None)
         if guides.nbytes > self.memory_limit:
             return
-        self._kept[key] = guides
-        while sum(each.nbytes for each in self._kept.values()) > self.memory_limit:
-            self._kept.popitem(last=False)
+        self._cached[key] = guides
+        while sum(each.nbytes for each in self._cached.values()) > self.memory_limit:
+            self._cached.popitem(last=False)
 
 
 # One for the process: the next F12 is to find what the last one left.
@@ -190,11 +190,11 @@ def _find(key: str, folder: Path, size: tuple[int, int] | None) -> CachedGuides 
     except FileNotFoundError:
         return None
     except OSError as error:
-        warn(f"cannot read kept guides {path} ({error.strerror})")
+        warn(f"cannot read cached guides {path} ({error.strerror})")
         return None
     except _FAULTS as error:
         reason = str(error) or type(error).__name__
-        warn(f"kept guides {path} are damaged ({reason}) and are rendered anew")
+        warn(f"cached guides {path} are damaged ({reason}) and are rendered anew")
         return None
     return guides
 

@@ -1,4 +1,4 @@
-"""Where the guides of a picture come from: rendered, kept from before, or both."""
+"""Where the guides of a picture come from: rendered, cached, or both."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .guide_cache import CachedGuides, GuideName
 
 @dataclass(frozen=True)
 class _Look:
-    """What a look into the cache was for, and what it took; its text tells a user."""
+    """What a look into the cache was for, and what it took; its text is for the user."""
 
     key: str
     probe: Probe
@@ -45,7 +45,7 @@ class _Look:
 class GuideSource:
     """Guides of one frame.
 
-    `decision` tells afterwards where they came from, and `name`, where it is known,
+    `decision` says afterwards where they came from, and `name`, where it is known,
     what they show: guides of the same name hold each other's samples. `portion` says
     which samples are new, where frames of a shot continue one sequence.
     """
@@ -75,7 +75,7 @@ class GuideSource:
         `low` is the picture by view, which an empty scene's guides are made of.
         """
         if low is not None and not self._chosen.render_guides:
-            self.decision = Decision(GUIDE_CACHE, "off", "there are no guides to keep")
+            self.decision = Decision(GUIDE_CACHE, "off", "there are no guides to cache")
             return self._of_background(low)
         if GUIDE_CACHE not in self._request.savings:
             return self._render(self._chosen.guide_samples)
@@ -92,16 +92,16 @@ class GuideSource:
         region = self._passes.region
         size = region.height, region.width
         holes = guide_cache.CACHE.holes
-        kept = guide_cache.CACHE.get(key, probe.values, self._folder, size)
+        cached = guide_cache.CACHE.get(key, probe.values, self._folder, size)
         has_hole = guide_cache.CACHE.holes > holes
         look = _Look(key, probe, has_hole, time.perf_counter() - started)
-        missing = self._missing(0 if kept is None else kept.samples)
+        missing = self._missing(0 if cached is None else cached.samples)
         if not missing:
-            assert kept is not None
-            self._passes.put_back(kept.passes)
-            self._report_hit(kept.samples, look)
-            return _guides(kept, {"sync": 0.0, "guides": look.seconds})
-        return self._add(look, kept, missing)
+            assert cached is not None
+            self._passes.put_back(cached.passes)
+            self._report_hit(cached.samples, look)
+            return _guides(cached, {"sync": 0.0, "guides": look.seconds})
+        return self._add(look, cached, missing)
 
     def _of_background(self, low: dict[str, Beauty]) -> dict[str, Guides]:
         """What Cycles writes where it sees nothing: its light as albedo, no normal."""
@@ -137,18 +137,18 @@ class GuideSource:
         frame = passes.frame, passes.region, passes.views, names, how
         return guide_key(self._graph, scene, frame)
 
-    def _missing(self, kept: int) -> int:
+    def _missing(self, cached: int) -> int:
         """Samples to render beside those that are there."""
-        asked = self._chosen.guide_samples
-        if kept < asked:
-            return asked - kept
-        return max(0, min(asked, self._request.guide_limit - kept))
+        requested = self._chosen.guide_samples
+        if cached < requested:
+            return requested - cached
+        return max(0, min(requested, self._request.guide_limit - cached))
 
-    def _render(self, samples: int, kept: int = 0) -> dict[str, Guides]:
+    def _render(self, samples: int, cached: int = 0) -> dict[str, Guides]:
         seed = None if self._request.seed is None else self._request.seed + 1
-        if kept:  # samples of the same seed would be the same samples
+        if cached:  # samples of the same seed would be the same samples
             first = self._graph.scene_eval.cycles.seed if seed is None else seed
-            seed = first + kept
+            seed = first + cached
         return self._passes.guides_by_view(
             samples,
             seed=seed,
@@ -157,35 +157,35 @@ class GuideSource:
         )
 
     def _add(
-        self, look: _Look, kept: CachedGuides | None, samples: int
+        self, look: _Look, cached: CachedGuides | None, samples: int
     ) -> dict[str, Guides]:
-        """Render samples, join them with those kept, and keep the result."""
-        rendered = self._render(samples, 0 if kept is None else kept.samples)
+        """Render samples, add those cached, and cache the result."""
+        rendered = self._render(samples, 0 if cached is None else cached.samples)
         seconds = dict(next(iter(rendered.values())).seconds)
         seconds["guides"] += look.seconds
         alphas = {view: guides.alpha for view, guides in rendered.items()}
         passes = self._passes.data_passes()
         guides = CachedGuides(samples, passes, alphas, look.probe.values)
         reason = self._why_missed(look)
-        value = f"kept {samples} samples"
-        if kept is not None:
-            guides = kept.merged(guides)
+        value = f"cached {samples} samples"
+        if cached is not None:
+            guides = cached.merged(guides)
             self._passes.put_back(guides.passes)
             reason = f"{samples} more samples of the same view"
-            value = f"gathered {guides.samples} samples"
+            value = f"accumulated {guides.samples} samples"
         try:
             guide_cache.CACHE.put(look.key, guides, self._folder)
-        except OSError as error:  # the picture is worth more than the guides kept
+        except OSError as error:  # the picture is worth more than the cache
             reason = (
                 f"in memory only: cannot write to {self._folder} ({error.strerror})"
             )
-            warn(f"guides are kept {reason}")
+            warn(f"guides are cached {reason}")
         self.decision = Decision(GUIDE_CACHE, value, f"{reason}; {look}")
         return _guides(guides, seconds)
 
     def _why_missed(self, look: _Look) -> str:
         if not look.has_hole:
-            return "no kept guides match this camera, geometry and materials"
+            return "no cached guides match this camera, geometry and materials"
         reason = (
             "nothing XRDS looks at has changed, but a probe render shows other guides"
         )
@@ -201,16 +201,16 @@ class GuideSource:
         )
 
 
-def _guides(kept: CachedGuides, seconds: dict[str, float]) -> dict[str, Guides]:
+def _guides(cached: CachedGuides, seconds: dict[str, float]) -> dict[str, Guides]:
     return {
         view: Guides(
-            kept.passes[view, ALBEDO],
-            kept.passes[view, NORMAL],
+            cached.passes[view, ALBEDO],
+            cached.passes[view, NORMAL],
             alpha,
             None,
             None,
-            kept.samples,
+            cached.samples,
             seconds,
         )
-        for view, alpha in kept.alphas.items()
+        for view, alpha in cached.alphas.items()
     }

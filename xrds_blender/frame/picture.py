@@ -30,7 +30,7 @@ class NetworkFailed(XRDSError):
 
 @dataclass(frozen=True)
 class Temporal:
-    """What neighbouring frames lent to a picture.
+    """What a picture has from neighbour frames.
 
     `frames`: the numbers of those whose samples went in, its own too; `mean_samples`
     per pixel after accumulation; `rejected`: the share of the neighbours' samples that
@@ -49,8 +49,8 @@ class Picture:
 
     `radiance` (H, W, 3) is premultiplied by `alpha` (H, W); `albedo` and `normal`
     (H, W, 3) and `low_resolution` (h, w, 3) are None for Cycles alone. `seconds` by
-    stage: total, sync, beauty, denoise, guides, network, write; Cycles does not tell
-    its own denoising from sampling, so `beauty` holds both then. `peak_memory`
+    stage: total, sync, beauty, denoise, guides, network, write; Cycles reports
+    its denoising and sampling as one, so `beauty` holds both then. `peak_memory`
     is the largest in bytes that the process has taken so far; `device` is what the
     network ran on, empty for Cycles alone; `settings` are what it was rendered
     by, as a time budget chose them.

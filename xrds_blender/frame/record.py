@@ -25,52 +25,52 @@ _LEFT_OUT = {
 
 def fields(picture: Picture, settings: Settings, samples: int) -> dict[str, str]:
     """Name and value of what made a picture; `samples` are the scene's own."""
-    told = {"version": package_version(), "mode": _mode(settings)}
-    told["scale"] = str(settings.scale)
+    entries = {"version": package_version(), "mode": _mode(settings)}
+    entries["scale"] = str(settings.scale)
     if settings.is_enlarged:
-        told["preset"] = settings.preset
+        entries["preset"] = settings.preset
     elif not settings.is_cycles_only:
-        told["preset"] = settings.quality
-    told["samples"] = str(settings.samples or samples)
+        entries["preset"] = settings.quality
+    entries["samples"] = str(settings.samples or samples)
     if settings.is_enlarged:
-        told["guide_samples"] = _decided(picture.plan, "guide samples") or "0"
+        entries["guide_samples"] = _decided(picture.plan, "guide samples") or "0"
     if picture.temporal is not None:
         frames = picture.temporal.frames
-        told["frames"] = f"{frames[0]} to {frames[-1]}"
+        entries["frames"] = f"{frames[0]} to {frames[-1]}"
     if picture.device:
-        told["device"] = picture.device
-    told["seconds"] = f"{picture.seconds.get('total', 0.0):.1f}"
-    told["left_out"] = ", ".join(_left_out(picture.plan)) or "nothing"
-    return told
+        entries["device"] = picture.device
+    entries["seconds"] = f"{picture.seconds.get('total', 0.0):.1f}"
+    entries["left_out"] = ", ".join(_left_out(picture.plan)) or "nothing"
+    return entries
 
 
-def line(told: dict[str, str], frame: int, layer: str) -> str:
+def line(entries: dict[str, str], frame: int, layer: str) -> str:
     """The fields as one line of a log."""
     rest = [
         f"{name.replace('_', ' ')} {value}"
-        for name, value in told.items()
+        for name, value in entries.items()
         if name not in _NAMELESS
     ]
-    head = f"XRDS {told['version']}, frame {frame}, {layer}: {told['mode']}"
+    head = f"XRDS {entries['version']}, frame {frame}, {layer}: {entries['mode']}"
     return ", ".join([head, *rest])
 
 
 _NAMELESS = ("version", "mode")
 
 
-def metadata(told: dict[str, str], layer: str = "") -> dict[str, str]:
+def metadata(entries: dict[str, str], layer: str = "") -> dict[str, str]:
     """The fields by their names in files: with the layer's, as Cycles names its own.
 
     Files of one picture, as commands write them, have no layers.
     """
     prefix = f"{PREFIX}.{layer}." if layer else f"{PREFIX}."
-    return {prefix + name: value for name, value in told.items()}
+    return {prefix + name: value for name, value in entries.items()}
 
 
-def stamp(engine: Any, told: dict[str, str], layer: str) -> None:
+def stamp(engine: Any, entries: dict[str, str], layer: str) -> None:
     """Let Blender write the fields into every file that it makes of the result."""
     result = engine.get_result()
-    for name, value in metadata(told, layer).items():
+    for name, value in metadata(entries, layer).items():
         result.stamp_data_add_field(name, value)
 
 
@@ -86,7 +86,7 @@ def _decided(plan: tuple[Decision, ...], name: str) -> str | None:
 
 def _left_out(plan: tuple[Decision, ...]) -> list[str]:
     found = [_LEFT_OUT.get((each.decision, each.value)) for each in plan]
-    kept = _decided(plan, GUIDE_CACHE) or ""
-    if kept.startswith("used"):
-        found.append("guides, kept from before")
+    cached = _decided(plan, GUIDE_CACHE) or ""
+    if cached.startswith("used"):
+        found.append("guides, from the cache")
     return [words for words in found if words]

@@ -46,19 +46,19 @@ def run_job(
     return call_engine(scene, work, layer)
 
 
-def render_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
-    """Do the work that waits for the engine, or what Blender asks of it: `asked`.
+def render_in(engine: Any, depsgraph: Any, requested: Callable[[], object]) -> None:
+    """Do the work that waits for the engine, or what Blender requests: `requested`.
 
     The result then has no passes but those that the file asks for.
     """
     live.clear()
     try:
-        _work_in(engine, depsgraph, asked)
+        _work_in(engine, depsgraph, requested)
     finally:
         spare_passes.drop(engine)
 
 
-def _work_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
+def _work_in(engine: Any, depsgraph: Any, requested: Callable[[], object]) -> None:
     task = PROCESS.of(_Waiting).task
     if task is not None:
         try:
@@ -67,7 +67,7 @@ def _work_in(engine: Any, depsgraph: Any, asked: Callable[[], object]) -> None:
             task.error = error
         return
     try:
-        asked()
+        requested()
     except Cancelled:
         return  # it was Blender that cancelled
     except XRDSError as error:

@@ -1,6 +1,6 @@
 """What a running render is doing now, how far it has come, and how long it will take.
 
-Cycles tells Blender how far each of its renders is, so Blender's own bar would run
+Cycles reports to Blender how far each of its renders is, so Blender's own bar would run
 several times. The status bar therefore shows what is worked out here, from the seconds
 of the stages so far and those that each kind of stage took before.
 """
@@ -32,8 +32,8 @@ STAGES = (
     "write",
 )
 _KINDS = (LOW, GUIDES, NETWORK)
-_LEAST = 0.02  # of a stage, before its seconds can be told from what is done
-_LARGE = 0.1  # megapixels; of less, seconds do not tell what more would take
+_LEAST = 0.02  # of a stage, before its seconds can be estimated from what is done
+_LARGE = 0.1  # megapixels; of less, seconds say nothing about more
 
 
 @dataclass
@@ -132,8 +132,8 @@ def current() -> str | None:
     if run is None:
         return None
     left = _left(run)
-    told = "" if left is None else f", {_clock(left)} left"
-    return f"{state.frames_left}XRDS {run.number}/{run.of}: {run.stage}{told}"
+    time_left = "" if left is None else f", {_clock(left)} left"
+    return f"{state.frames_left}XRDS {run.number}/{run.of}: {run.stage}{time_left}"
 
 
 def show() -> None:

@@ -56,10 +56,10 @@ class XRDSRender(bpy.types.RenderEngine):
             with thread_guard.shared():
                 from ..frame.rendering import render_in
 
-                render_in(self, depsgraph, lambda: self._render_asked(depsgraph))
+                render_in(self, depsgraph, lambda: self._render_requested(depsgraph))
 
-    def _render_asked(self, depsgraph: Any) -> None:
-        """Render what the scene's settings describe, and tell what was done."""
+    def _render_requested(self, depsgraph: Any) -> None:
+        """Render what the scene's settings describe, and report what was done."""
         from ..frame import record
         from ..shot.render import render_frame
         from .properties import request_of
@@ -70,9 +70,9 @@ class XRDSRender(bpy.types.RenderEngine):
         layer, notes = depsgraph.view_layer_eval.name, list(support.notes(scene))
         picture = render_frame(self, depsgraph, request)
         settings = picture.settings or request.settings
-        told = record.fields(picture, settings, samples)
-        record.stamp(self, told, layer)
-        self.report({"INFO"}, record.line(told, frame, layer))
+        entries = record.fields(picture, settings, samples)
+        record.stamp(self, entries, layer)
+        self.report({"INFO"}, record.line(entries, frame, layer))
         for note in notes if settings.is_enlarged else ():
             self.report({"INFO"}, f"XRDS: {note}")
 

@@ -1,4 +1,4 @@
-"""The way to a PyTorch for super-resolution: a command, a folder, a look at the result.
+"""How to get a PyTorch for super-resolution: a command, a folder, a look at the result.
 
 An add-on may not download by itself, so the user runs the command, in a terminal.
 """

@@ -23,7 +23,7 @@ class _Drawn:
 
 
 def draw(engine: Any, depsgraph: Any, space: Any) -> None:
-    """Draw what `cycles.live` tells."""
+    """Draw what `cycles.live` holds."""
     now = live.now()
     if now.picture is None:
         _draw_samples(engine, depsgraph, space, now.scale)

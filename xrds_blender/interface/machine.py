@@ -25,7 +25,7 @@ class Machine:
     """Folder of weights files; None means the shipped ones."""
     threads: int | None = None
     """Of the network on the processor; None leaves it to PyTorch."""
-    stop_keeps: bool = True
+    finish_stopped: bool = True
     """Whether a render that the user stops leaves the picture so far, denoised."""
     torch: Path | None = None
     """Folder that PyTorch is taken from; None means the one that Python finds."""
@@ -34,16 +34,16 @@ class Machine:
 def machine() -> Machine:
     """The preferences of the enabled add-on, or the defaults."""
     entry = bpy.context.preferences.addons.get(package)
-    kept: Any = entry and entry.preferences
-    if kept is None:
+    stored: Any = entry and entry.preferences
+    if stored is None:
         return Machine()
     return Machine(
-        device=kept.device or "auto",
-        memory_limit=kept.memory_limit * MEBIBYTE or None,
-        weights=folder(kept.weights),
-        threads=kept.threads or None,
-        stop_keeps=kept.stop_keeps,
-        torch=folder(kept.torch),
+        device=stored.device or "auto",
+        memory_limit=stored.memory_limit * MEBIBYTE or None,
+        weights=folder(stored.weights),
+        threads=stored.threads or None,
+        finish_stopped=stored.finish_stopped,
+        torch=folder(stored.torch),
     )
 
 

@@ -52,8 +52,8 @@ def _draw_mode(column: Any, settings: Any, estimate: Estimate, timed: bool) -> N
     cell.prop_enum(settings, "mode", mode.value, text=name, translate=False)
     if timed:
         spent = estimate.seconds
-        told = "" if spent is None else duration(spent)
-        seconds.label(text=told, translate=False)
+        text = "" if spent is None else duration(spent)
+        seconds.label(text=text, translate=False)
     quality.label(text=_quality(estimate), translate=False)
 
 

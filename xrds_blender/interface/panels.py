@@ -209,7 +209,7 @@ def _forget_file(*_: object) -> None:
 
 @persistent
 def _draw_again(*_: object) -> None:
-    """Seconds are known after a render; Blender draws the panel when told alone."""
+    """Seconds are known after a render; Blender draws the panel only on request."""
     if not bpy.app.background:
         bpy.app.timers.register(_tag_redraw, first_interval=0.1)
 

@@ -23,7 +23,7 @@ def draw(layout: Any, context: Any, text: str, icon: str = "NONE") -> None:
 
 
 def lines(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
-    """The text in lines of at most `width`, as `measure` tells; a long word alone."""
+    """The text in lines of at most `width`, by `measure`; a long word alone."""
     found, line = [], ""
     for part in _parts(text):
         if line and measure((line + part).rstrip()) > width:

@@ -63,7 +63,7 @@ def _apply_torch(preferences: Any, _: Any = None) -> None:
         torch_folder.use(None)
 
 
-_NAMES = ("device", "threads", "memory_limit", "stop_keeps", "weights", "torch")
+_NAMES = ("device", "threads", "memory_limit", "finish_stopped", "weights", "torch")
 
 
 class XRDS_Preferences(bpy.types.AddonPreferences):
@@ -91,7 +91,7 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
         default=0,
         min=0,
     )
-    stop_keeps: bpy.props.BoolProperty(
+    finish_stopped: bpy.props.BoolProperty(
         name="Stop Keeps the Picture",
         description="What you stop with Esc keeps the samples taken so far, quickly "
         "denoised. The frame of an animation is shown, not saved",
@@ -125,12 +125,12 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
         for icon, line in torch_status(machine.folder(self.torch)):
             layout.label(text=line, icon=icon)
         if not torch_folder.is_there():
-            self._draw_the_way_to_torch(layout.box())
+            self._draw_how_to_get_torch(layout.box())
         layout.operator(XRDS_OT_self_test.bl_idname, icon="CHECKMARK")
         for line in XRDS_OT_self_test.lines:
             layout.label(text=line)
 
-    def _draw_the_way_to_torch(self, layout: Any) -> None:
+    def _draw_how_to_get_torch(self, layout: Any) -> None:
         layout.use_property_split = False
         layout.label(text=get_torch.NEEDED)
         layout.prop(self, "torch_command", text="")
@@ -171,11 +171,11 @@ def register(package: str) -> None:
         bpy.utils.register_class(item)
     entry = bpy.context.preferences.addons.get(package)
     if entry and entry.preferences:
-        kept = entry.preferences
-        if not (kept.torch or torch_folder.is_there()):
-            kept.torch = get_torch.remembered()
-        if kept.torch:
-            _apply_torch(kept)
+        stored = entry.preferences
+        if not (stored.torch or torch_folder.is_there()):
+            stored.torch = get_torch.remembered()
+        if stored.torch:
+            _apply_torch(stored)
 
 
 def unregister() -> None:

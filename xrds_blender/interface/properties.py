@@ -202,7 +202,7 @@ def request_of(settings: XRDSSettings) -> Request:
         memory_limit=here.memory_limit,
         weights=here.weights,
         threads=here.threads,
-        stop_keeps=here.stop_keeps,
+        finish_stopped=here.finish_stopped,
         temporal_radius=settings.temporal_radius,
     )
     return modes.in_mode(wanted, Mode(settings.mode), settings.id_data)

@@ -38,23 +38,23 @@ def remarks(scene: Any, request: Request, here: Capabilities) -> list[Remark]:
     """Icon and sentence: what is missing first, then what is otherwise than usual."""
     settings, chosen = scene.xrds, request.settings.mode
     lacks = {m: missing(replace(request.settings, mode=m), here) for m in MODES}
-    told: list[Remark] = []
+    found: list[Remark] = []
     if settings.is_timed:
         if not here.any_denoiser:
-            told.append(("ERROR", NO_BUDGET))
+            found.append(("ERROR", NO_BUDGET))
     elif lacks[chosen]:
-        told.append(("ERROR", lacks[chosen]))
+        found.append(("ERROR", lacks[chosen]))
     else:
-        told += [("ERROR", sentence) for sentence in _wrong(scene, chosen, here)]
+        found += [("ERROR", sentence) for sentence in _wrong(scene, chosen, here)]
     not_offered = {text for mode, text in lacks.items() if text and mode is not chosen}
-    told += [
-        ("INFO", text) for text in sorted(not_offered) if ("ERROR", text) not in told
+    found += [
+        ("INFO", text) for text in sorted(not_offered) if ("ERROR", text) not in found
     ]
     if request.settings.is_enlarged:
         if not _knows_passes(request):
-            told.append(("ERROR", OTHER_PASSES))
-        told += [("INFO", sentence) for sentence in support.notes(scene)]
-    return told
+            found.append(("ERROR", OTHER_PASSES))
+        found += [("INFO", sentence) for sentence in support.notes(scene)]
+    return found
 
 
 def _wrong(scene: Any, mode: Mode, here: Capabilities) -> list[str]:

@@ -66,21 +66,21 @@ def next_render(scene: Any, request: Request, here: Capabilities) -> list[Row]:
     if request.settings.is_cycles_only:
         own = scene_settings(scene).denoising
         named = own and f"OIDN {own.quality.title()}, {own.prefilter.title()}"
-        told = named or translated("none")
-        return [*rows, ("Denoising", told)]
+        shown = named or translated("none")
+        return [*rows, ("Denoising", shown)]
     rows.append(("Denoising", translated(_QUALITIES[request.settings.quality])))
     return rows + _neighbours(size, request.settings)
 
 
 def _neighbours(size: tuple[int, int], settings: Settings) -> list[Row]:
-    """How many frames an animation keeps, and the memory that they take."""
+    """How many frames an animation stores, and the memory that they take."""
     radius = settings.temporal_radius
     if not radius:
         return []
     text = "{radius} before and after, {memory}"
     taken = _amount(forecast.shot_memory(*size, radius, settings.scale))
-    told = translated(text, radius=radius, memory=taken)
-    return [("Neighbouring Frames", told)]
+    shown = translated(text, radius=radius, memory=taken)
+    return [("Neighbouring Frames", shown)]
 
 
 def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
@@ -142,7 +142,7 @@ def last_render(last: LastRender) -> list[Row]:
 
 
 def _stage(stage: str, name: str, mode: Mode) -> str:
-    """Cycles does not tell its own denoising from its samples."""
+    """Cycles reports its samples and its denoising as one."""
     if stage != "beauty":
         return name
     if mode.is_enlarged:

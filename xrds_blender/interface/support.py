@@ -23,7 +23,7 @@ def _layers(scene: Any) -> list[Any]:
 
 
 def _uses_light_passes(scene: Any) -> bool:
-    names = [f"use_pass_{light}_{way}" for light in LIGHTS for way in _WAYS]
+    names = [f"use_pass_{light}_{bounce}" for light in LIGHTS for bounce in _BOUNCES]
     names += ["use_pass_ambient_occlusion", "use_pass_shadow"]
     own = ("use_pass_volume_direct", "use_pass_volume_indirect")
     own += ("use_pass_shadow_catcher",)
@@ -35,7 +35,7 @@ def _uses_light_passes(scene: Any) -> bool:
     )
 
 
-_WAYS = ("direct", "indirect")
+_BOUNCES = ("direct", "indirect")
 
 
 def _is_panorama(scene: Any) -> bool:

@@ -1,7 +1,7 @@
 """What reads and writes Blender's own memory, and nothing else does.
 
 Blender's Python interface has no word for four things that a render by XRDS needs. Each
-module here finds the place in Blender's memory by what Blender's own properties tell,
+module here finds the place in Blender's memory by what Blender's own properties show,
 compares before it writes, and reads back what it has written. So an unknown Blender is
 noticed and nothing is damaged:
 

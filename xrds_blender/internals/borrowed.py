@@ -1,4 +1,4 @@
-"""Settings lent for the time of one render and given back whatever happens.
+"""Settings borrowed for the time of one render and given back whatever happens.
 
 Nothing here touches the user's scene: what is set belongs to the evaluated scene or
 to the render pipeline's own copy of the render settings.

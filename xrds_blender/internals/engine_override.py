@@ -50,7 +50,7 @@ def begin(scene: Any) -> None:
     """
     if scene.render.engine != ENGINE:
         _find(scene.render)
-        _free_kept_engine(scene)
+        _free_last_engine(scene)
         PROCESS.of(Override).waiting = scene
 
 
@@ -83,10 +83,10 @@ def _at_end(*_: Any) -> None:
     state = PROCESS.of(Override)
     if state.last is not None:
         scene, state.last = state.last, None
-        _free_kept_engine(scene)
+        _free_last_engine(scene)
 
 
-def _free_kept_engine(scene: Any) -> None:
+def _free_last_engine(scene: Any) -> None:
     """Free what Blender keeps of the last render, which may be another engine's.
 
     It keeps the engine for persistent data, and would render with it.
@@ -120,10 +120,10 @@ def _look_for(render: Any) -> int | None:
     name = name.rstrip(b"\0") + b"\0"
     at = memory.find(name)
     while 0 <= at <= len(memory) - _NAME_SIZE:
-        kept = memory[at : at + _NAME_SIZE]
+        old = memory[at : at + _NAME_SIZE]
         ctypes.memmove(base + at, _padded(ENGINE), _NAME_SIZE)
         follows = render.engine == ENGINE
-        ctypes.memmove(base + at, kept, _NAME_SIZE)
+        ctypes.memmove(base + at, old, _NAME_SIZE)
         if follows:
             return at
         at = memory.find(name, at + 1)

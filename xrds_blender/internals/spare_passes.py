@@ -8,7 +8,7 @@ to see is out of its list meanwhile.
 
 Blender's lists are two pointers, to the first item and the last; each item begins with
 two, to the next item and the previous one. Everything is compared with what Blender's
-properties tell before anything is written; where it differs the pass stays.
+properties show before anything is written; where it differs the pass stays.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ _TILES = re.compile(rb"Rendered (\d+)/(\d+) Tiles")
 
 
 def fraction(engine: Any) -> float | None:
-    """The part of its samples that Cycles has taken; None where it does not tell.
+    """The part of its samples that Cycles has taken; None where it does not say.
 
     The engine must be rendering.
     """

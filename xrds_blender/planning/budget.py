@@ -1,4 +1,4 @@
-"""Seconds asked for -> what to render: the least error expected in them.
+"""Seconds requested -> what to render: the least error expected in them.
 
 Seconds come from a cost model of the scene at hand (what the probes found), errors
 from a table that `xrds bench` measured on other scenes. Pure functions: neither
@@ -23,7 +23,7 @@ from .settings import Denoising, Mode, Network, Settings
 MODEL = Path(__file__).with_name("budget.json")
 # Predictions scatter; a frame that is late is worse than one that is early.
 AIM = 0.97
-# Where nothing fits: what is as fast as the fastest, as far as predictions can tell.
+# Where nothing fits: what is as fast as the fastest, within what predictions can resolve.
 ALIKE = 1.1
 # What is no better than what was chosen may end this much late: a quicker denoiser
 # saves little more time and costs decibels.
@@ -31,7 +31,7 @@ LATE = 0.05
 MOST_SAMPLES = 16384
 # Of a neighbour's samples in a shot: those that count like the frame's own, as Cycles +
 # OIDN needs 4 to 5 times the samples for the same picture at a radius of 4.
-LENT = 0.5
+REUSED = 0.5
 # Seconds that each neighbour takes, to be packed and accumulated, over those of the
 # quickest denoising.
 ACCUMULATION = 0.25
@@ -55,15 +55,15 @@ class Costs:
     pictures: int = 1
 
     def in_shot(self, radius: int) -> Costs:
-        """Those of a frame to which `radius` frames before and after lend samples.
+        """Those of a frame that reuses samples of `radius` frames before and after.
 
         The probes are the first frame's alone. At full size the frame is denoised by
         itself as well.
         """
-        lending = 2 * radius * ACCUMULATION * min(self.denoise.values())
+        reusing = 2 * radius * ACCUMULATION * min(self.denoise.values())
         return replace(
             self,
-            fixed=self.fixed - self.probes + lending,
+            fixed=self.fixed - self.probes + reusing,
             probes=0.0,
             pictures=2 if radius else 1,
         )
@@ -75,7 +75,7 @@ class Costs:
         return rest + settings.samples * self._sample(settings)
 
     def samples(self, settings: Settings, seconds: float) -> int:
-        """Most samples for which settings keep to `seconds`; 0 if none does."""
+        """Most samples for which settings stay within `seconds`; 0 if none does."""
         left = seconds - self._without_samples(settings)
         return max(0, min(MOST_SAMPLES, math.floor(left / self._sample(settings))))
 
@@ -140,16 +140,16 @@ class ErrorModel:
 
     def limited(self, denoising: Collection[Denoising]) -> ErrorModel:
         """Without those at full size whose denoising is not among these."""
-        kept = {
+        left = {
             family: curve
             for family, curve in self.curves.items()
             if family.is_enlarged or family.denoising in denoising
         }
-        return ErrorModel(kept)
+        return ErrorModel(left)
 
     def in_shot(self, radius: int) -> ErrorModel:
         """Of frames that `radius` frames before and after give their samples."""
-        worth = 1 + 2 * radius * LENT
+        worth = 1 + 2 * radius * REUSED
         return ErrorModel({s: replace(c, worth=worth) for s, c in self.curves.items()})
 
     def families(self, networks: Sequence[Network]) -> Iterator[tuple[Settings, Curve]]:
@@ -306,13 +306,13 @@ def reach(
     psnr: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
 ) -> Selection:
     """The fastest choice of at least `psnr` dB; the best there is where none has it."""
-    picks = []
+    found = []
     for family, curve in errors.families(networks):
         samples = _least_samples(curve, psnr)
-        picks.append(_selection(family, samples, costs, curve))
-    enough = [p for p in picks if p.psnr >= psnr]
+        found.append(_selection(family, samples, costs, curve))
+    enough = [each for each in found if each.psnr >= psnr]
     if not enough:
-        best = max(picks, key=_merit)
+        best = max(found, key=_merit)
         return Selection(best.settings, best.seconds, best.psnr, None, fits=False)
     best = min(enough, key=lambda p: p.seconds)
     rivals = [p for p in enough if _kind(p.settings) != _kind(best.settings)]
@@ -332,9 +332,9 @@ def _fitting(
 def _fastest(
     costs: Costs, errors: ErrorModel, networks: Sequence[Network]
 ) -> Selection:
-    picks = _few(costs, errors, networks)
-    least = min(p.seconds for p in picks)
-    best = max((p for p in picks if p.seconds <= least * ALIKE), key=_merit)
+    found = _few(costs, errors, networks)
+    least = min(p.seconds for p in found)
+    best = max((each for each in found if each.seconds <= least * ALIKE), key=_merit)
     return Selection(best.settings, best.seconds, best.psnr, None, fits=False)
 
 

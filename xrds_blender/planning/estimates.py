@@ -56,8 +56,8 @@ class Estimate:
 class SceneSettings:
     """What a scene has where settings leave it open.
 
-    `denoising` is that of Cycles alone, None where it does not denoise or does it in a
-    way that was never measured.
+    `denoising` is that of Cycles alone, None where it does not denoise or in a mode
+    that was never measured.
     """
 
     samples: int

@@ -34,7 +34,7 @@ class SceneFacts:
     hair: bool = True
     depth_of_field: bool = True
     motion_blur: bool = True
-    """Asked for in the file; what moves is another question."""
+    """Requested in the file; what moves is another question."""
     moving: tuple[str, ...] = ("anything",)
     """Up to a few names of what changes from frame to frame."""
     film_transparent: bool = False
@@ -56,7 +56,7 @@ class Facts:
     max_bounces: int
     has_denoiser: bool
     exact_camera: bool
-    lends: bool = True
+    reprojects: bool = True
     """Whether it is known where the camera shows a place in another frame."""
     guide_samples: int = 4
     scene: SceneFacts = SceneFacts()

@@ -50,7 +50,7 @@ def memory(
 def shot_memory(width: int, height: int, radius: int, scale: int = 1) -> int:
     """Bytes that an animation's window of frames takes, of an ordinary scene.
 
-    Without the user's own passes; frames that lend `radius` to each side are kept.
+    Without the user's own passes; `radius` frames to each side are stored.
     """
     if not radius:
         return 0

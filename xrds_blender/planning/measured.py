@@ -1,4 +1,4 @@
-"""What finished renders of a scene tell about the next one's seconds.
+"""The next render's seconds, estimated from those that are finished.
 
 Pure functions: neither Blender nor torch is needed here.
 """
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from .budget import Costs, Model
 from .settings import DEFAULT_DENOISING, Denoising, Mode, Network, Settings
 
-# A frame of more pixels than this many times those measured is not told of: what a
+# A frame of more pixels than this many times those measured is not estimated: what a
 # small one takes to begin would count too much.
 MOST_GROWTH = 4
 # A guide sample's seconds over a full one's, where no guides were rendered yet: 0.56 to
@@ -26,7 +26,7 @@ class Measured:
 
     `fixed`: scene sync, BVH and writing; `beauty` and `guide`: one sample; `denoise`:
     Blender's default denoiser; `networks`: each that has run; `totals`: renders as they
-    were. None is what no render has told yet.
+    were. None is what no render has shown yet.
     """
 
     pixels: int
@@ -81,7 +81,7 @@ def learn(
     """What is known after one more render, of these seconds by stage.
 
     Its settings are resolved. A render at another size or in another mode adds to what
-    the ones before have told.
+    what is known from the ones before.
     """
     seconds = defaultdict(float, seconds)
     before = _resized(known, pixels) if known else Measured(pixels)
@@ -100,7 +100,7 @@ def learn(
     speed = model.denoiser_speed[settings.denoising]
     if settings.mode is Mode.FULL_SIZE:
         return replace(now, beauty=sample, denoise=seconds["denoise"] / speed)
-    # Cycles does not tell its denoiser from its samples, so that must be known
+    # Cycles reports its samples and its denoiser as one, so that must be known
     if now.denoise is None or now.denoise * speed >= seconds["beauty"]:
         return now
     return replace(now, beauty=sample - now.denoise * speed / settings.samples)

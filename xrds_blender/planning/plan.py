@@ -103,7 +103,7 @@ def cycles_only(reason: str) -> Plan:
 def full_size(quality: str) -> Plan:
     """The plan at scale 1: all of Cycles' samples, denoised in process."""
     decisions = (
-        Decision("method", "full size", "asked for"),
+        Decision("method", "full size", "as requested"),
         Decision("denoise", quality, "in process, by Open Image Denoise"),
     )
     return Plan(False, GuideRender(), 0, True, True, False, decisions)
@@ -182,19 +182,23 @@ def _render_guides(facts: Facts, allowed: bool) -> tuple[bool, Decision]:
 
 
 def _samples(facts: Facts, allowed: bool) -> tuple[int, Decision]:
-    asked, name = facts.guide_samples, "guide samples"
+    requested, name = facts.guide_samples, "guide samples"
     masks = any(each.startswith("cryptomatte") for each in facts.scene.passes)
-    if masks and asked < CRYPTOMATTE_SAMPLES:
-        reason = f"Cryptomatte is on: its masks need more than the {asked} requested"
+    if masks and requested < CRYPTOMATTE_SAMPLES:
+        reason = (
+            f"Cryptomatte is on: its masks need more than the {requested} requested"
+        )
         decision = Decision(name, str(CRYPTOMATTE_SAMPLES), reason)
         return CRYPTOMATTE_SAMPLES, decision
     fine = _fine_detail(facts.scene)
     if facts.guides == "full":
-        return asked, Decision(name, str(asked), "full guides hold light, and so noise")
-    if fine or masks or not allowed or asked <= CRISP_SAMPLES:
+        return requested, Decision(
+            name, str(requested), "full guides hold light, and so noise"
+        )
+    if fine or masks or not allowed or requested <= CRISP_SAMPLES:
         reason = f"as requested; the scene has {fine}" if fine else "as requested"
-        return asked, Decision(name, str(asked), reason)
-    saving = _part(facts, 1 - CRISP_SAMPLES / asked)
+        return requested, Decision(name, str(requested), reason)
+    saving = _part(facts, 1 - CRISP_SAMPLES / requested)
     reason = "even colours on sharp surfaces: only edges need samples"
     return CRISP_SAMPLES, Decision(name, str(CRISP_SAMPLES), reason, saving)
 
@@ -288,8 +292,8 @@ def neighbours(
     `cuts` are the frames at which another camera begins.
     """
     name, scene = "accumulation", facts.scene
-    if not facts.lends:
-        reason = "nothing tells where this panorama shows a place: each frame is alone"
+    if not facts.reprojects:
+        reason = "this panorama cannot be reprojected: each frame is alone"
         return (Decision(name, "none", reason),)
     value = f"{radius} frames to each side"
     if not scene.moving:

@@ -1,4 +1,4 @@
-"""What a render is asked for, as the panel, the command and scripts describe it."""
+"""What a render is to be, as the panel, the command and scripts describe it."""
 
 from __future__ import annotations
 
@@ -54,12 +54,12 @@ class Machine:
 
 @dataclass(frozen=True)
 class Request:
-    """A render as it is asked for: where there is a goal, settings follow from it.
+    """A render as requested; where there is a goal, settings follow from it.
 
     `seed` None leaves Cycles' own; `exposure` None is found in the picture; `savings`
     names what the plan may leave out where the scene does not need it. `guide_cache` is
     a folder for guides beside those in memory; each render of the same view adds its
-    samples to them until they are `guide_limit`. `stop_keeps` leaves what there is in
+    samples to them until they are `guide_limit`. `finish_stopped` leaves what there is in
     the result when the user stops the render.
     """
 
@@ -71,7 +71,7 @@ class Request:
     savings: tuple[str, ...] = SAVINGS
     guide_cache: str | Path | None = None
     guide_limit: int = 0
-    stop_keeps: bool = False
+    finish_stopped: bool = False
 
     def __post_init__(self) -> None:
         unknown = set(self.savings) - set(SAVINGS)

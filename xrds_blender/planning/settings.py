@@ -76,12 +76,6 @@ class Denoising(StrEnum):
         return self.value.startswith("XRDS-")
 
     @property
-    def cycles_denoising(self) -> Denoising | None:
-        """The mode of Cycles that is asked for; None leaves what the scene has."""
-        asked = self.denoising
-        return None if asked is None or asked.is_ours else asked
-
-    @property
     def quality(self) -> str:
         """High, balanced or fast, as Cycles has it too; best to fast of ours."""
         first, _, second = self.value.partition("-")
@@ -146,9 +140,9 @@ class Settings:
 
     @property
     def cycles_denoising(self) -> Denoising | None:
-        """The mode of Cycles that is asked for; None leaves what the scene has."""
-        asked = self.denoising
-        return None if asked is None or asked.is_ours else asked
+        """The mode of Cycles that is requested; None leaves what the scene has."""
+        requested = self.denoising
+        return None if requested is None or requested.is_ours else requested
 
     @property
     def quality(self) -> str:

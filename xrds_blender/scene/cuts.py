@@ -1,4 +1,4 @@
-"""Cuts that a scene tells by itself: timeline markers that bind cameras."""
+"""Cuts that a scene declares: timeline markers that bind cameras."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 Everything that an evaluated scene holds goes in, but for what is known not to matter:
 light, samples, denoising, output. So what nobody thought of costs a render. What no
-data-block tells (a file that changed while its times did not, a renderer's own state)
+data-block shows (a file that changed while its times did not, a renderer's own state)
 the key cannot know; a probe render proves it (`cycles/guide_probe.py`). What cannot be
 followed at all raises NotFollowed.
 """
@@ -54,7 +54,7 @@ _RENDER_LEFT_OUT = (
 )
 _RENDER_PREFIXES = ("preview_", "stamp_", "use_stamp", "bake_", "use_bake", "metadata_")
 _RENDER_PREFIXES += ("sequencer_", "use_sequencer", "compositor_", "simplify_gpencil")
-# Of a view layer: what it holds by name, and what is no light's way.
+# Of a view layer: what it holds by name, and what no light passes.
 _LAYER_LEFT_OUT = (
     "use samples objects depsgraph layer_collection active_layer_collection eevee "
     "freestyle_settings use_freestyle lightgroups active_lightgroup active_aov "
@@ -78,7 +78,7 @@ def guide_key(depsgraph: Any, facts: SceneFacts, frame: Any) -> str:
 
 
 def refuse(depsgraph: Any, facts: SceneFacts) -> None:
-    """Raise NotFollowed for what a look at this frame cannot tell."""
+    """Raise NotFollowed for what a look at this frame cannot show."""
     if facts.motion_blur and facts.moving:
         moving = ", ".join(facts.moving)
         raise NotFollowed(f"motion blur of {moving}, whose path is not looked at")

@@ -11,7 +11,7 @@ import numpy as np
 
 
 def image_digest(image: Any) -> tuple[Any, ...]:
-    """What tells an image's pixels apart from all it could hold otherwise."""
+    """What identifies an image's pixels."""
     image = image.original or image
     if image.is_dirty or image.source == "VIEWER":
         return "painted", _pixels(image)

@@ -44,7 +44,7 @@ def mesh(item: Any) -> Iterator[tuple[str, np.ndarray]]:
 
     Generated coordinates come from the mesh before its modifiers, and so do texture
     coordinates whose last bits are not the same each time; what modifiers do to these
-    their settings tell. Raises TypeError for an attribute of an unknown type.
+    their settings say. Raises TypeError for an attribute of an unknown type.
     """
     import bpy
 

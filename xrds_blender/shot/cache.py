@@ -43,7 +43,7 @@ class SampleCache:
     say: Callable[[str], object]
     rendered: set[int] = field(default_factory=set)
 
-    def told(self, numbers: Sequence[int]) -> dict[str, Any]:
+    def report(self, numbers: Sequence[int]) -> dict[str, Any]:
         """Say of frames which were rendered and which were there, for `--json`."""
         return {
             "folder": str(self.folder),
@@ -55,8 +55,8 @@ class SampleCache:
         """Write a frame's views; raises PictureError where that fails."""
         for view, frame in frames.items():
             # an opaque film's alpha says nothing, and would be another channel
-            kept = frame if self.transparent else replace(frame, alpha=None)
-            write_kept(self._path(frame.number, view), kept, self.origin)
+            stored = frame if self.transparent else replace(frame, alpha=None)
+            write_kept(self._path(frame.number, view), stored, self.origin)
             self.rendered.add(frame.number)
 
     def read(self, number: int) -> Sampled | None:
@@ -67,17 +67,17 @@ class SampleCache:
             if not path.is_file():
                 return None
             try:
-                kept = read_frame(path, number, Reading())
+                cached = read_frame(path, number, Reading())
             except PictureError as error:
                 self.say(f"frame {number} is rendered again: {error}")
                 return None
-            if kept.key != self.origin.key:
+            if cached.key != self.origin.key:
                 self.say(
                     f"frame {number} is rendered again: {path} is of another file or "
                     "of other settings"
                 )
                 return None
-            views[view] = _with_alpha(kept.stored)
+            views[view] = _with_alpha(cached.stored)
         return Sampled(number, views, {})
 
     def beside(self, numbers: Sequence[int], radius: int) -> list[int]:
@@ -119,7 +119,7 @@ def cache_of(
 def _key(scene: Any, request: Request, layer: str) -> str:
     """Name what decides a frame's samples: files, settings, and Blender.
 
-    Other files than the .blend are told by name, size and time of change.
+    Other files than the .blend are identified by name, size and time of change.
     """
     import bpy
 
@@ -154,7 +154,7 @@ def _trace(path: Path) -> tuple[str, int, int]:
 
 
 def _with_alpha(stored: Stored) -> Stored:
-    """Add the alpha of an opaque film to a frame that was kept without."""
+    """Add the alpha of an opaque film to a frame that was stored without."""
     if stored.picture.shape[1] == 10:
         return stored
     opaque = np.ones((len(stored.picture), 1), stored.picture.dtype)

@@ -143,11 +143,13 @@ class EngineFrames:
             return self.method.sample(engine, depsgraph, between=between)
         place = scene.frame_current // scene.frame_step
         sampled = self.method.sample(engine, depsgraph, place)
-        asked = _OF_ONE_SAMPLE.keys() & set(requested_passes(depsgraph.view_layer_eval))
-        if asked:
+        requested = _OF_ONE_SAMPLE.keys() & set(
+            requested_passes(depsgraph.view_layer_eval)
+        )
+        if requested:
             others = passes.all_passes()
             first_sample(engine, depsgraph, self.method.request, place)
-            names = set().union(*(_OF_ONE_SAMPLE[each] for each in asked))
+            names = set().union(*(_OF_ONE_SAMPLE[each] for each in requested))
             own = {k: x for k, x in passes.all_passes().items() if k[1] in names}
             passes.put_back(others | own)
         return sampled

@@ -33,12 +33,12 @@ def explain(
     def look(engine: Any, depsgraph: Any) -> dict[str, Any]:
         is_shot = len(shot) > 1 and has_neighbours(scene, request)
         with chosen(engine, depsgraph, request, start, is_shot) as found:
-            return _told(depsgraph, found, scene, shot)
+            return _described(depsgraph, found, scene, shot)
 
     return call_engine(scene, look)
 
 
-def _told(
+def _described(
     depsgraph: Any, choice: Chosen, scene: Any, shot: Sequence[int]
 ) -> dict[str, Any]:
     request, radius = choice.request, choice.request.settings.temporal_radius

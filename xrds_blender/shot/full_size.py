@@ -21,7 +21,7 @@ from ..planning.plan import Decision, full_size
 from ..planning.request import Request
 from ..planning.settings import Denoising, Settings
 from .methods import Method, Report
-from .sampling import Keep, Sampled, sample_frame
+from .sampling import OnSampled, Sampled, sample_frame
 from .stopping import quick
 
 if TYPE_CHECKING:
@@ -32,18 +32,18 @@ if TYPE_CHECKING:
 class FullSize(Method):
     """Samples at full size, denoised.
 
-    `keep` takes each frame that is sampled. `denoise_in_time` gives the quality in the
+    `on_sampled` takes each frame that is sampled. `denoise_in_time` gives the quality in the
     place of the request's, once the samples of a still are there.
     """
 
     def __init__(
         self,
         request: Request,
-        keep: Keep | None = None,
+        on_sampled: OnSampled | None = None,
         denoise_in_time: Callable[[], str] | None = None,
     ) -> None:
         super().__init__(request)
-        self._keep, self._denoise_in_time = keep, denoise_in_time
+        self._on_sampled, self._denoise_in_time = on_sampled, denoise_in_time
         self._quality = self.settings.quality
         self._denoiser = load_denoiser(self._quality, request.machine)
         self._movement = Movement()
@@ -55,7 +55,7 @@ class FullSize(Method):
         place: int | None = None,
         between: bool = False,
     ) -> Sampled:
-        return sample_frame(engine, depsgraph, self.request, place, self._keep)
+        return sample_frame(engine, depsgraph, self.request, place, self._on_sampled)
 
     def begin_finishing(self, engine: Any) -> Report:
         if self._denoise_in_time is not None:
@@ -145,7 +145,7 @@ def temporal(settings: Settings, gathered: Accumulated) -> Temporal:
 
 
 def accumulation(gathered: Accumulated) -> Decision:
-    """What was decided where neighbours were asked for their samples."""
+    """What was decided where neighbours' samples were reused."""
     frames = gathered.frames
     reason = "neighbouring frames show the same: their samples count here as well"
     return Decision("accumulation", f"frames {frames[0]} to {frames[-1]}", reason)

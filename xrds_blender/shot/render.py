@@ -30,7 +30,7 @@ from .cycles_only import CyclesOnly
 from .engine_frames import EngineFrames
 from .full_size import FullSize
 from .methods import Method
-from .sampling import Keep, Sampled, has_neighbours
+from .sampling import OnSampled, Sampled, has_neighbours
 from .super_resolution import SuperResolution
 
 
@@ -50,8 +50,8 @@ class Animations:
     by_layer: dict[tuple[str, str], _Animation] = field(default_factory=dict)
 
 
-def method_of(chosen: Chosen, keep: Keep | None = None) -> Method:
-    """What makes pictures of a job; `keep` as in `FullSize`.
+def method_of(chosen: Chosen, on_sampled: OnSampled | None = None) -> Method:
+    """What makes pictures of a job; `on_sampled` as in `FullSize`.
 
     Raises XRDSError where its parts cannot be loaded.
     """
@@ -59,7 +59,7 @@ def method_of(chosen: Chosen, keep: Keep | None = None) -> Method:
     if request.settings.is_cycles_only:
         return CyclesOnly(request)
     if not request.settings.is_enlarged:
-        return FullSize(request, keep, chosen.denoise_in_time)
+        return FullSize(request, on_sampled, chosen.denoise_in_time)
     return SuperResolution(request)
 
 
@@ -116,7 +116,7 @@ def render_alone(
             picture = _finish(engine, layer.name, method, own)
     finally:
         stages.end()
-    return _told(found, picture, layer, start)
+    return _described(found, picture, layer, start)
 
 
 def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Picture:
@@ -143,17 +143,17 @@ def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Pictu
         picture = _finish(engine, key[1], frames.method, found.own, others)
     finally:
         stages.end()
-    return _told(animation.chosen, picture, layer, start)
+    return _described(animation.chosen, picture, layer, start)
 
 
-def _told(
+def _described(
     choice: Chosen, picture: Picture, layer: history.Layer, start: float
 ) -> Picture:
     """The picture with what it was rendered by and how long; it is remembered."""
-    picture = choice.told(picture)
+    picture = choice.described(picture)
     picture.seconds["total"] = time.perf_counter() - start
     assert picture.settings is not None
-    history.keep(layer, picture.settings, picture.seconds)
+    history.remember(layer, picture.settings, picture.seconds)
     return picture
 
 
@@ -187,7 +187,7 @@ def _finish(
 
 def _leave_stopped(engine: Any, layer_name: str, method: Method, own: Sampled) -> None:
     """Leave what there is of a frame that was stopped, if the request asks for it."""
-    if method.request.stop_keeps:
+    if method.request.finish_stopped:
         _write(engine, layer_name, method, own, method.stopped(own))
 
 
@@ -209,7 +209,7 @@ def _write(
 def _renders_single_frames() -> bool:
     """Whether Blender was started for frames by number alone.
 
-    Each is a render job of its own then, which could keep nothing for the next. What
+    Each is a render job of its own then, which could pass nothing on to the next. What
     stands after -- is a script's, as is everything where Blender is a module.
     """
     if not _is_program_without_window():

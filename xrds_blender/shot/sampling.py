@@ -20,7 +20,7 @@ from ..cycles.view import cameras_of, can_track
 from ..frame import denoisers, stages
 from ..planning.request import Request
 from ..scene.contents import scene_facts, shapes_move, stands_still
-from .stopping import keep_samples
+from .stopping import finish_samples
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
@@ -28,7 +28,7 @@ LARGEST_SEED = 2**31 - 1
 _FEWEST = 1.0  # samples, on the mean of a frame
 
 
-Keep = Callable[[Mapping[str, Frame]], object]
+OnSampled = Callable[[Mapping[str, Frame]], object]
 """Takes a frame's samples by view, to be used another time."""
 
 
@@ -57,7 +57,7 @@ class Sampling:
     `count` samples per pixel; `geometry` names passes. `place` is the frame's in the
     shot where frames continue one sequence, None where each begins its own. `still`
     is as in `Frame`. A frame that `has_halves` is sampled in two; one that
-    `needs_motion` is rendered once more without motion blur, to tell it. One that
+    `needs_motion` is rendered once more without motion blur for its motion. One that
     `is_alone` has no neighbours: it is sampled as its file has it.
     """
 
@@ -134,7 +134,9 @@ def sampling_of(
         return Sampling(scene.frame_current)
     cameras = cameras_of(engine, depsgraph)
     if not cameras:
-        raise SceneError("such panoramas lend nothing; set the temporal radius to 0")
+        raise SceneError(
+            "such panoramas cannot be reprojected; set the temporal radius to 0"
+        )
     is_even = _is_even(scene, request)
     if not can_continue(scene, request):
         place = None
@@ -156,7 +158,7 @@ def sampling_of(
 
 
 def _is_even(scene: Any, request: Request) -> bool:
-    """Whether every pixel takes as many samples as it is asked to."""
+    """Whether every pixel takes as many samples as are requested."""
     cycles = scene.cycles
     decides = cycles.use_adaptive_sampling or cycles.time_limit
     return request.settings.samples is not None or not decides
@@ -177,20 +179,20 @@ def sample_frame(
     depsgraph: Any,
     request: Request,
     place: int | None = None,
-    keep: Keep | None = None,
+    on_sampled: OnSampled | None = None,
 ) -> Sampled:
     """Render the frame that the dependency graph is at; the result holds its passes.
 
     A frame with neighbours is rendered as `noisy_frame` does it and packed for the
-    window; `keep` takes its views before that. Raises what `noisy_frame` does.
+    window; `on_sampled` takes its views before that. Raises what `noisy_frame` does.
     """
     number = depsgraph.scene_eval.frame_current
     if not request.settings.temporal_radius:
         samples, seconds = _alone(engine, depsgraph, request)
         return Sampled(number, dict(samples), seconds)
     frames, seconds = noisy_frame(engine, depsgraph, request, place)
-    if keep is not None:
-        keep(frames)
+    if on_sampled is not None:
+        on_sampled(frames)
     views = {view: store(frame, np.float16) for view, frame in frames.items()}
     return Sampled(number, views, seconds)
 
@@ -206,7 +208,7 @@ def _alone(
             engine, depsgraph, samples=request.settings.samples, seed=request.seed
         )
     except Cancelled:
-        keep_samples(engine, layer_name, request)
+        finish_samples(engine, layer_name, request)
         raise
     return found, {"sync": clock.sync, "beauty": clock.render}
 
@@ -235,7 +237,7 @@ def noisy_frame(
             geometry=how.geometry,
         )
     except Cancelled:
-        keep_samples(engine, layer_name, request)
+        finish_samples(engine, layer_name, request)
         raise
     if clock.samples:  # where Cycles stopped before the most it was allowed
         how = replace(how, count=min(clock.samples, how.count))
@@ -301,7 +303,7 @@ def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
 
 
 def _geometry(depsgraph: Any) -> Sequence[tuple[str, str]]:
-    """The passes that tell where pixels were; motion only where things may move.
+    """The passes for reprojection; motion only where things may move.
 
     Cycles gives no vectors with motion blur.
     """

@@ -34,7 +34,7 @@ def render_shot(
     """Render frames of a scene, each with its neighbours' samples, in order.
 
     Frames that `is_done` says are there are neighbours alone, and only where they are
-    needed. A `cache` keeps the samples of every frame rendered; what it has already is
+    needed. A `cache` stores the samples of every frame rendered; what it has already is
     not rendered again, and may lie beyond the ends of these frames. Yields numbers and
     pictures, of stereo the first view's; the scene stays at the last frame rendered.
     What the request leaves open is chosen at the first frame to render. Raises what
@@ -68,7 +68,7 @@ def render_shot(
         picture = method.finish(own, others, view)
         seconds = dict.fromkeys(stages.STAGES, 0.0) | own.seconds | picture.seconds
         seconds["total"] = sum(seconds.values())
-        yield number, chosen.told(replace(picture, seconds=seconds))
+        yield number, chosen.described(replace(picture, seconds=seconds))
 
 
 def _chosen(scene: Any, request: Request, todo: Sequence[int]) -> Chosen:
@@ -99,7 +99,7 @@ def _sample(
     number: int,
     between: bool = False,
 ) -> Sampled:
-    """Sample a frame of a shot, the same way whatever part of the shot `frames` are."""
+    """Sample a frame of a shot, alike whatever part of the shot `frames` are."""
     scene.frame_set(number)
     place = place_of(number, frames)
 

@@ -18,9 +18,9 @@ from ..planning.settings import Denoising
 from .enlarging import enlarged
 
 
-def keep_samples(engine: Any, layer_name: str, request: Request) -> None:
+def finish_samples(engine: Any, layer_name: str, request: Request) -> None:
     """Denoise the full-size samples in the result, if the request asks for it."""
-    if not request.stop_keeps:
+    if not request.finish_stopped:
         return
     denoiser = load_denoiser("fast", request.machine)
     noisy = samples_in(engine, layer_name)
@@ -32,14 +32,14 @@ def keep_samples(engine: Any, layer_name: str, request: Request) -> None:
     session.write_combined(engine, layer_name, pictures)
 
 
-def keep_low_samples(
+def finish_low_samples(
     engine: Any, layer_name: str, request: Request, light: dict[str, LowSamples]
 ) -> None:
-    """Denoise low-resolution samples, if it is asked for, and as `keep_beauties`.
+    """Denoise low-resolution samples, if requested, and as `finish_beauties`.
 
     Views without any are left out.
     """
-    if not request.stop_keeps:
+    if not request.finish_stopped:
         return
     denoise = in_process(Denoising.XRDS_FAST, request.machine)
     beauties = {
@@ -49,14 +49,14 @@ def keep_low_samples(
         for view, low in light.items()
         if low.samples.picture.any()
     }
-    keep_beauties(engine, layer_name, request, beauties)
+    finish_beauties(engine, layer_name, request, beauties)
 
 
-def keep_beauties(
+def finish_beauties(
     engine: Any, layer_name: str, request: Request, beauties: dict[str, Beauty]
 ) -> None:
     """Make low-resolution pictures the result, enlarged, if the request asks for it."""
-    if request.stop_keeps:
+    if request.finish_stopped:
         result = engine.get_result()
         size = result.resolution_y, result.resolution_x
         pictures = enlarged(beauties, request.settings.scale, size)

@@ -43,7 +43,7 @@ from .enlarging import enlarge, enlarged, enlarged_lights
 from .full_size import accumulation, temporal
 from .methods import Method, Report
 from .sampling import Sampled, Sampling, light_of, sampling_of
-from .stopping import keep_beauties, keep_low_samples
+from .stopping import finish_beauties, finish_low_samples
 
 if TYPE_CHECKING:
     from xrds_core.denoising import Denoiser
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 _OF_OTHERS = Decision(
     "guides", "of the frames beside", "only the camera moves: they show the same"
 )
-_NOT_KEPT = Decision(
+_NOT_CACHED = Decision(
     GUIDE_CACHE, "off", "the camera moves: no frame has the guides of another"
 )
 
@@ -86,7 +86,7 @@ class Inputs:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """One view of a frame of a shot as the window keeps it, noisy.
+    """One view of a frame of a shot as the window stores it, noisy.
 
     `place` is that of the light's pixels, `camera` sees those of the picture. Guides of
     the same `guide_name` hold each other's samples: they are not added up. None where
@@ -241,9 +241,9 @@ class _Renders:
             guides = self._guides(source, beauties)
         except Cancelled:
             if beauties:
-                keep_beauties(self.engine, self.layer_name, self.request, beauties)
+                finish_beauties(self.engine, self.layer_name, self.request, beauties)
             else:
-                self._keep_light()
+                self._finish_light()
             raise
         first = self.passes.views[0]
         rendered = beauties[first].seconds, guides[first].seconds
@@ -271,15 +271,15 @@ class _Renders:
                 found, decision, seconds = self._with_guides(views, light)
                 rendered.append(seconds)
         except Cancelled:
-            self._keep_light(light)
+            self._finish_light(light)
             raise
         return Sampled(
             self.how.number, _with_decision(found, decision), _summed(rendered)
         )
 
-    def _keep_light(self, light: Mapping[str, LowSamples] | None = None) -> None:
+    def _finish_light(self, light: Mapping[str, LowSamples] | None = None) -> None:
         light = light or self.passes.stopped_samples(self.settings.scale)
-        keep_low_samples(self.engine, self.layer_name, self.request, light)
+        finish_low_samples(self.engine, self.layer_name, self.request, light)
 
     def _beauties(self) -> dict[str, Beauty]:
         """The denoised low-resolution light by view."""
@@ -335,8 +335,8 @@ class _Renders:
         ):
             return False
         spare = {name for _, name in self.engine.spare_passes}
-        asked = set(self.passes.pass_names()) - spare - {COMBINED}
-        if not all(is_light(name) for name in asked):
+        requested = set(self.passes.pass_names()) - spare - {COMBINED}
+        if not all(is_light(name) for name in requested):
             return False  # they come with the guides
         # under a camera that stands still guides are not rendered again anyway
         return self.how.place is None and not shapes_move(self.depsgraph)
@@ -355,8 +355,8 @@ class _Renders:
             )
             for view, each in views.items()
         }
-        is_kept = self.how.place is not None or self.request.guide_cache is not None
-        decision = source.decision if is_kept else _NOT_KEPT
+        is_cached = self.how.place is not None or self.request.guide_cache is not None
+        decision = source.decision if is_cached else _NOT_CACHED
         return found, decision, next(iter(guides.values())).seconds
 
     def _source(self, request: Request, samples: int) -> GuideSource:
@@ -410,17 +410,17 @@ def _with_decision(views: dict[str, View], decision: Decision) -> dict[str, View
 
 
 def _guide_request(request: Request, how: Sampling, samples: int) -> Request:
-    """Under a camera that stands still guides are kept until they are as many.
+    """Under a camera that stands still guides are accumulated until they are as many.
 
     Under another no frame finds what one before it has left, so memory is spared.
     """
     if how.place is not None:
         enough = samples * (2 * how.radius + 1)
         return replace(request, guide_limit=max(request.guide_limit, enough))
-    kept = request.savings
+    savings = request.savings
     if request.guide_cache is None:
-        kept = tuple(name for name in kept if name != _NOT_KEPT.decision)
-    return replace(request, seed=how.own_seed, savings=kept)
+        savings = tuple(name for name in savings if name != _NOT_CACHED.decision)
+    return replace(request, seed=how.own_seed, savings=savings)
 
 
 def _stored_light(how: Sampling, scale: int, low: LowSamples, view: str) -> Stored:

@@ -38,7 +38,7 @@ def _scripts() -> list[Callable[..., Any]]:
 
 
 def _call(handler: Callable[..., Any], scene: Any) -> None:
-    """As Blender does: with one argument or two; an error is told, and that is all."""
+    """As Blender does: with one argument or two; an error is reported, no more."""
     code = getattr(handler, "__code__", None)
     arguments = [scene] if code and code.co_argcount == 1 else [scene, None]
     try:
