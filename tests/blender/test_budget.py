@@ -9,14 +9,14 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
 
-PLAIN, QUICK = Choice(Denoiser.HIGH_ACCURATE, 0), Choice(Denoiser.FAST_FAST, 0)
-LOW = Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 2)
-FULL = Choice(Denoiser.HIGH_FAST, 0, 2, "fast", "full", 1)
+PLAIN, QUICK = Choice(Denoising.HIGH_ACCURATE, 0), Choice(Denoising.FAST_FAST, 0)
+LOW = Choice(Denoising.HIGH_FAST, 0, 4, "fast", "fast", 2)
+FULL = Choice(Denoising.HIGH_FAST, 0, 2, "fast", "full", 1)
 NETWORKS = [LOW.network, FULL.network]
 ERRORS = ErrorModel(
     {
@@ -36,7 +36,7 @@ COSTS = Costs(
 positive = st.floats(0.01, 100.0)
 
 
-def choose(seconds: float, costs: Costs = COSTS) -> budget.Picked:
+def choose(seconds: float, costs: Costs = COSTS) -> budget.Selection:
     return budget.choose(seconds, costs, ERRORS, NETWORKS)
 
 
@@ -124,7 +124,7 @@ def test_full_size_may_be_a_little_late_where_only_super_resolution_fits() -> No
     errors = ErrorModel({QUICK: ERRORS.curves[QUICK], LOW: Curve((4,), (15.0,))})
     quick = COSTS.seconds(replace(QUICK, samples=1))  # 7 s; LOW takes 5.45 s
 
-    def chosen(budget_seconds: float) -> budget.Picked:
+    def chosen(budget_seconds: float) -> budget.Selection:
         cheap = replace(COSTS, guide=0.1)
         return budget.choose(budget_seconds, cheap, errors, NETWORKS)
 
@@ -139,10 +139,10 @@ OURS = ErrorModel(
     {
         Choice(mode, 0): Curve((1, 16), (best - 8, best))
         for mode, best in {
-            Denoiser.XRDS_FAST: 30.0,
-            Denoiser.XRDS_MEDIUM: 32.0,
-            Denoiser.XRDS_HIGH: 34.0,
-            Denoiser.XRDS_BEST: 34.5,
+            Denoising.XRDS_FAST: 30.0,
+            Denoising.XRDS_MEDIUM: 32.0,
+            Denoising.XRDS_HIGH: 34.0,
+            Denoising.XRDS_BEST: 34.5,
         }.items()
     }
 )
@@ -160,20 +160,20 @@ OUR_COSTS = replace(
 @pytest.mark.parametrize(
     ("left", "denoiser"),
     [
-        (12.0, Denoiser.XRDS_BEST),  # the samples took less than expected
-        (10.9, Denoiser.XRDS_HIGH),
-        (5.9, Denoiser.XRDS_HIGH),  # what was chosen may be a little late
-        (4.9, Denoiser.XRDS_MEDIUM),
-        (3.1, Denoiser.XRDS_MEDIUM),
-        (2.9, Denoiser.XRDS_FAST),
-        (-3.0, Denoiser.XRDS_FAST),
-        (-60.0, Denoiser.XRDS_HIGH),  # five seconds more are nothing then
+        (12.0, Denoising.XRDS_BEST),  # the samples took less than expected
+        (10.9, Denoising.XRDS_HIGH),
+        (5.9, Denoising.XRDS_HIGH),  # what was chosen may be a little late
+        (4.9, Denoising.XRDS_MEDIUM),
+        (3.1, Denoising.XRDS_MEDIUM),
+        (2.9, Denoising.XRDS_FAST),
+        (-3.0, Denoising.XRDS_FAST),
+        (-60.0, Denoising.XRDS_HIGH),  # five seconds more are nothing then
     ],
 )
 def test_samples_get_the_best_denoiser_for_the_seconds_left(
-    left: float, denoiser: Denoiser
+    left: float, denoiser: Denoising
 ) -> None:
-    chosen = Choice(Denoiser.XRDS_HIGH, 4)
+    chosen = Choice(Denoising.XRDS_HIGH, 4)
     found = budget.denoiser_in_time(20.0 - left, 20.0, chosen, OUR_COSTS, OURS)
     assert found is denoiser
 
@@ -204,14 +204,14 @@ def test_xrds_is_taken_where_the_denoiser_leaves_no_time() -> None:
 
 
 def test_denoisers_that_are_not_there_are_not_chosen() -> None:
-    ours = Choice(Denoiser.XRDS_HIGH, 0)
+    ours = Choice(Denoising.XRDS_HIGH, 0)
     errors = ErrorModel({**ERRORS.curves, ours: Curve((1, 4, 16), (24.0, 29.0, 33.0))})
-    costs = replace(COSTS, denoise={**COSTS.denoise, Denoiser.XRDS_HIGH: 14.0})
+    costs = replace(COSTS, denoise={**COSTS.denoise, Denoising.XRDS_HIGH: 14.0})
     picked = budget.choose(60.0, costs, errors, [])
-    assert picked.choice.denoiser is Denoiser.XRDS_HIGH  # more samples fit
+    assert picked.choice.denoiser is Denoising.XRDS_HIGH  # more samples fit
     assert picked.choice.label == "full size, 10 samples, high denoising"
     assert "best plain for 60 s" in picked.decision(60.0).reason
-    left = errors.limited({Denoiser.HIGH_ACCURATE})
+    left = errors.limited({Denoising.HIGH_ACCURATE})
     assert budget.choose(60.0, costs, left, []).choice.denoiser == "HIGH-ACCURATE"
     assert set(left.curves) == {PLAIN, LOW, FULL}
 
@@ -243,8 +243,8 @@ def test_unreachable_quality_takes_the_best_and_says_so() -> None:
 
 def test_shipped_model_is_whole() -> None:
     model = budget.shipped()
-    assert set(model.denoiser_speed) == set(Denoiser)
-    assert model.denoiser_speed[DEFAULT_DENOISER] == pytest.approx(1.0)
+    assert set(model.denoiser_speed) == set(Denoising)
+    assert model.denoiser_speed[DEFAULT_DENOISING] == pytest.approx(1.0)
     assert any(choice.scale > 1 for choice in model.errors.curves)
     for choice, curve in model.errors.curves.items():
         assert choice.denoiser in model.denoiser_speed

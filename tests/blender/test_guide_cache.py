@@ -13,12 +13,11 @@ from hostile import Trigger
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.frame.job import Picture
-
 from xrds_blender import render
 from xrds_blender.cycles.pass_names import ALBEDO, NORMAL
 from xrds_blender.frame import guide_cache
 from xrds_blender.frame.guide_cache import CachedGuides, GuideCache
+from xrds_blender.frame.picture import Picture
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.plan import savings_but
 from xrds_lab.studio import traps

@@ -20,8 +20,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from guides import deeds, settings, stage
-from xrds_blender.frame.facts import find_facts
-from xrds_blender.frame.job import RenderJob
+from xrds_blender.choosing.facts import find_facts
 
 from xrds_blender.cycles import passes as cycles_passes
 from xrds_blender.cycles.passes import CyclesPasses
@@ -32,10 +31,11 @@ from xrds_blender.frame.guides import GuideSource
 from xrds_blender.frame.rendering import call_engine, run_job
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.plan import GuideRender, savings_but
+from xrds_blender.planning.request import Request, request
 from xrds_lab.studio import traps
 from xrds_lab.studio.nodes import Surface
 
-KEPT = RenderJob(scale=2, samples=1, guide_samples=1, seed=1)
+KEPT = request(scale=2, samples=1, guide_samples=1, seed=1)
 ANEW = replace(KEPT, savings=savings_but("guide cache"))
 Passes = dict[tuple[str, str], np.ndarray]
 
@@ -118,7 +118,7 @@ def small_probe(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cycles_passes, "PROBE_PIXELS", 100)
 
 
-def guides(job: RenderJob, told: list[str] | None = None) -> tuple[str, str, Passes]:
+def guides(job: Request, told: list[str] | None = None) -> tuple[str, str, Passes]:
     """What the cache says of itself, why, and every pass of the guides.
 
     What goes to the log goes into `told`.

@@ -10,13 +10,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.frame.facts import find_facts
-from xrds_blender.frame.job import RenderJob
+from xrds_blender.choosing.facts import find_facts
 
 from xrds_blender import run_job
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import plan
+from xrds_blender.planning.request import request
 from xrds_blender.shot.explain import explain
 from xrds_lab.studio import traps
 
@@ -52,7 +52,7 @@ def test_the_plan_leaves_guides_as_they_are(name: str) -> None:
     scene = small(name)
 
     def job(passes: Any) -> Any:
-        facts = find_facts(passes._depsgraph, RenderJob())
+        facts = find_facts(passes._depsgraph, request())
         how = plan.decide(facts).guides
         whole = [guides(passes, plan.GuideRender(), seed) for seed in (1, 2)]
         return how, whole, guides(passes, how)
@@ -82,7 +82,7 @@ def test_the_traps_are_traps(name: str, omission: str) -> None:
     scene = small(name)
 
     def job(passes: Any) -> Any:
-        facts = find_facts(passes._depsgraph, RenderJob())
+        facts = find_facts(passes._depsgraph, request())
         whole = [guides(passes, plan.GuideRender(), seed) for seed in (1, 2)]
         return plan.decide(facts).guides, whole, guides(passes, LESS[omission])
 
@@ -107,7 +107,7 @@ def test_a_pass_after_the_guides_has_its_lights_again() -> None:
 
 
 def decided(scene: Any) -> plan.Plan:
-    facts = call_engine(scene, lambda _, graph: find_facts(graph, RenderJob()))
+    facts = call_engine(scene, lambda _, graph: find_facts(graph, request()))
     return plan.decide(replace(facts, has_denoiser=True))
 
 
@@ -192,7 +192,7 @@ def test_a_plan_is_of_the_frames_asked_for() -> None:
     scene.collection.objects.link(other)
     for frame, camera in ((1, scene.camera), (8, other)):
         scene.timeline_markers.new(camera.name, frame=frame).camera = camera
-    job = RenderJob(scale=2, temporal_radius=2)
+    job = request(scale=2, temporal_radius=2)
 
     def told(*frames: int) -> tuple[bool, dict[str, str]]:
         found = explain(scene, job, frames)

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from xrds_blender.planning.ways import Means, Way
+from xrds_blender.planning.modes import Means, Way
 
 import xrds_blender
 from xrds_blender.frame import history, progress
@@ -31,7 +31,7 @@ from xrds_blender.interface import (
 )
 from xrds_blender.internals.lifetimes import FILE, PROCESS
 from xrds_blender.planning import ways
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import Network
 
 
 @pytest.fixture(autouse=True)

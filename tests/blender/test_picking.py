@@ -9,21 +9,21 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from xrds_blender.frame.job import RenderJob
-from xrds_blender.planning.denoiser import Denoiser
 
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
 from xrds_blender.frame import picking
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
+from xrds_blender.planning.request import request
+from xrds_blender.planning.settings import Denoising
 from xrds_blender.shot.explain import explain
 from xrds_core.errors import UsageError, XRDSError
 
-XRDS = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 1)
-PLAIN = budget.Choice(Denoiser.FAST_FAST, 0)
-FULL = budget.Choice(Denoiser.XRDS_FAST, 0)
-BEST = budget.Choice(Denoiser.XRDS_BEST, 0)
+XRDS = budget.Choice(Denoising.HIGH_FAST, 0, 4, "fast", "fast", 1)
+PLAIN = budget.Choice(Denoising.FAST_FAST, 0)
+FULL = budget.Choice(Denoising.XRDS_FAST, 0)
+BEST = budget.Choice(Denoising.XRDS_BEST, 0)
 
 
 # So dear that four samples are many: no test depends on how busy the machine is.
@@ -31,7 +31,7 @@ COSTS = budget.Costs(
     fixed=1.0,
     beauty=100.0,
     guide=50.0,
-    denoise=dict.fromkeys(Denoiser, 10.0),
+    denoise=dict.fromkeys(Denoising, 10.0),
     network={XRDS.network: 1.0},
 )
 
@@ -49,7 +49,7 @@ def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         errors = budget.ErrorModel(curves)
         model = replace(budget.shipped(), errors=errors)
         monkeypatch.setattr(budget, "shipped", lambda: model)
-        monkeypatch.setattr(picking, "_denoisers", lambda: tuple(Denoiser))
+        monkeypatch.setattr(picking, "_denoisers", lambda: tuple(Denoising))
         monkeypatch.setattr(picking, "probe", lambda *_: COSTS)
         monkeypatch.setattr(picking, "with_guides", lambda costs, _: costs)
         monkeypatch.setattr(picking, "network_seconds_per_pixel", lambda *_: 1e-6)
@@ -69,7 +69,7 @@ def test_probes_measure_the_scene(still_life: Callable[..., Any]) -> None:
     assert min(costs.fixed, costs.beauty, true.guide) > 0
     assert costs.guide < costs.beauty
     assert costs.fixed < true.fixed < time.perf_counter() - start + 1
-    assert set(costs.denoise) == set(Denoiser)
+    assert set(costs.denoise) == set(Denoising)
     assert min(costs.denoise.values()) > 0
     assert set(costs.network) == set(networks)
 
@@ -182,7 +182,7 @@ def test_time_that_the_samples_leave_is_for_a_better_denoiser(
     pytest.importorskip("mitsuba_oidn")
     only(full=40.0, best=41.0)
     costs = replace(
-        COSTS, denoise=COSTS.denoise | {Denoiser.XRDS_BEST: seconds_of_best}
+        COSTS, denoise=COSTS.denoise | {Denoising.XRDS_BEST: seconds_of_best}
     )
     monkeypatch.setattr(picking, "probe", lambda *_: costs)
     picture = render(still_life(64, 48), time_budget=500.0)
@@ -224,7 +224,7 @@ def test_the_plan_told_is_the_one_rendered(
     only(**{name: 40.0 if name == best else 20.0 for name in ("xrds", "plain", "full")})
     ensure_registered()
     scene = still_life(64, 48)
-    told = explain(scene, RenderJob(**goal))
+    told = explain(scene, request(**goal))
     picture = render(scene, **goal)
     before = [(each["decision"], each["value"]) for each in told["decisions"]]
     decided = [(each.decision, each.value) for each in picture.plan]
@@ -279,4 +279,4 @@ def test_panel_setting_reaches_the_job(still_life: Callable[..., Any]) -> None:
 )
 def test_wrong_wishes_are_refused(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(UsageError, match=message):
-        RenderJob(**wrong)
+        request(**wrong)

@@ -14,26 +14,25 @@ from channels import read_channels
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
-from xrds_blender.frame.job import RenderJob
-from xrds_blender.planning.denoiser import Denoiser
-
 from xrds_blender.command.render_file import render_file
 from xrds_blender.frame import picking
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
+from xrds_blender.planning.request import request
+from xrds_blender.planning.settings import Denoising
 from xrds_blender.shot.explain import explain
 
 FRAMES = [1, 2, 3]
-FULL = Choice(Denoiser.XRDS_FAST, 0)
-LOW = Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 1)
+FULL = Choice(Denoising.XRDS_FAST, 0)
+LOW = Choice(Denoising.HIGH_FAST, 0, 4, "fast", "fast", 1)
 FULL_GUIDES = replace(LOW, guides="full")
 # So dear that two samples are many: no test depends on how busy the machine is.
 COSTS = Costs(
     fixed=1.0,
     beauty=100.0,
     guide=10.0,
-    denoise=dict.fromkeys(Denoiser, 10.0),
+    denoise=dict.fromkeys(Denoising, 10.0),
     network={LOW.network: 1.0, FULL_GUIDES.network: 1.0},
 )
 
@@ -72,7 +71,7 @@ def best(monkeypatch: pytest.MonkeyPatch, probed: list[int]) -> Callable[..., No
 
 
 def rendered(blend: Path, radius: int = 1, **more: Any) -> dict[str, Any]:
-    job = RenderJob(temporal_radius=radius, **{"time_budget": 300.0, **more})
+    job = request(temporal_radius=radius, **{"time_budget": 300.0, **more})
     frames = str(blend.parent / "command" / "#.exr")
     return render_file(blend, frames, job, frames=FRAMES, resume=True)
 
@@ -145,7 +144,7 @@ def test_the_plan_told_is_the_one_rendered(
 ) -> None:
     ensure_registered()
     bpy.ops.wm.open_mainfile(filepath=str(blend))
-    job = RenderJob(temporal_radius=1, **goal)
+    job = request(temporal_radius=1, **goal)
     told = explain(bpy.context.scene, job, FRAMES)["decisions"]
     plan = rendered(blend, **({"time_budget": None} | goal))["plan"]
     assert told[0] == plan[0]

@@ -9,10 +9,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.frame.job import NetworkFailed
-
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
+from xrds_blender.frame.picture import NetworkFailed
 from xrds_blender.interface.registration import ensure_registered
 from xrds_core.errors import Cancelled, OutOfMemory
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from xrds_blender.planning.denoiser import Denoiser
-from xrds_blender.planning.ways import (
+from xrds_blender.planning.modes import (
     WAYS,
     Asked,
     Means,
@@ -20,8 +19,8 @@ from xrds_blender.planning.ways import (
 
 from xrds_blender.internals.lifetimes import FILE
 from xrds_blender.planning import budget
-from xrds_blender.planning.budget import Network
 from xrds_blender.planning.measured import GUIDE_SHARE, Measured, learn
+from xrds_blender.planning.settings import Denoising, Network
 
 MODEL = budget.shipped()
 NETWORKS = frozenset(Network("fast", scale, "fast") for scale in (2, 4, 8))
@@ -76,12 +75,12 @@ def test_decibels_are_differences_at_the_samples_asked_for() -> None:
 def test_nothing_is_told_of_what_was_not_measured() -> None:
     few = looks(replace(ASKED, samples=4))
     assert few[Way.X8].decibels is None  # measured from 16 samples on
-    quick = replace(ASKED, samples=4096, plain_denoiser=Denoiser.FAST_FAST)
-    short = MODEL.errors.curves[budget.Choice(Denoiser.FAST_FAST, 0)]
+    quick = replace(ASKED, samples=4096, plain_denoiser=Denoising.FAST_FAST)
+    short = MODEL.errors.curves[budget.Choice(Denoising.FAST_FAST, 0)]
     apart = looks(quick)[Way.PLAIN].decibels
     assert apart == pytest.approx(
         short.psnr[-1]
-        - MODEL.errors.curves[budget.Choice(Denoiser.XRDS_HIGH, 0)].at(
+        - MODEL.errors.curves[budget.Choice(Denoising.XRDS_HIGH, 0)].at(
             short.samples[-1]
         ),
         abs=0.01,
@@ -102,7 +101,7 @@ def test_guides_between_two_counts_promise_the_lower() -> None:
     assert five == looks(ASKED)[Way.X2]
 
 
-DENOISE = 10.0 * MODEL.denoiser_speed[Denoiser.XRDS_HIGH]
+DENOISE = 10.0 * MODEL.denoiser_speed[Denoising.XRDS_HIGH]
 FULL = {
     "sync": 1.0,
     "beauty": 32.0,
@@ -165,13 +164,13 @@ def test_plain_alone_does_not_tell_samples_from_denoising() -> None:
 def test_layers_of_a_scene_add_up() -> None:
     from types import SimpleNamespace
 
-    from xrds_blender.frame.job import Picture, RenderJob
-
     from xrds_blender.frame import history
+    from xrds_blender.frame.picture import Picture
+    from xrds_blender.planning.request import request
 
     FILE.end()
     picture = Picture(None, None, seconds=FULL)
-    job = RenderJob(1)
+    job = request(1)
     for layer in ("fore", "back"):
         history.keep(history.Place("Scene", layer, PIXELS, 16, None), job, picture)
     render = SimpleNamespace(

@@ -13,12 +13,11 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from xrds_blender.planning.denoiser import Denoiser
 
 from xrds_blender import run_job
 from xrds_blender.command import main
 from xrds_blender.planning import budget
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import Denoising, Network
 from xrds_core.errors import UsageError
 from xrds_lab.bench import (
     growth,
@@ -49,10 +48,10 @@ SIZE = (72, 52)  # that 4 does not divide: the low picture reaches beyond the fr
 @pytest.fixture(autouse=True)
 def few_modes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two modes of the denoiser instead of nine."""
-    few = (Denoiser.HIGH_ACCURATE, Denoiser.HIGH_FAST)
+    few = (Denoising.HIGH_ACCURATE, Denoising.HIGH_FAST)
     for module in ("sweep", "measure", "analysis"):
         user = importlib.import_module(f"xrds_lab.bench.{module}")
-        for name in ("DENOISERS", "LOW_DENOISERS"):
+        for name in ("DENOISERS", "LOW_DENOISING"):
             if hasattr(user, name):
                 monkeypatch.setattr(user, name, few)
     monkeypatch.setattr(growth, "_core_counts", lambda: [machine.cores()])
@@ -246,9 +245,9 @@ def test_the_pickers_model_is_written_and_can_be_read(world: World) -> None:
     world.run(timing=False, model=file)
     model = budget.Model.read(file)
     assert model.source.startswith("mean over 1 scenes: cubes; weights: fast x4")
-    plain = budget.Choice(Denoiser.HIGH_FAST, 0)
+    plain = budget.Choice(Denoising.HIGH_FAST, 0)
     assert model.errors.curves[plain].samples == (1, 2)
-    own = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 2)
+    own = budget.Choice(Denoising.HIGH_FAST, 0, 4, "fast", "fast", 2)
     assert own in model.errors.curves
 
 

@@ -12,12 +12,12 @@ import bpy
 import numpy as np
 import pytest
 from mathutils import Matrix
-from xrds_blender.planning.denoiser import CYCLES_DENOISERS
 
 from xrds_blender import run_job
 from xrds_blender.cycles.samples import sample_layer
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
+from xrds_blender.planning.settings import CYCLES_DENOISING
 from xrds_core.errors import SceneError, UsageError
 from xrds_core.temporal.frame import Camera, Frame
 from xrds_lab.bench.windows import Window
@@ -227,7 +227,7 @@ def test_cycles_denoiser_is_cycles_own(still_life: Callable[..., Any]) -> None:
     )
 
     def render(passes: Any) -> dict[str, Any]:
-        modes = CYCLES_DENOISERS
+        modes = CYCLES_DENOISING
         return {m: passes.beauty(1, 2, seed=5, denoiser=m).radiance for m in modes}
 
     for mode, expected in run_job(scene, render).items():

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import Network
 from xrds_lab.bench.low_budgets import CACHED, FRESH, LowSweep, markdown, rows
 
 

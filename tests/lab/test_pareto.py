@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from xrds_blender.planning.denoiser import Denoiser
 
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import Denoising, Network
 from xrds_core.errors import Cancelled
 from xrds_lab.bench import growth, machine, pareto, same_picture
 from xrds_lab.bench.inputs import OFF
@@ -135,7 +134,7 @@ def test_mean_curve_is_over_all_scenes_alike() -> None:
 
 NETWORK = Network("fast", 2, "fast")
 SWEEP = Sweep((NETWORK,))
-FULL_SIZE = Config("full_size", 4, Denoiser.XRDS_HIGH)
+FULL_SIZE = Config("full_size", 4, Denoising.XRDS_HIGH)
 
 
 def timed(tmp_path: Path) -> StageTimes:
@@ -192,7 +191,7 @@ def test_seconds_are_sums_of_the_stages_medians(tmp_path: Path) -> None:
 
 def test_the_denoised_and_scale_1_take_the_same_samples(tmp_path: Path) -> None:
     times = timed(tmp_path)
-    rival = times.cost(Config("oidn", 4, Denoiser.HIGH_FAST)).seconds
+    rival = times.cost(Config("oidn", 4, Denoising.HIGH_FAST)).seconds
     assert rival["beauty"] == times.cost(FULL_SIZE).seconds["beauty"]
     bare = times.cost(Config("cycles", 4)).seconds
     assert bare["beauty"] == pytest.approx(8.1)  # without guides
@@ -208,7 +207,7 @@ def test_full_size_pays_for_its_guides_and_for_our_denoiser(tmp_path: Path) -> N
 
 def test_adaptive_sampling_costs_what_its_own_frames_took(tmp_path: Path) -> None:
     times = timed(tmp_path)
-    config = adaptive(0.1, Denoiser.HIGH_ACCURATE)
+    config = adaptive(0.1, Denoising.HIGH_ACCURATE)
     with pytest.raises(KeyError, match=r"adaptive 0\.1"):
         times.cost(config)
     for seconds in (7.0, 9.0, 8.0):
@@ -218,7 +217,7 @@ def test_adaptive_sampling_costs_what_its_own_frames_took(tmp_path: Path) -> Non
     assert cost.total == pytest.approx(8.0)
     assert cost.seconds["beauty"] == pytest.approx(6.0)
     assert (cost.cpu_seconds, cost.peak_memory) == (15.0, 70)
-    quick = times.cost(adaptive(0.1, Denoiser.HIGH_FAST))
+    quick = times.cost(adaptive(0.1, Denoising.HIGH_FAST))
     assert quick.total == pytest.approx(8.0 - 4.0)  # its denoiser is 4 s quicker
     assert quick.cpu_seconds == pytest.approx(15.0 - 8.0)
 
@@ -245,9 +244,9 @@ def test_adaptive_sampling_is_a_rival_of_its_own() -> None:
 
 
 def test_names_of_kept_errors_stay_as_they_are() -> None:
-    key = Config("oidn", 4, Denoiser.HIGH_FAST).key
+    key = Config("oidn", 4, Denoising.HIGH_FAST).key
     assert key == "oidn_4_HIGH-FAST_1_0"
-    assert adaptive(0.1, Denoiser.HIGH_FAST).key.endswith("_0.1")
+    assert adaptive(0.1, Denoising.HIGH_FAST).key.endswith("_0.1")
 
 
 def test_runs_are_kept(tmp_path: Path) -> None:

@@ -5,11 +5,17 @@ from __future__ import annotations
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
-from xrds_blender.planning.ways import ALIKE
+from xrds_blender.planning.modes import ALIKE
 
 from xrds_blender.planning import budget
-from xrds_blender.planning.budget import Choice, Curve
+from xrds_blender.planning.budget import Curve
+from xrds_blender.planning.settings import (
+    DEFAULT_DENOISING,
+    OUR_DENOISING,
+    Denoising,
+    Mode,
+    Settings,
+)
 
 from . import hindsight, pareto, same_picture
 from .stages import PLAIN_FRAME, XRDS_FRAME, in_process_name
@@ -204,21 +210,27 @@ def fitted(scenes: Sequence[SceneBench], points: Sequence[Point]) -> budget.Mode
     A choice counts where every scene has it, so that all means are over the same
     scenes. Speeds stay the shipped model's where nothing was timed.
     """
-    errors: dict[tuple[Choice, int], list[float]] = {}
+    errors: dict[tuple[Settings, int], list[float]] = {}
     for point in points:
         if point["method"] in {"oidn", "full_size", "xrds"}:
-            fields = dict(point["settings"])
-            samples = fields.pop("samples")
-            key = Choice(samples=0, **fields), samples
+            key = _family(point), point["settings"]["samples"]
             errors.setdefault(key, []).append(point["psnr"])
-    curves: dict[Choice, dict[int, float]] = {}
-    for (choice, samples), psnr in errors.items():
+    curves: dict[Settings, dict[int, float]] = {}
+    for (family, samples), psnr in errors.items():
         if len(psnr) == len(scenes):
-            curves.setdefault(choice, {})[samples] = statistics.fmean(psnr)
+            curves.setdefault(family, {})[samples] = statistics.fmean(psnr)
     model = budget.ErrorModel({c: Curve.of(points) for c, points in curves.items()})
     names = ", ".join(scene.name for scene in scenes)
     source = f"mean over {len(scenes)} scenes: {names}; weights: "
     return _speeds(scenes, model, source + _weights(scenes[0]))
+
+
+def _family(point: Point) -> Settings:
+    """The settings of a point, without its samples."""
+    chosen = point["settings"]
+    mode = Mode.CYCLES_ONLY if point["method"] == "oidn" else Mode.of(chosen["scale"])
+    denoising, guides = Denoising(chosen["denoiser"]), chosen["guide_samples"]
+    return Settings(mode, None, denoising, chosen["preset"], guides).family
 
 
 def _weights(scene: SceneBench) -> str:
@@ -246,7 +258,7 @@ def _speeds(
     denoisers = {mode: _ratio(timed, lambda s, m=mode: s.times.denoising(m))
                  for mode in DENOISERS}  # fmt: skip
     denoisers |= {mode: _ratio(timed, lambda s, m=mode: s.times.median(_ours(m)))
-                  for mode in OUR_DENOISERS}  # fmt: skip
+                  for mode in OUR_DENOISING}  # fmt: skip
     networks = {
         network: _ratio(
             timed, lambda s, n=network: s.times.median(in_process_name(xrds(n)))
@@ -261,12 +273,12 @@ def _speeds(
     return budget.Model(errors, denoisers, networks, other, source)
 
 
-def _ours(mode: Denoiser) -> str:
+def _ours(mode: Denoising) -> str:
     return in_process_name(Config("full_size", 1, mode))
 
 
 def _ratio(scenes: Sequence[SceneBench], seconds: Any) -> float:
     """Median over scenes of the seconds, as a multiple of the default denoiser's."""
-    unit = DEFAULT_DENOISER
+    unit = DEFAULT_DENOISING
     ratios = [seconds(s) / max(s.times.denoising(unit), 1e-6) for s in scenes]
     return round(statistics.median(ratios), 4)

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.command import streams
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import Network
 from xrds_core.atomic import replacing, write_json
 from xrds_core.time_left import duration
 

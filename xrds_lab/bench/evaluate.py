@@ -14,7 +14,7 @@ from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import Network
 from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
 

@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.frame.job import RenderJob
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
+
+from xrds_blender.planning.request import request
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
 
 from . import machine, tasks
 from .inputs import Request
@@ -27,7 +28,7 @@ from .windows import Window
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from xrds_blender.planning.budget import Network
+    from xrds_blender.planning.settings import Network
 
     from .measure import Settings
     from .stages import Run, Task
@@ -41,11 +42,11 @@ MORE_CORES = (8, 32)
 # Larger frames are timed on all cores alone: what cores bring, smaller ones tell.
 MOST_PIXELS_OF_FEW_CORES = 1920 * 1080
 MEMORY_LIMIT = 1 << 30
-QUICK_DENOISER = Denoiser.HIGH_FAST
+QUICK_DENOISER = Denoising.HIGH_FAST
 NOTE = (
     "Break-even at equal rays: saved is a frame of one sample + OIDN less the "
     "low-resolution render of scale² samples, its OIDN and one guide sample; paid is "
-    f"the network. OIDN at full size is Blender's default ({DEFAULT_DENOISER}) or the "
+    f"the network. OIDN at full size is Blender's default ({DEFAULT_DENOISING}) or the "
     f"quicker {QUICK_DENOISER}. More cores than this machine has are extrapolated: "
     "every stage as a + b / cores through its runs on fewer. There was no graphics "
     "card to fit."
@@ -124,7 +125,7 @@ def _measured(
 def _renders() -> list[Request]:
     kinds = ("plain", "guides")
     lines = [anchor(kind, more=more) for kind in kinds for more in (False, True)]
-    modes = (DEFAULT_DENOISER, QUICK_DENOISER)
+    modes = (DEFAULT_DENOISING, QUICK_DENOISER)
     return lines + [anchor("plain", 1, mode) for mode in modes]
 
 
@@ -152,7 +153,7 @@ def _less_network(name: str) -> str:
     return f"{_frame(name)}, less the network"
 
 
-def _alone(denoiser: Denoiser) -> str:
+def _alone(denoiser: Denoising) -> str:
     return f"OIDN {denoiser} alone"
 
 
@@ -172,7 +173,7 @@ def _limited_network(shot: Shot, settings: Settings, network: Network) -> Task:
 
 def _xrds_frame(shot: Shot, settings: Settings, network: Network) -> Task:
     """A frame with the rays of one full-resolution sample and one guide sample."""
-    job = RenderJob(
+    job = request(
         **network._asdict(),
         samples=network.scale**2,
         guide_samples=1,
@@ -202,7 +203,7 @@ def _rows(
         if times.count(_frame(name)):
             seconds = times.median(_frame(name)) - times.median(_frame(name), "network")
             yield _less_network(name), seconds, None
-    for mode in (DEFAULT_DENOISER, QUICK_DENOISER):
+    for mode in (DEFAULT_DENOISING, QUICK_DENOISER):
         try:
             seconds = times.denoising(mode)
         except KeyError:
@@ -262,7 +263,7 @@ def _balance(rows: Sequence[Row], name: str, cores: int) -> Row | None:
             PLAIN_FRAME,
             _less_network(name),
             name,
-            _alone(DEFAULT_DENOISER),
+            _alone(DEFAULT_DENOISING),
             _alone(QUICK_DENOISER),
         )
     )

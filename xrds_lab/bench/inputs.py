@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
@@ -28,7 +28,7 @@ Arrays = dict[str, Array]
 GENERATION = 3
 OFF: Literal["OFF"] = "OFF"
 """In place of a denoiser's mode: the picture as rendered."""
-Mode = Denoiser | Literal["OFF"]
+Mode = Denoising | Literal["OFF"]
 # Unlike the references', so that no noise is shared with them or between a picture's
 # light and its guides. What denoises in Cycles and what does so outside get the same.
 SEEDS = {"low": 101, "guides": 202, "full": 404, "plain": 404}
@@ -104,7 +104,7 @@ class Request:
         if self.denoiser == OFF:
             return {"denoise": False}
         if self.denoiser is None and self.kind == "plain":
-            return {"denoiser": DEFAULT_DENOISER}
+            return {"denoiser": DEFAULT_DENOISING}
         return {"denoiser": self.denoiser}
 
 

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import Denoiser
-
 from xrds_blender.command import streams
+from xrds_blender.planning.settings import Denoising
 from xrds_core.atomic import replacing, write_json
 
 from ..progress import report_line
@@ -38,7 +37,7 @@ BUDGETS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)
 LOWERED = {2: (1, 2, 4, 8, 16), 4: (1, 2, 4, 8, 16, 32, 64), 8: (1, 4, 16, 64)}
 ENLARGED = {2: (1, 2), 4: (1, 2, 4, 8), 8: (4, 8, 16, 32)}
 FRESH, CACHED = 1, 4  # samples of guides rendered now, and of those kept from before
-QUICKEST, QUICK = Denoiser.FAST_FAST, Denoiser.HIGH_FAST
+QUICKEST, QUICK = Denoising.FAST_FAST, Denoising.HIGH_FAST
 FULL_SIZE = Config("oidn", 1, QUICKEST)
 NO_LIMIT = (math.inf,)  # whatever its seconds, every configuration is measured
 

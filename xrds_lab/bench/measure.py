@@ -7,15 +7,14 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.frame.job import RenderJob
-from xrds_blender.frame.picking import probe, with_guides
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
-
+from xrds_blender.choosing.probing import probe, with_guides
 from xrds_blender.planning import budget
+from xrds_blender.planning.request import request
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Mode, Settings
 from xrds_core.atomic import read_json, write_json
 
 from . import tasks, workload
-from .inputs import OFF, Folder, open_scene
+from .inputs import Folder, open_scene
 from .pictures import Networks, Pictures
 from .stages import PLAIN_FRAME, StageTimes, Stopwatch
 from .sweep import DENOISERS, Config, Sweep, anchor, anchors, describe
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 # Configurations a little above the largest budget still shape the curves.
 MOST_OVER_BUDGET = 1.3
-DEFAULT = Config("oidn", 1, DEFAULT_DENOISER)  # the unit of the budgets
+DEFAULT = Config("oidn", 1, DEFAULT_DENOISING)  # the unit of the budgets
 
 
 @dataclass(frozen=True)
@@ -129,7 +128,7 @@ class SceneBench:
         try:
             return self.times.cost(DEFAULT).total
         except KeyError:
-            return self.costs.seconds(budget.Choice(DEFAULT_DENOISER, 1))
+            return self.costs.seconds(Settings(Mode.CYCLES_ONLY, 1, DEFAULT_DENOISING))
 
     @property
     def megapixels(self) -> float:
@@ -228,12 +227,12 @@ class SceneBench:
         """Render a whole frame within a budget; measure its error on the window."""
         seconds = multiple * self.unit()
         networks = self.settings.networks
-        job = RenderJob(
+        job = request(
             time_budget=seconds, device=networks.device, weights=networks.weights
         )
         picture, run = tasks.frame(self.shot, job)
-        assert picture.job is not None
-        config = picked_config(picture.job)
+        assert picture.settings is not None
+        config = selected_config(picture.settings)
         record = {
             "budget": seconds,
             "seconds": picture.seconds | {"total": run["seconds"]},
@@ -317,23 +316,14 @@ class SceneBench:
         }
 
 
-def picked_config(job: RenderJob) -> Config:
-    """The configuration of a job that the picker made."""
-    denoiser = OFF if job.denoiser is None else Denoiser(job.denoiser)
-    samples = job.samples or 0
-    if job.plain:
-        return Config("oidn", samples, denoiser)
-    if not job.is_enlarged:
-        return Config("full_size", samples, Denoiser(f"XRDS-{job.denoise.upper()}"))
-    return Config(
-        "xrds",
-        samples,
-        denoiser,
-        job.scale,
-        job.preset,
-        job.guides,
-        job.guide_samples,
-    )
+def selected_config(settings: Settings) -> Config:
+    """The configuration of settings that were selected for a goal."""
+    samples, denoising = settings.samples or 0, settings.denoising
+    if not settings.is_enlarged:
+        method = "oidn" if settings.is_cycles_only else "full_size"
+        return Config(method, samples, denoising)
+    network, guides = settings.network, settings.guide_samples
+    return Config("xrds", samples, denoising, *network, guide_samples=guides)
 
 
 def _named(shot: Shot, samples: int) -> str:

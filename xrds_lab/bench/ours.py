@@ -18,10 +18,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, OUR_DENOISERS, Denoiser
 
 from xrds_blender.command import console
-from xrds_blender.planning.budget import Choice, Curve, ErrorModel, Model
+from xrds_blender.planning.budget import Curve, ErrorModel, Model
+from xrds_blender.planning.settings import (
+    DEFAULT_DENOISING,
+    OUR_DENOISING,
+    Denoising,
+    Mode,
+    Settings,
+)
 from xrds_core.atomic import read_json, write_json
 
 from .. import metrics
@@ -83,7 +89,7 @@ def measure(name: str, assets: Path | None) -> dict[str, Row]:
 
 def _errors(passes: Any, exposure: float) -> dict[str, Row]:
     halves = [
-        passes.beauty(1, REFERENCE_SAMPLES, denoiser=DEFAULT_DENOISER, seed=seed)
+        passes.beauty(1, REFERENCE_SAMPLES, denoiser=DEFAULT_DENOISING, seed=seed)
         for seed in REFERENCE_SEEDS
     ]
     reference = sum(half.radiance for half in halves) / len(halves) * exposure
@@ -95,10 +101,10 @@ def _row(passes: Any, count: int, reference: Any, exposure: float) -> Row:
 
     row = {}
     if count in EVEN_COUNTS:
-        rival = passes.beauty(1, count, denoiser=DEFAULT_DENOISER, seed=SEED)
-        row[str(DEFAULT_DENOISER)] = metrics.psnr(rival.radiance * exposure, reference)
+        rival = passes.beauty(1, count, denoiser=DEFAULT_DENOISING, seed=SEED)
+        row[str(DEFAULT_DENOISING)] = metrics.psnr(rival.radiance * exposure, reference)
     noisy = passes.guides(count, full=True, seed=SEED)
-    for mode in OUR_DENOISERS:
+    for mode in OUR_DENOISING:
         denoise = OurDenoiser(mode.quality)
         ours = denoise(noisy.radiance, noisy.albedo, noisy.normal).radiance
         row[str(mode)] = metrics.psnr(ours * exposure, reference)
@@ -107,20 +113,22 @@ def _row(passes: Any, count: int, reference: Any, exposure: float) -> Row:
 
 def joined(model: Model, measured: dict[str, dict[str, Row]]) -> Model:
     """The model with our denoiser: the default's curve and what ours differ by."""
-    base = model.errors.curves[Choice(DEFAULT_DENOISER, 0)]
+    base = model.errors.curves[
+        Settings(Mode.CYCLES_ONLY, None, DEFAULT_DENOISING).family
+    ]
     curves = dict(model.errors.curves)
-    for mode in OUR_DENOISERS:
+    for mode in OUR_DENOISING:
         psnr = {
             count: base.at(count) + _difference(measured, mode, count)
             for count in COUNTS
         }
-        curves[Choice(mode, 0)] = Curve.of(psnr)
+        curves[Settings(Mode.FULL_SIZE, None, mode).family] = Curve.of(psnr)
     speeds = {**model.denoiser_speed, **_speeds()}
     return replace(model, errors=ErrorModel(curves), denoiser_speed=speeds)
 
 
 def _difference(
-    measured: dict[str, dict[str, Row]], mode: Denoiser, count: int
+    measured: dict[str, dict[str, Row]], mode: Denoising, count: int
 ) -> float:
     """Of a denoiser from the default's line through the even counts.
 
@@ -132,10 +140,10 @@ def _difference(
 
 
 def _line(scene: dict[str, Row]) -> Curve:
-    return Curve.of({n: scene[str(n)][DEFAULT_DENOISER] for n in EVEN_COUNTS})
+    return Curve.of({n: scene[str(n)][DEFAULT_DENOISING] for n in EVEN_COUNTS})
 
 
-def _speeds() -> dict[Denoiser, float]:
+def _speeds() -> dict[Denoising, float]:
     """Processor seconds of ours as multiples of the default's in Blender.
 
     Processor seconds, because wall time is the machine's as much as the denoiser's;
@@ -146,10 +154,10 @@ def _speeds() -> dict[Denoiser, float]:
     width, height = TIMED
     images = [random.random((height, width, 3), np.float32) for _ in range(3)]
     unit = statistics.median(_seconds(lambda: _default(*images)) for _ in range(ROUNDS))
-    return {mode: round(_our_seconds(mode, images) / unit, 4) for mode in OUR_DENOISERS}
+    return {mode: round(_our_seconds(mode, images) / unit, 4) for mode in OUR_DENOISING}
 
 
-def _our_seconds(mode: Denoiser, images: list[Any]) -> float:
+def _our_seconds(mode: Denoising, images: list[Any]) -> float:
     from xrds_core.denoising import Denoiser as OurDenoiser
 
     denoiser = OurDenoiser(mode.quality)

@@ -11,7 +11,7 @@ import statistics
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -27,7 +27,7 @@ BUDGETS = (0.125, 16.0)  # the first and last of a mean curve
 
 def _oidn_default(point: Point) -> bool:
     return (
-        point["method"] == "oidn" and point["settings"]["denoiser"] == DEFAULT_DENOISER
+        point["method"] == "oidn" and point["settings"]["denoiser"] == DEFAULT_DENOISING
     )
 
 

@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
-from xrds_blender.planning.denoiser import Denoiser as Mode
 
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Network
+from xrds_blender.planning.settings import Denoising as Mode
 from xrds_core import denoising, exr
 from xrds_core.atomic import replacing
 from xrds_core.denoising import Denoiser
@@ -95,7 +94,7 @@ class Pictures:
             return []
         samples = self.reference_samples
         return [
-            Request("plain", samples, 1, DEFAULT_DENOISER, seed) for seed in HALF_SEEDS
+            Request("plain", samples, 1, DEFAULT_DENOISING, seed) for seed in HALF_SEEDS
         ]
 
     def missing(self, configs: Sequence[Config]) -> list[Request]:

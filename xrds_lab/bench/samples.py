@@ -15,9 +15,7 @@ from dataclasses import asdict
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
-
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising, Network
 from xrds_core.atomic import write_json
 
 from ..progress import silent
@@ -41,7 +39,7 @@ LOW_SAMPLES = (4, 16, 64)
 AVERAGES = (2, 4, 8)
 """Samples per full-resolution pixel with `full` guides, which get a half of them."""
 GUIDE_SAMPLES = 4
-OIDN = {"default": DEFAULT_DENOISER, "fast": Denoiser.FAST_FAST}
+OIDN = {"default": DEFAULT_DENOISING, "fast": Denoising.FAST_FAST}
 
 
 def samples_table(
@@ -82,7 +80,7 @@ def configurations(scale: int, preset: str, full: bool) -> Iterator[Config]:
     """Every configuration of the table, each once."""
     low = sorted({*LOW_SAMPLES, *(n * scale**2 for n in RATES)})
     for n in low:
-        yield xrds(Network(preset, scale, "fast"), n, DEFAULT_DENOISER, GUIDE_SAMPLES)
+        yield xrds(Network(preset, scale, "fast"), n, DEFAULT_DENOISING, GUIDE_SAMPLES)
     for n in RATES:
         for denoiser in OIDN.values():
             yield Config("oidn", n, denoiser)
@@ -91,7 +89,7 @@ def configurations(scale: int, preset: str, full: bool) -> Iterator[Config]:
         for average in AVERAGES:
             # half of the rays for the guides, half for the low-resolution picture
             half = average // 2
-            yield xrds(network, average * scale**2 // 2, DEFAULT_DENOISER, half)
+            yield xrds(network, average * scale**2 // 2, DEFAULT_DENOISING, half)
 
 
 def _measured(

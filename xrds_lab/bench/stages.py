@@ -15,8 +15,7 @@ import time
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
-
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.atomic import read_json, write_json
 
 from . import machine
@@ -115,11 +114,11 @@ class StageTimes:
         They are timed with Blender's default denoiser; another one costs what it costs
         more or less than that.
         """
-        name = replace(config, denoiser=DEFAULT_DENOISER).label
+        name = replace(config, denoiser=DEFAULT_DENOISING).label
         total, other, sync, cpu = (
             self.median(name, k) for k in ("seconds", "other", "sync", "cpu")
         )
-        if config.denoiser != DEFAULT_DENOISER:
+        if config.denoiser != DEFAULT_DENOISING:
             total += self._apart(config.denoiser, "seconds")
             cpu += self._apart(config.denoiser, "cpu")
         stages = dict.fromkeys(STAGES, 0.0) | {"sync": sync, "other": other}
@@ -129,7 +128,7 @@ class StageTimes:
 
     def _apart(self, denoiser: Mode | None, key: str) -> float:
         """Seconds of a denoiser less those of Blender's default, at full size."""
-        default = self.denoising(DEFAULT_DENOISER, key=key)
+        default = self.denoising(DEFAULT_DENOISING, key=key)
         return self.denoising(denoiser, key=key) - default
 
     def _stages(self, config: Config, key: str) -> dict[str, float]:

@@ -6,15 +6,14 @@ from dataclasses import asdict, dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import (
-    CYCLES_DENOISERS,
-    DEFAULT_DENOISER,
-    LOW_DENOISERS,
-    OUR_DENOISERS,
-    Denoiser,
+from xrds_blender.planning.settings import (
+    CYCLES_DENOISING,
+    DEFAULT_DENOISING,
+    LOW_DENOISING,
+    OUR_DENOISING,
+    Denoising,
+    Network,
 )
-
-from xrds_blender.planning.budget import Network
 
 from .inputs import OFF, Mode, Request
 
@@ -26,8 +25,8 @@ PLAIN_SAMPLES = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64)
 # Every mode of the denoiser is tried on few samples; on many only those that can
 # still win: there the denoiser's own seconds count for little.
 FEW_SAMPLES = 8
-DENOISERS = CYCLES_DENOISERS
-MANY_DENOISERS = (Denoiser.HIGH_ACCURATE, Denoiser.HIGH_FAST)
+DENOISERS = CYCLES_DENOISING
+MANY_DENOISERS = (Denoising.HIGH_ACCURATE, Denoising.HIGH_FAST)
 LOW_SAMPLES = {
     2: (2, 4, 8, 16, 32, 64),
     4: (4, 8, 16, 32, 64, 128),
@@ -174,7 +173,7 @@ class Sweep:
         configs += [
             Config("full_size", n, denoiser)
             for n in self.plain_samples
-            for denoiser in OUR_DENOISERS
+            for denoiser in OUR_DENOISING
         ]
         for scale in self.scales:
             configs += self._baselines(scale)
@@ -185,7 +184,7 @@ class Sweep:
     def _baselines(self, scale: int) -> list[Config]:
         configs = []
         for n in self.low_samples[scale]:
-            bicubic = Config("bicubic", n, DEFAULT_DENOISER, scale)
+            bicubic = Config("bicubic", n, DEFAULT_DENOISING, scale)
             configs.append(bicubic)
             configs += [
                 replace(
@@ -204,7 +203,7 @@ class Sweep:
             xrds(network, n, denoiser, guide_samples)
             for n, denoiser, guide_samples in product(
                 self.low_samples[network.scale],
-                LOW_DENOISERS,
+                LOW_DENOISING,
                 self.full_samples if full else self.guide_samples,
             )
         ]

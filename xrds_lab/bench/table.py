@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 from typing import Any
 
-from xrds_blender.planning.budget import Network
+from xrds_blender.planning.settings import Network
 
 Record = dict[str, Any]
 

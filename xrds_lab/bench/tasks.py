@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.frame.job import RenderJob
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
 from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
+from xrds_blender.planning.request import Request as RenderRequest
+from xrds_blender.planning.request import request
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
 
 from .inputs import Request, open_scene, sample_adaptively
 from .rivals import ENLARGEMENTS
@@ -26,9 +28,8 @@ from .stages import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from xrds_blender.frame.job import Picture
-
-    from xrds_blender.planning.budget import Network
+    from xrds_blender.frame.picture import Picture
+    from xrds_blender.planning.settings import Network
     from xrds_core.arrays import Array
 
     from .inputs import Arrays
@@ -47,14 +48,14 @@ def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str
     noisy = cache(lambda: _noisy_frame(shot))
     for config in configs:
         if config.noise_threshold is not None:
-            if config.denoiser == DEFAULT_DENOISER:  # the others follow from it
+            if config.denoiser == DEFAULT_DENOISING:  # the others follow from it
                 timed[config.label] = _adaptive_frame(shot, config)
             continue
         name = in_process_name(config)
         if config.method in CYCLES or name in timed:
             continue
         if config.method == "full_size":
-            timed[name] = _our_denoiser(Denoiser(config.denoiser), noisy)
+            timed[name] = _our_denoiser(Denoising(config.denoiser), noisy)
         elif config.method == "xrds":
             used.append(config.network)
             timed[name] = _network(networks, config.network, window)
@@ -69,35 +70,37 @@ def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str
     return timed
 
 
-def plain_job() -> RenderJob:
+def plain_job() -> RenderRequest:
     """1 spp + OIDN with Blender's defaults: the unit of all budgets."""
-    return RenderJob(plain=True, samples=1, denoiser=DEFAULT_DENOISER)
+    return request(plain=True, samples=1, denoiser=DEFAULT_DENOISING)
 
 
 def _adaptive_frame(shot: Shot, config: Config) -> Task:
-    job = RenderJob(plain=True, denoiser=Denoiser(config.denoiser))
+    job = request(plain=True, denoiser=Denoising(config.denoiser))
     return lambda: frame(shot, job, config)[1]
 
 
 def frame(
-    shot: Shot, job: RenderJob, adaptive: Config | None = None
+    shot: Shot, job: RenderRequest, adaptive: Config | None = None
 ) -> tuple[Picture, Run]:
     """Render a whole frame as a user does, from a freshly opened file.
 
     Every frame renders its own guides. `other` is the time outside all stages;
     weights are loaded before. `adaptive` tells how Cycles samples adaptively.
     """
-    from xrds_blender import render
     from xrds_blender.frame.networks import load_upscaler
+    from xrds_blender.interface.registration import ensure_registered
+    from xrds_blender.shot.render import render_scene
 
+    ensure_registered()
     scene = open_scene(shot.path, shot.window.whole)
     if adaptive is not None and adaptive.noise_threshold is not None:
         sample_adaptively(scene, adaptive.samples, adaptive.noise_threshold)
-    if not job.is_picked and job.is_enlarged:
-        load_upscaler(job)
+    if job.goal is None and job.settings.is_enlarged:
+        load_upscaler(job.settings.network, job.machine)
     pictures: list[Picture] = []
-    choices = vars(job) | {"savings": savings_but(GUIDE_CACHE)}
-    run = clocked(lambda: pictures.append(render(scene, **choices)))
+    job = replace(job, savings=savings_but(GUIDE_CACHE))
+    run = clocked(lambda: pictures.append(render_scene(scene, job)))
     stages = {k: s for k, s in pictures[0].seconds.items() if k != "total"}
     other = run["seconds"] - sum(stages.values())
     return pictures[0], run | {"other": other, "sync": stages["sync"]}
@@ -127,7 +130,7 @@ def _noisy_frame(shot: Shot) -> Arrays:
     return run_job(scene, lambda passes: Request("full", 1).render(passes)[0])
 
 
-def _our_denoiser(mode: Denoiser, noisy: Callable[[], Arrays]) -> Task:
+def _our_denoiser(mode: Denoising, noisy: Callable[[], Arrays]) -> Task:
     """Time our denoiser; building its filters, once a session, does not count."""
     from xrds_core.denoising import Denoiser as OurDenoiser
 
@@ -203,12 +206,12 @@ def _network(networks: Networks, network: Network, window: Window) -> Task:
     return task
 
 
-def _quick_job(networks: Networks, network: Network) -> RenderJob:
-    return RenderJob(
+def _quick_job(networks: Networks, network: Network) -> RenderRequest:
+    return request(
         **network._asdict(),
         samples=network.scale,
         guide_samples=1,
         device=networks.device,
         weights=networks.weights,
-        denoiser=Denoiser.HIGH_FAST,
+        denoiser=Denoising.HIGH_FAST,
     )

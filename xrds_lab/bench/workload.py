@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import Denoiser
+from xrds_blender.planning.settings import Denoising
 
 from .inputs import OFF
 
@@ -36,7 +36,7 @@ def config_seconds(config: Config, costs: Costs) -> float:
     if config.method == "xrds":
         seconds += costs.network[config.network]
     elif config.method == "full_size":
-        seconds += costs.denoise[Denoiser(config.denoiser)]
+        seconds += costs.denoise[Denoising(config.denoiser)]
     return seconds
 
 

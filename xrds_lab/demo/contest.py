@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.frame.job import RenderJob
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
-from xrds_blender import render
+from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
+from xrds_blender.planning.request import Request, request
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
+from xrds_blender.shot.render import render_scene
 from xrds_blender.shot.shot import render_shot
 
 from .scene import MIDDLE, SHOT
@@ -38,7 +39,7 @@ class Way:
 
     name: str
     label: str
-    job: RenderJob
+    job: Request
     trials: tuple[int, int] = (1, 4)
     where: str = ""
 
@@ -46,23 +47,23 @@ class Way:
 CYCLES = Way(
     "cycles_oidn_default",
     "Cycles + OIDN",
-    RenderJob(plain=True, denoiser=DEFAULT_DENOISER),
+    request(plain=True, denoiser=DEFAULT_DENOISING),
 )
 QUICK = Way(
     "cycles_oidn_quick",
     "Cycles + OIDN, fast prefilter",
-    RenderJob(plain=True, denoiser=Denoiser.HIGH_FAST),
+    request(plain=True, denoiser=Denoising.HIGH_FAST),
 )
-FULL_SIZE = Way("xrds_x1", "XRDS, full size", RenderJob(scale=1))
+FULL_SIZE = Way("xrds_x1", "XRDS, full size", request(scale=1))
 ENLARGED = Way(
     "xrds_x2",
     "XRDS, super-resolution x2",
     # every picture is to pay for its own guides
-    RenderJob(scale=2, guide_samples=1, savings=savings_but(GUIDE_CACHE)),
+    request(scale=2, guide_samples=1, savings=savings_but(GUIDE_CACHE)),
     trials=(4, 16),
     where=" at half size",
 )
-ACCUMULATED = Way("xrds_shot", "XRDS, shot", RenderJob(scale=1, temporal_radius=RADIUS))
+ACCUMULATED = Way("xrds_shot", "XRDS, shot", request(scale=1, temporal_radius=RADIUS))
 
 
 @dataclass(frozen=True)
@@ -92,6 +93,7 @@ class Contest:
     """Renders one scene again and again; every call is timed as the user waits."""
 
     def __init__(self, scene: Any, countdown: Countdown) -> None:
+        ensure_registered()
         self._scene, self._countdown = scene, countdown
         self._lines: dict[Way, tuple[float, float]] = {}
 
@@ -169,7 +171,7 @@ class Contest:
     # --- renders ----------------------------------------------------------------------
 
     def _shoot(self, samples: int, numbers: Sequence[int]) -> tuple[float, Any]:
-        job, name = replace(ACCUMULATED.job, samples=samples), ACCUMULATED.label
+        job, name = ACCUMULATED.job.with_settings(samples=samples), ACCUMULATED.label
         start, made = time.perf_counter(), {}
         self._countdown.say(f"{name}, {samples} spp, {len(numbers)} frames")
         for number, picture in render_shot(self._scene, job, numbers):
@@ -191,10 +193,10 @@ class Contest:
         self, way: Way, samples: int, number: int = MIDDLE
     ) -> tuple[float, Array]:
         """Seconds and radiance (H, W, 3) of one frame."""
-        job = replace(way.job, samples=samples)
+        job = way.job.with_settings(samples=samples)
         start = time.perf_counter()
         self._scene.frame_set(number)
-        radiance = render(self._scene, **vars(job)).radiance
+        radiance = render_scene(self._scene, job).radiance
         seconds = time.perf_counter() - start
         if not np.isfinite(radiance).all():
             raise FloatingPointError(f"{way.label} holds values that are not finite")

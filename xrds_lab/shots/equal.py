@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 
 from ..bench.same_picture import in_order
 from ..bench.sweep import Config
@@ -27,7 +27,7 @@ def curve(pictures: Pictures, journal: Journal, target: float) -> dict[int, floa
     """
     known: dict[int, float] = {}
     for samples in SERIES:
-        config = Config("oidn", samples, DEFAULT_DENOISER)
+        config = Config("oidn", samples, DEFAULT_DENOISING)
         pictures.render(pictures.missing([config]), journal, lambda _: None)
         with journal.attempt(f"{pictures.shot.name}: {config.label}"):
             known[samples] = pictures.errors(config)["psnr"]

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.frame.job import RenderJob
 
 import xrds_core
+from xrds_blender.planning.request import request
 from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.atomic import write_json
@@ -28,8 +28,7 @@ from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
 from .motions import MOTIONS
 
 if TYPE_CHECKING:
-    from xrds_blender.planning.denoiser import Denoiser
-
+    from xrds_blender.planning.settings import Denoising
     from xrds_core.arrays import Array
     from xrds_core.temporal.frame import Frame
 
@@ -73,7 +72,7 @@ class Clip:
     def _method(self, radius: int) -> FullSize:
         if radius not in self._methods:
             self._methods[radius] = FullSize(
-                RenderJob(
+                request(
                     scale=1, samples=self.samples, temporal_radius=radius, device="cpu"
                 )
             )
@@ -84,7 +83,7 @@ class Clip:
             self._stored[number] = store(self.frames[number], np.float16)
         return self._stored[number]
 
-    def oidn(self, number: int, mode: Denoiser) -> Array:
+    def oidn(self, number: int, mode: Denoising) -> Array:
         """A frame by itself, denoised by Cycles."""
         return rivals.cycles_oidn(self.frames[number], mode)
 
@@ -210,7 +209,7 @@ class SceneFigures:
             return lambda number: clip.xrds(number, radius), {}
         if method == MEDIAN:
             return clip.median, {}
-        mode = rivals.DEFAULT_DENOISER
+        mode = rivals.DEFAULT_DENOISING
         if method == BEST:
             mode = best_mode(clip, self._reference())
         return lambda number: clip.oidn(number, mode), {"mode": str(mode)}
@@ -222,7 +221,7 @@ class SceneFigures:
         )
 
 
-def best_mode(clip: Clip, reference: Array) -> Denoiser:
+def best_mode(clip: Clip, reference: Array) -> Denoising:
     """The mode of Cycles' denoiser with the highest PSNR on the middle frame."""
     from ..metrics import psnr
 

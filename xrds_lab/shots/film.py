@@ -6,8 +6,8 @@ import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.atomic import replacing
 
 from ..metrics import to_srgb
@@ -48,7 +48,7 @@ def write(path: Path, clip: Clip) -> None:
     """Write all frames of a shot as an animated WebP: Cycles + OIDN, then XRDS."""
     frames = [
         beside(
-            to_srgb(clip.oidn(number, DEFAULT_DENOISER), clip.stops),
+            to_srgb(clip.oidn(number, DEFAULT_DENOISING), clip.stops),
             to_srgb(clip.xrds(number, REACH), clip.stops),
         )
         for number in sorted(clip.frames)

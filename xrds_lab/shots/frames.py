@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.errors import SceneError
 
 from .. import packing
@@ -147,12 +147,11 @@ class ShotFrames:
 
 def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
-    from xrds_blender.frame.job import RenderJob
-
     from xrds_blender.frame.rendering import call_engine
+    from xrds_blender.planning.request import request
     from xrds_blender.shot.sampling import noisy_frame
 
-    job = RenderJob(scale=1, samples=request.samples, temporal_radius=request.reach)
+    job = request(scale=1, samples=request.samples, temporal_radius=request.reach)
     place = request.number - (MIDDLE - request.reach)
     frames, seconds = call_engine(scene, lambda *given: noisy_frame(*given, job, place))
     return packing.pack(frames), seconds
@@ -164,7 +163,7 @@ def _truth(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]
     made = run_job(
         scene,
         lambda passes: passes.beauty(
-            1, request.samples, seed=_PAIR_SEED, denoiser=DEFAULT_DENOISER
+            1, request.samples, seed=_PAIR_SEED, denoiser=DEFAULT_DENOISING
         ),
     )
     return {"radiance": made.radiance}, made.seconds

@@ -9,8 +9,12 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.planning.denoiser import CYCLES_DENOISERS, DEFAULT_DENOISER, Denoiser
 
+from xrds_blender.planning.settings import (
+    CYCLES_DENOISING,
+    DEFAULT_DENOISING,
+    Denoising,
+)
 from xrds_core.temporal.frame import store
 from xrds_core.temporal.motion import carry, grid, passage
 
@@ -18,10 +22,10 @@ if TYPE_CHECKING:
     from xrds_core.arrays import Array
     from xrds_core.temporal.frame import Frame
 
-MODES: tuple[Denoiser, ...] = CYCLES_DENOISERS
+MODES: tuple[Denoising, ...] = CYCLES_DENOISING
 
 
-def cycles_oidn(frame: Frame, mode: Denoiser = DEFAULT_DENOISER) -> Array:
+def cycles_oidn(frame: Frame, mode: Denoising = DEFAULT_DENOISING) -> Array:
     """What Cycles' denoiser makes of a frame's samples, (H, W, 3).
 
     The same library with the same settings, as in Cycles'

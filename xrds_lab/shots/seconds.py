@@ -8,11 +8,9 @@ from __future__ import annotations
 import json
 import statistics
 import time
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
-
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.atomic import write_json
 
 from ..bench.inputs import open_scene
@@ -24,8 +22,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from xrds_blender.frame.job import RenderJob
-
+    from xrds_blender.planning.request import Request
     from xrds_core.temporal.frame import Stored
 
     from ..bench.windows import Shot
@@ -61,15 +58,14 @@ class SceneSeconds:
 
 def timed(shot: Shot, samples: int, radii: Sequence[int], rounds: int) -> Timed:
     """Time a panning shot of whole frames: seconds by stage, `total` and `cpu`."""
-    from xrds_blender.frame.job import RenderJob
-
     from xrds_blender import render
+    from xrds_blender.planning.request import request
 
     reach = max(*radii, rounds // 2, 1)
     scene = open_scene(shot.path, shot.window.whole)
     animate(scene, shot.window, "pan", MIDDLE, reach)
-    job = RenderJob(scale=1, samples=samples, temporal_radius=reach)
-    plain = {"plain": True, "samples": samples, "denoiser": DEFAULT_DENOISER}
+    job = request(scale=1, samples=samples, temporal_radius=reach)
+    plain = {"plain": True, "samples": samples, "denoiser": DEFAULT_DENOISING}
     sampled: dict[int, Stored] = {}
     ours, rival = [], []
     for number in range(MIDDLE - reach, MIDDLE + reach + 1):
@@ -80,14 +76,14 @@ def timed(shot: Shot, samples: int, radii: Sequence[int], rounds: int) -> Timed:
             rival.append(_clocked(lambda: render(scene, **plain))[1])
     result = {_name(DEFAULT, 0): _median(rival)}
     for radius in radii:
-        finished = _finished(sampled, replace(job, temporal_radius=radius), rounds)
+        finished = _finished(sampled, job.with_settings(temporal_radius=radius), rounds)
         taken = _median(ours)
         both = {name: taken[name] + finished[name] for name in ("total", "cpu")}
         result[_name(XRDS, radius)] = {**finished, "sample": taken["total"], **both}
     return result
 
 
-def _sample(scene: Any, job: RenderJob) -> Stored:
+def _sample(scene: Any, job: Request) -> Stored:
     """One frame's samples, packed as a shot keeps them."""
     from xrds_blender.frame.rendering import call_engine
     from xrds_blender.shot.sampling import sample_frame
@@ -97,13 +93,13 @@ def _sample(scene: Any, job: RenderJob) -> Stored:
 
 
 def _finished(
-    sampled: Mapping[int, Stored], job: RenderJob, rounds: int
+    sampled: Mapping[int, Stored], job: Request, rounds: int
 ) -> dict[str, float]:
     """Seconds of the middle frame's accumulation and denoising."""
     from xrds_blender.shot.full_size import FullSize
     from xrds_core.temporal.window import Shot as Window
 
-    numbers = Window(tuple(sampled), job.temporal_radius).neighbours(MIDDLE)
+    numbers = Window(tuple(sampled), job.settings.temporal_radius).neighbours(MIDDLE)
     own, lenders = sampled[MIDDLE], [sampled[number] for number in numbers]
     method, runs = FullSize(job), []
     for _ in range(rounds):

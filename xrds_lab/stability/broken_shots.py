@@ -130,12 +130,11 @@ def crashes(frames: Frames) -> int:
 
 def long(frames: Frames) -> Measured:
     """Growth of memory in KiB per frame over a thousand frames, one after the other."""
-    from xrds_blender.frame.job import RenderJob
-
+    from xrds_blender.planning.request import request
     from xrds_blender.shot.full_size import FullSize
 
     originals = list(frames.values())
-    job = RenderJob(scale=1, samples=SAMPLES, temporal_radius=RADIUS, device="cpu")
+    job = request(scale=1, samples=SAMPLES, temporal_radius=RADIUS, device="cpu")
     method, memory = FullSize(job), []
 
     def load(number: int) -> Stored:

@@ -43,7 +43,7 @@ class Frame:
 def drive(scene: Any, count: int, **choices: Any) -> list[Frame]:
     """Render frames 1 to `count` and write them as PNG and EXR in turn.
 
-    `choices` are the fields of RenderJob.
+    `choices` are those of `xrds_blender.render`.
     """
     from xrds_blender import render
     from xrds_blender.command import picture_file

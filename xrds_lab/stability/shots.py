@@ -10,8 +10,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.atomic import replacing
 
 from .. import metrics
@@ -80,7 +80,7 @@ def _frame(passes: Any, frame: int) -> Arrays:
     arrays |= {"albedo": guides.albedo, "normal": guides.normal}
     for scale in SCALES:
         count = equal_samples(scale)
-        picture = passes.beauty(1, count, seed=300 + frame, denoiser=DEFAULT_DENOISER)
+        picture = passes.beauty(1, count, seed=300 + frame, denoiser=DEFAULT_DENOISING)
         arrays[f"plain{scale}"] = picture.radiance
     return arrays
 

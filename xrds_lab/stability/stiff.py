@@ -10,8 +10,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.atomic import replacing
 from xrds_core.superres import front_end
 
@@ -91,7 +91,7 @@ def render(name: str, side: int) -> Arrays:
         plain = {f"plain{s}": equal_samples(s, samples) for s in SCALES}
         for key, count in (plain | {"reference": REFERENCE_SAMPLES}).items():
             seed = _SEEDS["reference" if key == "reference" else "plain"]
-            picture = passes.beauty(1, count, seed=seed, denoiser=DEFAULT_DENOISER)
+            picture = passes.beauty(1, count, seed=seed, denoiser=DEFAULT_DENOISING)
             arrays[key] = picture.radiance
             arrays[f"{key}_seconds"] = sum(picture.seconds.values())
         return {key: np.asarray(x, np.float32) for key, x in arrays.items()}

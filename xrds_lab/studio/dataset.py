@@ -25,10 +25,10 @@ from typing import Any
 import bpy
 import numpy as np
 from tqdm import tqdm
-from xrds_blender.planning.denoiser import DEFAULT_DENOISER
 
 from xrds_blender import run_job
 from xrds_blender.cycles.passes import CyclesPasses
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 
@@ -258,7 +258,7 @@ def _arrays(passes: CyclesPasses, samples: Samples) -> tuple[Arrays, dict[str, f
     reference = timed(
         "reference",
         lambda seed: passes.beauty(
-            1, samples.reference, denoiser=DEFAULT_DENOISER, seed=seed
+            1, samples.reference, denoiser=DEFAULT_DENOISING, seed=seed
         ),
     )
     arrays["reference"] = reference.radiance
