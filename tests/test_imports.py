@@ -22,6 +22,7 @@ ORDER = (
     "xrds_blender.command",
     "xrds_blender.interface",
     "xrds_blender.shot",
+    "xrds_blender.choosing",
     "xrds_blender.frame",
     "xrds_blender.cycles",
     "xrds_blender.scene",

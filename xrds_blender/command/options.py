@@ -59,8 +59,8 @@ def add_request(command: argparse.ArgumentParser) -> None:
         "--temporal-radius",
         type=arguments.whole,
         metavar="N",
-        help="neighbour frames on each side whose samples are reused (default: 4 for several "
-        "frames)",
+        help="neighbour frames on each side whose samples are reused (default: 4 for "
+        "several frames)",
     )
     add(
         "--guide-samples",

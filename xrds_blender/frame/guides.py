@@ -27,7 +27,7 @@ from .guide_cache import CachedGuides, GuideName
 
 @dataclass(frozen=True)
 class _Look:
-    """What a look into the cache was for, and what it took; its text is for the user."""
+    """What a look into the cache was for, and its cost; its text is for the user."""
 
     key: str
     probe: Probe

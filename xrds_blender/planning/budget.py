@@ -23,7 +23,7 @@ from .settings import Denoising, Mode, Network, Settings
 MODEL = Path(__file__).with_name("budget.json")
 # Predictions scatter; a frame that is late is worse than one that is early.
 AIM = 0.97
-# Where nothing fits: what is as fast as the fastest, within what predictions can resolve.
+# Where nothing fits: what is as fast as the fastest, for all that predictions show.
 ALIKE = 1.1
 # What is no better than what was chosen may end this much late: a quicker denoiser
 # saves little more time and costs decibels.

@@ -308,8 +308,7 @@ def _in_part(scene: SceneFacts) -> tuple[Decision, ...]:
     causes = {
         "motion blur": (
             scene.motion_blur,
-            "Cycles gives no vectors with motion blur: samples of moving things are rarely "
-            "reused",
+            "Cycles gives no vectors with motion blur: moving things reuse few samples",
         ),
         "depth of field": (scene.depth_of_field, "blurred pixels mix many depths"),
         "volumes": (

@@ -59,8 +59,8 @@ class Request:
     `seed` None leaves Cycles' own; `exposure` None is found in the picture; `savings`
     names what the plan may leave out where the scene does not need it. `guide_cache` is
     a folder for guides beside those in memory; each render of the same view adds its
-    samples to them until they are `guide_limit`. `finish_stopped` leaves what there is in
-    the result when the user stops the render.
+    samples to them until they are `guide_limit`. `finish_stopped` leaves what there is
+    in the result when the user stops the render.
     """
 
     settings: Settings = field(default_factory=Settings)

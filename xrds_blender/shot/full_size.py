@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 class FullSize(Method):
     """Samples at full size, denoised.
 
-    `on_sampled` takes each frame that is sampled. `denoise_in_time` gives the quality in the
-    place of the request's, once the samples of a still are there.
+    `on_sampled` takes each frame that is sampled. `denoise_in_time` gives the quality,
+    in place of the request's, once the samples of a still are there.
     """
 
     def __init__(

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from xrds_blender.choosing.probing import probe, with_guides
 from xrds_blender.planning import budget
 from xrds_blender.planning.request import request
-from xrds_blender.planning.settings import DEFAULT_DENOISING, Mode, Settings
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Mode
+from xrds_blender.planning.settings import Settings as RenderSettings
 from xrds_core.atomic import read_json, write_json
 
 from . import tasks, workload
@@ -128,7 +129,9 @@ class SceneBench:
         try:
             return self.times.cost(DEFAULT).total
         except KeyError:
-            return self.costs.seconds(Settings(Mode.CYCLES_ONLY, 1, DEFAULT_DENOISING))
+            return self.costs.seconds(
+                RenderSettings(Mode.CYCLES_ONLY, 1, DEFAULT_DENOISING)
+            )
 
     @property
     def megapixels(self) -> float:
@@ -316,7 +319,7 @@ class SceneBench:
         }
 
 
-def selected_config(settings: Settings) -> Config:
+def selected_config(settings: RenderSettings) -> Config:
     """The configuration of settings that were selected for a goal."""
     samples, denoising = settings.samples or 0, settings.denoising
     if not settings.is_enlarged:
