@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from xrds_blender.planning import plan
 from xrds_blender.planning.lending import lending
+
+from xrds_blender.planning import plan
 
 FACTS = plan.Facts(
     scale=4,

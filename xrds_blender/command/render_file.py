@@ -193,9 +193,15 @@ def _write(
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated
+    first = next(iter(picture.views), "")
     try:
-        pixels = picture.radiance, picture.alpha
-        picture_file.save(target, *pixels, scene, encoding, metadata)
+        for view, pixels in picture.views.items():
+            if view != first:  # the first comes last: a file of it says all are there
+                path = target.with_stem(target.stem + _suffix(scene, view))
+                light = pixels[..., :3], pixels[..., 3]
+                picture_file.save(path, *light, scene, encoding, metadata)
+        light = picture.radiance, picture.alpha
+        picture_file.save(target, *light, scene, encoding, metadata)
     except PictureError as error:
         place = _save_elsewhere(target, picture.radiance, picture.alpha, scene)
         raise PictureError(f"{error}; the frame was {place}") from error
@@ -210,6 +216,11 @@ def _write(
         "temporal": picture.temporal and dataclasses.asdict(picture.temporal),
         "peak_memory": picture.peak_memory,
     }
+
+
+def _suffix(scene: Any, view: str) -> str:
+    """What the file of a view has after its name, as in Blender's own output."""
+    return str(scene.render.views[view].file_suffix)
 
 
 def _save_aside(target: Path, radiance: Any, alpha: Any, scene: Any) -> str:

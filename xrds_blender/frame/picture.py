@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import XRDSError
 
 from ..planning.plan import Decision
 from ..planning.settings import Settings
+from .stages import STAGES
 
 if TYPE_CHECKING:
     from xrds_core.arrays import Array
@@ -53,7 +55,7 @@ class Picture:
     its denoising and sampling as one, so `beauty` holds both then. `peak_memory`
     is the largest in bytes that the process has taken so far; `device` is what the
     network ran on, empty for Cycles alone; `settings` are what it was rendered
-    by, as a time budget chose them.
+    by, as a time budget chose them; `views` (H, W, 4) are all views of stereo by name.
     """
 
     radiance: Array
@@ -67,6 +69,7 @@ class Picture:
     device: str = ""
     settings: Settings | None = None
     temporal: Temporal | None = None
+    views: dict[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, pixels: Array, **rest: Any) -> Picture:
@@ -75,6 +78,23 @@ class Picture:
 
         radiance, alpha = pixels[..., :3], pixels[..., 3]
         return cls(np.ascontiguousarray(radiance), np.ascontiguousarray(alpha), **rest)
+
+
+def joined(pictures: Mapping[str, Picture], sampled: Mapping[str, float]) -> Picture:
+    """The first view's picture, with all views where there are several.
+
+    Its seconds are those of `sampled`, of all views together, and of each view.
+    """
+    import numpy as np
+
+    seconds = dict.fromkeys(STAGES, 0.0) | dict(sampled)
+    for picture in pictures.values():
+        for stage, spent in picture.seconds.items():
+            seconds[stage] = seconds.get(stage, 0.0) + spent
+    views = {}
+    if len(pictures) > 1:
+        views = {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
+    return replace(next(iter(pictures.values())), seconds=seconds, views=views)
 
 
 def peak_memory() -> int:

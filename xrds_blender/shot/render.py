@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import takewhile
 from typing import Any
 
@@ -22,7 +22,7 @@ from ..choosing import history
 from ..choosing.chosen import Chosen, choose_for_shot, chosen
 from ..cycles import session
 from ..frame import stages, torch_folder
-from ..frame.picture import NetworkFailed, Picture
+from ..frame.picture import NetworkFailed, Picture, joined
 from ..frame.rendering import call_engine
 from ..internals.lifetimes import RENDER_JOB
 from ..planning.request import Request, request
@@ -178,11 +178,9 @@ def _finish(
     started = time.perf_counter()
     combined = {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
     _write(engine, layer_name, method, own, combined)
-    seconds = dict.fromkeys(stages.STAGES, 0.0) | own.seconds
-    for stage in {stage for p in pictures.values() for stage in p.seconds}:
-        seconds[stage] += sum(p.seconds.get(stage, 0.0) for p in pictures.values())
-    seconds["write"] = time.perf_counter() - started
-    return replace(next(iter(pictures.values())), seconds=seconds)
+    picture = joined(pictures, own.seconds)
+    picture.seconds["write"] = time.perf_counter() - started
+    return picture
 
 
 def _leave_stopped(engine: Any, layer_name: str, method: Method, own: Sampled) -> None:

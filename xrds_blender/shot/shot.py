@@ -7,14 +7,13 @@ along with what they show, and the sum is denoised once and, above scale 1, enla
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import Any
 
 from xrds_core.temporal.window import Shot, Window, place_of
 
 from ..choosing.chosen import Chosen, choose_for_shot
 from ..frame import stages
-from ..frame.picture import Picture
+from ..frame.picture import Picture, joined
 from ..frame.rendering import call_engine
 from ..planning.request import Request
 from ..scene.cuts import cuts
@@ -36,7 +35,7 @@ def render_shot(
     Frames that `is_done` says are there are neighbours alone, and only where they are
     needed. A `cache` stores the samples of every frame rendered; what it has already is
     not rendered again, and may lie beyond the ends of these frames. Yields numbers and
-    pictures, of stereo the first view's; the scene stays at the last frame rendered.
+    pictures; the scene stays at the last frame rendered.
     What the request leaves open is chosen at the first frame to render. Raises what
     `render` raises.
     """
@@ -62,13 +61,13 @@ def render_shot(
         number, own = found.number, found.own
         if is_done(number):  # another machine was quicker
             continue
-        view, others = next(iter(own.views)), list(found.neighbours.values())
+        others = list(found.neighbours.values())
         if method.lacks(own, others):
             own = _sample(scene, method, frames, number)
-        picture = method.finish(own, others, view)
-        seconds = dict.fromkeys(stages.STAGES, 0.0) | own.seconds | picture.seconds
-        seconds["total"] = sum(seconds.values())
-        yield number, chosen.described(replace(picture, seconds=seconds))
+        pictures = {view: method.finish(own, others, view) for view in own.views}
+        picture = joined(pictures, own.seconds)
+        picture.seconds["total"] = sum(picture.seconds.values())
+        yield number, chosen.described(picture)
 
 
 def _chosen(scene: Any, request: Request, todo: Sequence[int]) -> Chosen:
