@@ -15,15 +15,15 @@ from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
 from xrds_blender.planning.denoiser import DEFAULT_DENOISER, Denoiser
 
 PLAIN, QUICK = Choice(Denoiser.HIGH_ACCURATE, 0), Choice(Denoiser.FAST_FAST, 0)
-LOW = Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 2)
-FULL = Choice(Denoiser.HIGH_FAST, 0, 2, "fast", "full", 1)
-NETWORKS = [LOW.network, FULL.network]
+LOW = Choice(Denoiser.HIGH_FAST, 0, 4, "fast", 2)
+HALF = Choice(Denoiser.HIGH_FAST, 0, 2, "fast", 1)
+NETWORKS = [LOW.network, HALF.network]
 ERRORS = ErrorModel(
     {
         PLAIN: Curve((1, 4, 16), (24.0, 29.0, 33.0)),
         QUICK: Curve((1, 4, 16), (22.0, 26.0, 30.0)),
         LOW: Curve((4, 16, 64), (23.0, 25.0, 25.5)),
-        FULL: Curve((4, 16), (25.0, 27.0)),
+        HALF: Curve((4, 16), (25.0, 27.0)),
     }
 )
 COSTS = Costs(
@@ -31,7 +31,7 @@ COSTS = Costs(
     beauty=4.0,
     guide=2.0,
     denoise={"HIGH-ACCURATE": 24.0, "HIGH-FAST": 4.0, "FAST-FAST": 2.0},
-    network={LOW.network: 3.0, FULL.network: 3.0},
+    network={LOW.network: 3.0, HALF.network: 3.0},
 )
 positive = st.floats(0.01, 100.0)
 
@@ -44,8 +44,8 @@ def test_seconds_are_the_sum_of_the_parts() -> None:
     assert COSTS.seconds(replace(PLAIN, samples=3)) == 1 + 24 + 3 * 4
     low = 1 + 4 / 16 + 2 * 2 + 3 + 8 * 4 / 16
     assert COSTS.seconds(replace(LOW, samples=8)) == low
-    full = 1 + 4 / 4 + 1 * 4 + 3 + 8 * 4 / 4  # its guides are full samples
-    assert COSTS.seconds(replace(FULL, samples=8)) == full
+    half = 1 + 4 / 4 + 1 * 2 + 3 + 8 * 4 / 4
+    assert COSTS.seconds(replace(HALF, samples=8)) == half
 
 
 def test_curve_is_linear_in_doublings_and_goes_on() -> None:
@@ -213,7 +213,7 @@ def test_denoisers_that_are_not_there_are_not_chosen() -> None:
     assert "best plain for 60 s" in picked.decision(60.0).reason
     left = errors.limited({Denoiser.HIGH_ACCURATE})
     assert budget.choose(60.0, costs, left, []).choice.denoiser == "HIGH-ACCURATE"
-    assert set(left.curves) == {PLAIN, LOW, FULL}
+    assert set(left.curves) == {PLAIN, LOW, HALF}
 
 
 def test_networks_without_weights_are_not_chosen() -> None:

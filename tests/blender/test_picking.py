@@ -20,7 +20,7 @@ from xrds_blender.planning.denoiser import Denoiser
 from xrds_blender.shot.explain import explain
 from xrds_core.errors import UsageError, XRDSError
 
-XRDS = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 1)
+XRDS = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", 1)
 PLAIN = budget.Choice(Denoiser.FAST_FAST, 0)
 FULL = budget.Choice(Denoiser.XRDS_FAST, 0)
 BEST = budget.Choice(Denoiser.XRDS_BEST, 0)

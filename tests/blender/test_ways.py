@@ -24,7 +24,7 @@ from xrds_blender.planning.ways import (
 )
 
 MODEL = budget.shipped()
-NETWORKS = frozenset(Network("fast", scale, "fast") for scale in (2, 4, 8))
+NETWORKS = frozenset(Network("fast", scale) for scale in (2, 4, 8))
 ALL = Means(True, True, True, NETWORKS)
 ASKED = Asked(samples=16)
 PIXELS = 1920 * 1080
@@ -43,7 +43,7 @@ def test_what_cannot_work_is_left_out_and_told() -> None:
     no_torch = replace(ALL, torch=False)
     assert set(looks(at_hand=no_torch)) == {Way.FULL_SIZE, Way.PLAIN}
     assert "PyTorch" in missing(Way.X2, ASKED, no_torch)
-    x2 = replace(ALL, networks=frozenset({Network("fast", 2, "fast")}))
+    x2 = replace(ALL, networks=frozenset({Network("fast", 2)}))
     assert set(looks(at_hand=x2)) == {Way.FULL_SIZE, Way.X2, Way.PLAIN}
     assert "weights" in missing(Way.X4, ASKED, x2)
     assert "Open Image Denoise" in missing(

@@ -37,7 +37,7 @@ from xrds_lab.bench.sweep import Sweep
 from xrds_lab.bench.windows import find_shots
 
 SWEEP = Sweep(
-    (Network("fast", 4, "fast"),),
+    (Network("fast", 4),),
     plain_samples=(1, 2),
     low_samples={4: (4,)},
     guide_samples=(1, 2),
@@ -248,7 +248,7 @@ def test_the_pickers_model_is_written_and_can_be_read(world: World) -> None:
     assert model.source.startswith("mean over 1 scenes: cubes; weights: fast x4")
     plain = budget.Choice(Denoiser.HIGH_FAST, 0)
     assert model.errors.curves[plain].samples == (1, 2)
-    own = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", "fast", 2)
+    own = budget.Choice(Denoiser.HIGH_FAST, 0, 4, "fast", 2)
     assert own in model.errors.curves
 
 

@@ -10,7 +10,7 @@ from xrds_core.errors import UsageError
 from xrds_core.exr.encoding import CODECS, FLOAT_ZIP, Encoding
 from xrds_core.frames import RADIUS
 
-from ..frame.job import GUIDES, PRESETS, QUALITIES, SCALES, RenderJob
+from ..frame.job import PRESETS, QUALITIES, SCALES, RenderJob
 from ..planning.plan import SAVINGS
 from . import arguments
 from .scene_file import SceneChoice
@@ -107,12 +107,6 @@ def add_scene(command: argparse.ArgumentParser) -> None:
 def add_network(command: argparse.ArgumentParser) -> None:
     """Add what chooses a network and how it runs."""
     add = command.add_argument
-    add(
-        "--guides",
-        choices=GUIDES,
-        default="fast",
-        help="albedo and normal, or full: noisy radiance too (default: fast)",
-    )
     add("--preset", choices=PRESETS, default="fast", help="the network (default: fast)")
     add(
         "--exposure",
@@ -186,7 +180,6 @@ def job_of(options: argparse.Namespace) -> RenderJob:
         scale=options.scale,
         samples=options.samples,
         guide_samples=options.guide_samples,
-        guides=options.guides,
         preset=options.preset,
         device=options.device,
         exposure=options.exposure,
@@ -208,21 +201,13 @@ def job_of(options: argparse.Namespace) -> RenderJob:
 def _temporal_radius(options: argparse.Namespace) -> int:
     """The radius asked for; by default one that pays, where frames can lend."""
     asked: int | None = options.temporal_radius
-    hindrance = _hindrance(options)
+    if asked and options.plain:
+        raise UsageError(
+            "--temporal-radius cannot be had with --plain: Cycles renders each frame "
+            "alone"
+        )
     if asked is not None:
-        if asked and hindrance:
-            raise UsageError(f"--temporal-radius cannot be had with {hindrance}")
         return asked
     several = len(getattr(options, "frames", None) or ()) > 1
     several |= getattr(options, "keep_samples", None) is not None
-    return RADIUS if several and not hindrance else 0
-
-
-def _hindrance(options: argparse.Namespace) -> str:
-    """The option under which frames cannot lend to each other; empty if they can."""
-    if options.plain:
-        return "--plain: Cycles renders each frame alone"
-    is_picked = options.time_budget or options.quality
-    if options.scale > 1 and options.guides == "full" and not is_picked:
-        return "--guides full: frames lend fast guides alone"
-    return ""
+    return RADIUS if several and not options.plain else 0

@@ -30,7 +30,6 @@ def join_facts(scene: Any, job: RenderJob, scene_facts: SceneFacts) -> Facts:
         scale=job.scale,
         width=width,
         height=height,
-        guides=job.guides,
         max_bounces=scene.cycles.max_bounces,
         has_denoiser=session.has_denoiser() or denoisers.is_there(),
         lends=camera is None or can_track(scene),

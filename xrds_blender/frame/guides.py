@@ -76,7 +76,7 @@ class GuideSource:
         if low is not None and not self._chosen.render_guides:
             self.decision = Decision(GUIDE_CACHE, "off", "there are no guides to keep")
             return self._of_background(low)
-        if self._job.guides == "full" or GUIDE_CACHE not in self._job.savings:
+        if GUIDE_CACHE not in self._job.savings:
             return self._render(self._chosen.guide_samples)
         started = time.perf_counter()
         try:
@@ -119,7 +119,7 @@ class GuideSource:
             albedo, alpha = large(beauty.radiance), large(beauty.alpha)
             normal = np.zeros_like(albedo)
             seconds = {"sync": 0.0, "guides": 0.0}
-            guides[view] = Guides(albedo, normal, alpha, None, None, None, seconds)
+            guides[view] = Guides(albedo, normal, alpha, None, None, seconds)
             self._passes.put_back({(view, ALBEDO): albedo, (view, NORMAL): normal})
         return guides
 
@@ -150,7 +150,6 @@ class GuideSource:
             seed = first + kept
         return self._passes.guides_by_view(
             samples,
-            full=self._job.guides == "full",
             seed=seed,
             how=self._chosen.guides,
             portion=self._portion and replace(self._portion, length=samples),
@@ -207,7 +206,6 @@ def _guides(kept: CachedGuides, seconds: dict[str, float]) -> dict[str, Guides]:
             kept.passes[view, ALBEDO],
             kept.passes[view, NORMAL],
             alpha,
-            None,
             None,
             kept.samples,
             seconds,

@@ -79,7 +79,6 @@ def asked_of(
         samples=job.samples or samples,
         denoise=job.denoise,
         preset=job.preset,
-        guides=job.guides,
         guide_samples=job.guide_samples,
         plain_denoiser=job.denoiser or plain_denoiser,
     )

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 SCALES = (1, 2, 4, 8)
 PRESETS = ("fast", "balanced", "paper")
-GUIDES = ("fast", "full")
 QUALITIES = ("best", "high", "medium", "balanced", "fast")
 _SAMPLES = 1 << 24  # the most that Cycles takes
 _RANGES = {
@@ -53,7 +52,6 @@ class RenderJob:
     scale: int = 2
     samples: int | None = None
     guide_samples: int = 4
-    guides: str = "fast"
     preset: str = "fast"
     device: str = "auto"
     exposure: float | None = None

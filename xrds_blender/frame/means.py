@@ -25,7 +25,7 @@ def means(weights: str | Path | None = None) -> Means:
 def networks_at_hand(weights: str | Path | None = None) -> list[Network]:
     """Those whose weights are there."""
     found = weights_headers(weights)
-    return [Network(each.preset, each.scale, each.guides) for each in found]
+    return [Network(each.preset, each.scale) for each in found]
 
 
 def weights_headers(weights: str | Path | None = None) -> list[WeightsHeader]:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def load_upscaler(job: RenderJob) -> Upscaler:
     """The network of a job; the last one stays loaded for the next frame."""
     weights = None if job.weights is None else str(job.weights)
-    upscaler = _load(job.preset, job.scale, job.guides, job.device, weights)
+    upscaler = _load(job.preset, job.scale, job.device, weights)
     if job.threads is not None:
         import torch
 
@@ -29,11 +29,9 @@ def load_upscaler(job: RenderJob) -> Upscaler:
 
 
 @lru_cache(maxsize=1)
-def _load(
-    preset: str, scale: int, guides: str, device: str, weights: str | None
-) -> Upscaler:
+def _load(preset: str, scale: int, device: str, weights: str | None) -> Upscaler:
     upscaler_class: type[Upscaler] = torch_folder.load("superres.upscaler").Upscaler
-    return upscaler_class(preset, scale, guides, device, weights=weights)
+    return upscaler_class(preset, scale, device, weights=weights)
 
 
 def known_networks(job: RenderJob) -> list[Network]:
@@ -48,5 +46,5 @@ def known_networks(job: RenderJob) -> list[Network]:
     except XRDSError:
         return []
     if job.weights is not None and not Path(job.weights).is_dir():
-        return [Network(job.preset, job.scale, job.guides)]
+        return [Network(job.preset, job.scale)]
     return networks_at_hand(job.weights)

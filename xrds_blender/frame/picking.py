@@ -67,7 +67,6 @@ def pick(
     networks = [n for n in known_networks(job) if n in model.network_speed]
     if shot:
         errors = errors.in_shot(job.temporal_radius)
-        networks = [n for n in networks if n.guides == "fast"]  # others do not lend
 
     def choose() -> Picked:
         known = costs.in_shot(job.temporal_radius) if shot else costs
@@ -158,7 +157,6 @@ def _job(job: RenderJob, picked: Picked) -> RenderJob:
             "plain": False,
             "scale": choice.scale,
             "preset": choice.preset,
-            "guides": choice.guides,
             "guide_samples": choice.guide_samples,
         }
     return replace(job, time_budget=None, quality=None, **chosen)
@@ -296,9 +294,8 @@ def network_seconds_per_pixel(network: Network, job: RenderJob) -> float:
     side = NETWORK_SIDE // scale
     low = random.random((side, side, 3), np.float32)
     full = random.random((NETWORK_SIDE, NETWORK_SIDE, 3), np.float32)
-    extra = full if network.guides == "full" else None
     for _ in range(2):
         begun = time.perf_counter()
-        upscaler(low, full, full, guide_radiance=extra, guide_samples=1)
+        upscaler(low, full, full, guide_samples=1)
         seconds = time.perf_counter() - begun
     return seconds / NETWORK_SIDE**2

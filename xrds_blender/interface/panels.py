@@ -8,7 +8,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..frame import history
-from ..frame.job import GUIDES, PRESETS, RenderJob
+from ..frame.job import PRESETS, RenderJob
 from ..frame.means import means
 from ..frame.ways import best_way, outlooks
 from ..internals.engine_override import ENGINE
@@ -78,7 +78,8 @@ def _draw_choices(layout: Any, scene: Any, job: RenderJob, at_hand: Means) -> No
     if settings.way == Way.FULL_SIZE:
         column.prop(settings, "denoise")
     if job.is_enlarged:
-        offered = [p for p in PRESETS if _network(job, preset=p) in at_hand.networks]
+        networks = at_hand.networks
+        offered = [p for p in PRESETS if Network(p, job.scale) in networks]
         _offer(column, settings, "preset", offered)
     if not job.plain:
         layout.prop(settings, "temporal_radius")
@@ -99,10 +100,6 @@ class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):
         layout, settings = self.layout, context.scene.xrds
         layout.use_property_split = True
         layout.use_property_decorate = False
-        job = job_of(settings)
-        networks = means(job.weights).networks
-        offered = [g for g in GUIDES if _network(job, guides=g) in networks]
-        _offer(layout, settings, "guides", offered)
         layout.prop(settings, "guide_samples")
 
 
@@ -155,11 +152,6 @@ class XRDS_PT_last_render(_RenderPanel, bpy.types.Panel):
         assert last is not None
         for name, value in summary.last_render(last):
             _row(self.layout, name, value)
-
-
-def _network(job: RenderJob, **other: str) -> Network:
-    """The weights of a job, with another preset or other guides."""
-    return Network(job.preset, job.scale, job.guides)._replace(**other)
 
 
 def _offer(layout: Any, settings: Any, name: str, offered: list[str]) -> None:

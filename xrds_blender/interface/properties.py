@@ -100,19 +100,6 @@ DENOISE = [
         "The smallest network, for previews: the quickest, and the softest picture",
     ),
 ]
-_GUIDES = [
-    (
-        "fast",
-        "Fast",
-        "Colour and direction of the surfaces, rendered at full size without light",
-    ),
-    (
-        "full",
-        "Full",
-        "A noisy full-size picture as well: slower, but shadows and reflections get "
-        "sharper",
-    ),
-]
 
 
 class XRDSSettings(bpy.types.PropertyGroup):
@@ -151,13 +138,6 @@ class XRDSSettings(bpy.types.PropertyGroup):
         description="In an animation, how many frames before and after lend their "
         "samples to each frame. More give less noise and flicker and take more memory; "
         "0 renders every frame by itself",
-    )
-    guides: EnumProperty(
-        name="Guides",
-        translation_context=CONTEXT,
-        items=_GUIDES,
-        description="What is rendered at full size to show the network where edges "
-        "and textures are",
     )
     guide_samples: IntProperty(
         name="Samples per Pixel",
@@ -214,7 +194,6 @@ def job_of(settings: XRDSSettings) -> RenderJob:
     job = RenderJob(
         scale=1,
         guide_samples=settings.guide_samples,
-        guides=settings.guides,
         preset=settings.preset,
         denoise=settings.denoise,
         device=here.device,

@@ -69,9 +69,9 @@ def _wrong(scene: Any, way: Way, at_hand: Means) -> list[str]:
 
 def _knows_passes(job: RenderJob) -> bool:
     """Whether the weights were trained on denoising passes as this Blender has them."""
-    wanted = (job.preset, job.scale, job.guides)
+    wanted = (job.preset, job.scale)
     series = {
-        (each.preset, each.scale, each.guides): each.blender_series
+        (each.preset, each.scale): each.blender_series
         for each in weights_headers(job.weights)
     }.get(wanted, "")
     if not series:

@@ -41,7 +41,6 @@ class Network(NamedTuple):
 
     preset: str
     scale: int
-    guides: str
 
 
 @dataclass(frozen=True)
@@ -55,13 +54,12 @@ class Choice:
     samples: int
     scale: int = 1
     preset: str = ""
-    guides: str = ""
     guide_samples: int = 0
 
     @property
     def network(self) -> Network:
         """The weights it needs."""
-        return Network(self.preset, self.scale, self.guides)
+        return Network(self.preset, self.scale)
 
     @property
     def label(self) -> str:
@@ -71,10 +69,9 @@ class Choice:
             return f"full size, {samples}, {self.denoiser.quality} denoising"
         if self.scale == 1:
             return f"plain, {samples}, OIDN {self.denoiser}"
-        guides = "full guide" if self.guides == "full" else "guide"
         return (
             f"{self.preset} x{self.scale}, {samples}, "
-            f"{self.guide_samples} {guides} samples, OIDN {self.denoiser}"
+            f"{self.guide_samples} guide samples, OIDN {self.denoiser}"
         )
 
 
@@ -125,9 +122,9 @@ class Costs:
         denoise = self.denoise[choice.denoiser]
         if choice.scale == 1:
             return self.fixed + denoise * self.pictures
-        guide = self.beauty if choice.guides == "full" else self.guide
-        seconds = self.fixed + denoise / choice.scale**2
-        return seconds + choice.guide_samples * guide + self.network[choice.network]
+        guides = choice.guide_samples * self.guide
+        low = self.fixed + denoise / choice.scale**2
+        return low + guides + self.network[choice.network]
 
 
 @dataclass(frozen=True)
@@ -224,7 +221,7 @@ class Model:
             for entry in content["curves"]
         }
         networks = {
-            Network(entry["preset"], entry["scale"], entry["guides"]): entry["speed"]
+            Network(entry["preset"], entry["scale"]): entry["speed"]
             for entry in content["networks"]
         }
         return cls(
@@ -242,8 +239,8 @@ class Model:
             "other_per_megapixel": self.other_per_megapixel,
             "denoisers": dict(self.denoiser_speed),
             "networks": [
-                {"preset": preset, "scale": scale, "guides": guides, "speed": speed}
-                for (preset, scale, guides), speed in self.network_speed.items()
+                {"preset": preset, "scale": scale, "speed": speed}
+                for (preset, scale), speed in self.network_speed.items()
             ],
             "curves": [
                 {

@@ -82,13 +82,12 @@ class Asked:
     samples: int
     denoise: str = "high"
     preset: str = "fast"
-    guides: str = "fast"
     guide_samples: int = 4
     plain_denoiser: Denoiser | None = DEFAULT_DENOISER
 
     def network(self, scale: int) -> Network:
         """The weights that an enlargement needs."""
-        return Network(self.preset, scale, self.guides)
+        return Network(self.preset, scale)
 
 
 @dataclass(frozen=True)

@@ -106,8 +106,6 @@ def has_neighbours(scene: Any, job: RenderJob) -> bool:
         return False
     if job.is_picked and not denoisers.is_there():
         return False
-    if job.is_enlarged and job.guides != "fast" and not job.is_picked:
-        return False
     return scene.camera is not None and can_track(scene)
 
 

@@ -330,7 +330,6 @@ def picked_config(job: RenderJob) -> Config:
         denoiser,
         job.scale,
         job.preset,
-        job.guides,
         job.guide_samples,
     )
 
