@@ -14,7 +14,7 @@ from torch import Tensor, nn
 
 from xrds_core.atomic import write_json
 from xrds_core.info import COSTS
-from xrds_core.superres.kernels import KernelTail
+from xrds_core.superres.kernels import GUIDE_COUNT, KernelTail
 from xrds_core.superres.network import (
     PRESETS,
     XRDS,
@@ -99,9 +99,7 @@ def count(config: NetworkConfig, size: int = PAPER_OUTPUT) -> Operations:
         if isinstance(network.tail, KernelTail):
             _leave_out_the_weightless(network.tail)
         counter = _Counter(network)
-        network(
-            torch.empty(1, 3, low, low), torch.empty(1, config.guide_count, size, size)
-        )
+        network(torch.empty(1, 3, low, low), torch.empty(1, GUIDE_COUNT, size, size))
     parameters = sum(p.numel() for p in network.parameters())
     return Operations(parameters, counter.macs, counter.attention, counter.elementwise)
 

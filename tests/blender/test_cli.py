@@ -85,7 +85,7 @@ def run(code: str, *words: str) -> subprocess.CompletedProcess[str]:
         ["render", "a.blend", "-o", "b.exr", "--exposure", "0"],
         ["render", "a.blend", "-o", "b.exr", "--memory-limit", "much"],
         ["evaluate", "a.blend", "--windows", "w", "--references", "r", "--scale", "x"],
-        ["evaluate", "a.blend", "--windows", "w", "--references", "r", "--guides", "x"],
+        ["evaluate", "a.blend", "--windows", "w", "--references", "r", "--preset", "x"],
         ["stability"],
         ["stability", "--out", "o", "--parts", "everything"],
     ],
@@ -153,12 +153,7 @@ def test_render_options() -> None:
         0.5,
         7,
     )
-    assert (options.guides, options.preset, options.plain, options.json) == (
-        "fast",
-        "fast",
-        False,
-        False,
-    )
+    assert (options.preset, options.plain, options.json) == ("fast", False, False)
 
 
 @pytest.mark.parametrize(
@@ -213,13 +208,11 @@ def test_what_cannot_be_is_one_line(
 
 def test_evaluate_lists() -> None:
     options = parse(
-        "evaluate a b --windows w --references r "
-        "--scale 2,4 --preset fast,balanced --guides fast,full"
+        "evaluate a b --windows w --references r --scale 2,4 --preset fast,balanced"
     )
     assert options.scenes == [Path("a"), Path("b")]
     assert options.scale == (2, 4)
     assert options.preset == ("fast", "balanced")
-    assert options.guides == ("fast", "full")
 
 
 @pytest.mark.parametrize(

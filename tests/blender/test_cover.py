@@ -33,7 +33,7 @@ def guides_of(alpha: np.ndarray, samples: int | None = 4) -> Guides:
     hits = np.random.default_rng(1).binomial(samples or 1, alpha) / (samples or 1)
     nothing = np.zeros((*alpha.shape, 3), np.float32)
     noisy = hits.astype(np.float32) if samples else alpha
-    return Guides(nothing, nothing, noisy, None, None, samples)
+    return Guides(nothing, nothing, noisy, None, samples)
 
 
 def error(alpha: np.ndarray) -> float:
@@ -73,7 +73,7 @@ def test_the_network_gets_it(life: Any, network: Any) -> None:
 
 def guides_like(alpha: np.ndarray) -> Guides:
     nothing = np.zeros((*alpha.shape, 3), np.float32)
-    return Guides(nothing, nothing, alpha, None, None, 4)
+    return Guides(nothing, nothing, alpha, None, 4)
 
 
 def test_without_the_library_it_stays_as_it_is(monkeypatch: Any) -> None:

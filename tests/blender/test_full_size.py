@@ -28,16 +28,16 @@ def noisy_passes(scene: Any, seed: int) -> Any:
         scene,
         lambda passes: (
             passes.beauty(1, denoise=False, seed=seed),
-            passes.guides(scene.cycles.samples, full=True, seed=seed),
+            passes.low_samples(1, seed=seed)[""].samples,
         ),
     )
 
 
 def test_the_picture_is_cycles_samples_denoised(life: Any) -> None:
     picture = render(life, 1, seed=3)
-    beauty, guides = noisy_passes(life, 3)
+    beauty, samples = noisy_passes(life, 3)
     noisy = np.dstack((beauty.radiance, beauty.alpha))
-    expected = Denoiser()(noisy, guides.albedo, guides.normal).radiance
+    expected = Denoiser()(noisy, samples.albedo, samples.normal).radiance
     np.testing.assert_allclose(picture.radiance, expected[..., :3], atol=1e-5)
     np.testing.assert_array_equal(picture.alpha, beauty.alpha)
     assert np.abs(picture.radiance - beauty.radiance).mean() > 1e-3

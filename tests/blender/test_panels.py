@@ -95,7 +95,7 @@ def test_unregister_takes_everything_back() -> None:
     assert hasattr(bpy.types, "XRDS_PT_settings")
 
 
-ALL = Means(True, True, True, frozenset({Network("fast", 2, "fast")}))
+ALL = Means(True, True, True, frozenset({Network("fast", 2)}))
 
 
 class Layout:
@@ -174,7 +174,6 @@ def test_each_way_shows_its_own_settings(way: str, named: set[str]) -> None:
     assert "use_time_budget" not in told
     presets = {"fast", "balanced", "paper"} if way == "x2" else set()
     assert {"preset", "balanced", "paper"} & told == presets - {"fast"}
-    assert not {"guides", "full"} & told  # no weights
 
 
 def test_other_networks_are_offered_where_their_weights_are(
@@ -182,12 +181,11 @@ def test_other_networks_are_offered_where_their_weights_are(
 ) -> None:
     settings = bpy.context.scene.xrds
     settings.way = "x2"
-    known = [Network("fast", 2, "fast"), Network("paper", 2, "fast")]
-    known.append(Network("fast", 2, "full"))
-    at_hand = Means(True, True, True, frozenset(known))
+    known = frozenset({Network("fast", 2), Network("paper", 2)})
+    at_hand = Means(True, True, True, known)
     monkeypatch.setattr(panels, "means", lambda _: at_hand)
-    told = drawn(panels.XRDS_PT_settings, panels.XRDS_PT_guides)
-    assert {"fast", "paper", "full"} <= set(told)
+    told = drawn()
+    assert {"fast", "paper"} <= set(told)
     assert "balanced" not in told
     assert "2×" in told
     assert "4×" not in told  # no weights

@@ -83,7 +83,7 @@ def test_one_session_renders_what_a_session_each_would(
             lambda: passes.beauty(2, 4, denoise=False, seed=1).radiance,
             lambda: passes.guides(4, seed=2).albedo,
             lambda: passes.beauty(1, 4, denoise=False, seed=3).radiance,
-            lambda: passes.guides(4, full=True, seed=4).radiance,
+            lambda: passes.low_samples(1, 4, seed=4)[""].samples.picture,
             lambda: passes.beauty(4, 8, denoise=False, seed=5).radiance,
         ):
             if fresh:
@@ -99,7 +99,7 @@ def test_one_session_renders_what_a_session_each_would(
     assert kept[2].shape == (36, 48, 3)
 
 
-@pytest.mark.parametrize("kind", ["beauty", "full guides"])
+@pytest.mark.parametrize("kind", ["beauty", "samples"])
 def test_fewer_samples_keep_their_own_blue_noise(still_life: Build, kind: str) -> None:
     """Laid for more samples it would be worse to denoise, with nothing to see."""
     scene = still_life()
@@ -107,7 +107,7 @@ def test_fewer_samples_keep_their_own_blue_noise(still_life: Build, kind: str) -
     def few(passes: Any) -> np.ndarray:
         if kind == "beauty":
             return passes.beauty(1, 2, denoise=False, seed=1).radiance
-        return passes.guides(2, full=True, seed=1).radiance
+        return passes.low_samples(1, 2, seed=1)[""].samples.picture
 
     def after_many(passes: Any) -> np.ndarray:
         passes.beauty(4, 16, denoise=False)
@@ -137,13 +137,11 @@ def test_guides_keep_albedo_and_normals_of_the_full_render(still_life: Build) ->
     scene = still_life()
 
     def job(passes: Any) -> Any:
-        return passes.guides(32, seed=1), passes.guides(32, full=True, seed=2)
+        return passes.guides(32, seed=1), passes.low_samples(1, 32, seed=2)
 
     short, full = run_job(scene, job)
-    assert short.radiance is None
-    assert full.radiance.shape == (36, 48, 3)
     for name in ("albedo", "normal"):
-        difference = np.abs(getattr(short, name) - getattr(full, name))
+        difference = np.abs(getattr(short, name) - getattr(full[""].samples, name))
         assert difference.mean() < 0.01, name
     np.testing.assert_array_equal(short.alpha, 1.0)
     assert short.depth.shape == (36, 48)

@@ -12,7 +12,6 @@ FACTS = plan.Facts(
     scale=4,
     width=1366,
     height=768,
-    guides="fast",
     max_bounces=12,
     has_denoiser=True,
     exact_camera=True,
@@ -52,7 +51,6 @@ def test_without_a_denoiser_nothing_is_denoised() -> None:
 
 def test_guides_never_bounce_more_than_the_scene() -> None:
     assert values(replace(FACTS, max_bounces=2))["guide bounces"] == "2, none diffuse"
-    assert values(replace(FACTS, guides="full"))["guide bounces"] == "12"
 
 
 def test_a_panorama_says_that_it_is_resampled() -> None:

@@ -174,10 +174,9 @@ def test_a_cancelled_shot_keeps_the_frames_before(
         ("--scale 1 --frames 1-3 --temporal-radius 0", 0),
         ("--scale 1 --frame 1", 0),
         ("--scale 2 --frames 1-3", 4),
-        ("--scale 2 --guides full --frames 1-3", 0),
         ("--plain --frames 1-3", 0),
         ("--time-budget 9 --frames 1-3", 4),
-        ("--quality 30 --guides full --frames 1-3", 4),
+        ("--quality 30 --frames 1-3", 4),
     ],
 )
 def test_the_radius_by_default(line: str, radius: int) -> None:

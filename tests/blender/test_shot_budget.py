@@ -57,7 +57,7 @@ def best(monkeypatch: pytest.MonkeyPatch, probed: list[int]) -> Callable[..., No
     """Let one family be the best, whatever it costs."""
 
     def leave(family: Choice) -> None:
-        psnr = dict.fromkeys((FULL, LOW, FULL_GUIDES), 20.0) | {family: 40.0}
+        psnr = dict.fromkeys((FULL, LOW), 20.0) | {family: 40.0}
         curves = {c: Curve((1, 16), (p - 4, p)) for c, p in psnr.items()}
         speed = dict.fromkeys(COSTS.network, 0.1)
         model = replace(
@@ -94,16 +94,13 @@ def test_a_shot_is_probed_once_and_lends(
     assert result["kept"] == FRAMES
 
 
-def test_super_resolution_lends_by_the_guides_that_can(
+def test_frames_of_super_resolution_lend_as_well(
     blend: Path, probed: list[int], best: Callable[..., None]
 ) -> None:
     best(LOW)
     result = rendered(blend)
     assert result["plan"][0]["value"].startswith("fast x4")
     assert result["frames"][1]["temporal"]["frames"] == (1, 2, 3)
-    best(FULL_GUIDES)
-    (blend.parent / "command" / "1.exr").unlink()
-    assert "full guide" not in rendered(blend)["plan"][0]["value"]
 
 
 def test_an_animation_is_the_shot_of_the_command(

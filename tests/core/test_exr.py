@@ -185,10 +185,9 @@ def test_passes_are_found_under_any_prefix(path: Path, layout: str) -> None:
     np.testing.assert_array_equal(beauty.alpha, PASSES["Combined"]["A"])
     np.testing.assert_array_equal(beauty.picture, stacked("Combined", "RGBA"))
     np.testing.assert_array_equal(beauty.noisy, stacked("Noisy Image"))
-    guides = read_guides(path, full=True)
+    guides = read_guides(path)
     np.testing.assert_array_equal(guides.albedo, stacked("Denoising Albedo"))
     np.testing.assert_array_equal(guides.normal, stacked("Denoising Normal", "XYZ"))
-    np.testing.assert_array_equal(guides.radiance, stacked("Noisy Image"))
     np.testing.assert_array_equal(guides.alpha, PASSES["Combined"]["A"])
 
 
@@ -201,14 +200,6 @@ def test_a_plain_picture_with_and_without_alpha(path: Path) -> None:
         assert beauty.picture.shape == (4, 6, len(letters))
         assert (beauty.alpha is None) == (letters == "RGB")
         assert beauty.noisy is None
-
-
-def test_full_guides_of_an_undenoised_render_are_the_picture(path: Path) -> None:
-    passes = {k: v for k, v in PASSES.items() if k != "Noisy Image"}
-    write_passes(path, passes, "layered")
-    guides = read_guides(path, full=True)
-    np.testing.assert_array_equal(guides.radiance, stacked("Combined"))
-    assert read_guides(path).radiance is None
 
 
 def test_normals_may_be_called_red_green_and_blue(path: Path) -> None:

@@ -21,16 +21,11 @@ def planes(name: str, letters: str, height: int, width: int) -> dict[str, np.nda
     return {f"{name}{x}": generator.random(size, np.float32) for x in letters}
 
 
-@pytest.fixture(params=["fast", "full"])
-def guides(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
-
-
 @pytest.fixture
-def folder(tmp_path: Path, guides: str) -> Path:
+def folder(tmp_path: Path) -> Path:
     torch.manual_seed(0)
-    network = XRDS(preset_config("fast", 2, guides))
-    save_network(network, tmp_path / weights.file_name("fast", 2, guides), {})
+    network = XRDS(preset_config("fast", 2))
+    save_network(network, tmp_path / weights.file_name("fast", 2), {})
     passes = {
         **planes("ViewLayer.Combined.", "RGBA", 19, 16),
         **planes("ViewLayer.Noisy Image.", "RGB", 19, 16),
@@ -44,14 +39,11 @@ def folder(tmp_path: Path, guides: str) -> Path:
 
 
 @pytest.mark.parametrize(("name", "channels"), [("opaque", 3), ("low", 4)])
-def test_files_in_a_file_out(
-    folder: Path, guides: str, name: str, channels: int
-) -> None:
+def test_files_in_a_file_out(folder: Path, name: str, channels: int) -> None:
     told = upscale_file(
         folder / f"{name}.exr",
         folder / "guides.exr",
         folder / "out.exr",
-        guides=guides,
         exposure=0.5,
         device="cpu",
         weights=folder,
@@ -62,19 +54,17 @@ def test_files_in_a_file_out(
     result = read_beauty(folder / "out.exr").picture
     assert result.shape == (19, 16, channels)
 
-    passes = exr_upscale.read_guides(folder / "guides.exr", full=guides == "full")
-    expected = Upscaler("fast", 2, guides, "cpu", weights=folder)(
+    passes = exr_upscale.read_guides(folder / "guides.exr")
+    expected = Upscaler("fast", 2, "cpu", weights=folder)(
         read_beauty(folder / f"{name}.exr").picture,
         passes.albedo,
         passes.normal,
-        guide_radiance=passes.radiance,
         guide_alpha=passes.alpha if channels == 4 else None,
         exposure=0.5,
     )
     np.testing.assert_array_equal(result, expected.radiance)
 
 
-@pytest.mark.parametrize("guides", ["fast"])
 @pytest.mark.parametrize("output", ["low.exr/out.exr", ".", "low.exr"])
 def test_an_output_that_cannot_be_is_told_before_the_work(
     folder: Path, output: str, monkeypatch: pytest.MonkeyPatch
@@ -85,7 +75,6 @@ def test_an_output_that_cannot_be_is_told_before_the_work(
         upscale_file(low, guide, folder / output, weights=folder)
 
 
-@pytest.mark.parametrize("guides", ["fast"])
 @pytest.mark.parametrize("name", ["out.png", "out.jpg", "out"])
 def test_no_exr_is_written_under_another_formats_name(folder: Path, name: str) -> None:
     low, guide = folder / "low.exr", folder / "guides.exr"
@@ -94,7 +83,6 @@ def test_no_exr_is_written_under_another_formats_name(folder: Path, name: str) -
     assert not (folder / name).exists()
 
 
-@pytest.mark.parametrize("guides", ["fast"])
 def test_a_lost_alpha_is_counted_and_told_and_keeps_the_colour(folder: Path) -> None:
     from xrds_blender.command.upscale import _lines
 
@@ -129,7 +117,6 @@ def test_bad_pixels_of_a_shot_are_told_by_frame() -> None:
     ]
 
 
-@pytest.mark.parametrize("guides", ["fast"])
 def test_a_wrong_guide_file_writes_nothing(folder: Path) -> None:
     low = folder / "low.exr"
     with pytest.raises(PictureError, match="Denoising Albedo"):

@@ -89,13 +89,6 @@ def test_strength_is_the_way_from_the_guides_to_their_means(
     torch.testing.assert_close(way, STRENGTH * (shipped(guides) - guides))
 
 
-def test_radiance_of_full_guides_is_no_guide_to_filter(shipped: GuideFilter) -> None:
-    guides = torch.cat((random_guides(16, 16), torch.rand(1, 3, 16, 16)), dim=1)
-    found = filter_guides(shipped, guides)
-    torch.testing.assert_close(found[:, :6], filter_guides(shipped, guides[:, :6]))
-    assert torch.equal(found[:, 6:], guides[:, 6:])
-
-
 # --- when it is asked -----------------------------------------------------------------
 
 

@@ -37,7 +37,7 @@ READERS = {
     "toml": ("from xrds_lab.training.config import read_config as read", "UsageError"),
     "npz": (
         "from xrds_lab.training.windows import read_window\n"
-        "read = lambda path: read_window(path, 2, 'fast')",
+        "read = lambda path: read_window(path, 2)",
         "PictureError",
     ),
 }

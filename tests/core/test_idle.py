@@ -17,11 +17,11 @@ SIDE, SCALE = 320, 2
 THING = slice(128, 160)  # low-resolution rows and columns that are not background
 
 
-def make(preset: str = "fast", guides: str = "fast") -> Upscaler:
+def make(preset: str = "fast") -> Upscaler:
     torch.manual_seed(3)
-    network = XRDS(preset_config(preset, SCALE, guides))
+    network = XRDS(preset_config(preset, SCALE))
     torch.nn.init.normal_(network.tail.predict.weight, std=0.1)
-    return Upscaler(preset, SCALE, guides, device="cpu", weights=network)
+    return Upscaler(preset, SCALE, device="cpu", weights=network)
 
 
 @pytest.fixture(scope="module")
@@ -119,17 +119,6 @@ def test_doubts_are_computed(fast: Upscaler, wrong: str) -> None:
         fast(low, albedo, normal, skip_idle=skip).radiance for skip in (True, False)
     )
     np.testing.assert_array_equal(short[:64], whole[:64])
-
-
-def test_full_guides_are_all_computed() -> None:
-    low, albedo, normal = shot(np.zeros((SIDE, SIDE, 3), "f4"))
-    full = make(guides="full")
-    radiance = enlarged(low)
-    short, whole = (
-        full(low, albedo, normal, guide_radiance=radiance, skip_idle=skip).radiance
-        for skip in (True, False)
-    )
-    np.testing.assert_array_equal(short, whole)
 
 
 def test_odd_sizes_and_tiles(fast: Upscaler) -> None:

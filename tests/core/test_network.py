@@ -8,12 +8,7 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from xrds_core.superres.network import (
-    GUIDE_CHANNELS,
-    XRDS,
-    NetworkConfig,
-    preset_config,
-)
+from xrds_core.superres.network import XRDS, NetworkConfig, preset_config
 from xrds_core.superres.regression import explain
 
 TINY = NetworkConfig(groups=1, blocks=1, channels=8, guide_channels=4, window_size=4)
@@ -27,26 +22,12 @@ def test_every_scale_and_odd_sizes(scale: int) -> None:
 
 
 @pytest.mark.parametrize("block", ["rdst", "rdb", "rstb"])
-@pytest.mark.parametrize("guides", GUIDE_CHANNELS)
 @pytest.mark.parametrize("cross_attention", [True, False])
-def test_ablations_train_every_weight(
-    block: str, guides: str, cross_attention: bool
-) -> None:
-    config = replace(TINY, block=block, guides=guides, cross_attention=cross_attention)
-    network = XRDS(config)
-    out = network(torch.rand(1, 3, 8, 8), torch.rand(1, config.guide_count, 32, 32))
+def test_ablations_train_every_weight(block: str, cross_attention: bool) -> None:
+    network = XRDS(replace(TINY, block=block, cross_attention=cross_attention))
+    out = network(torch.rand(1, 3, 8, 8), torch.rand(1, 6, 32, 32))
     out.square().mean().backward()
     assert all(p.grad is not None for p in network.parameters())
-
-
-@pytest.mark.parametrize("guides", ["albedo", "normal", "none"])
-def test_left_out_guides_have_no_influence(guides: str) -> None:
-    network = XRDS(replace(TINY, guides=guides)).eval()
-    radiance, stack = torch.rand(1, 3, 8, 8), torch.rand(1, 6, 32, 32)
-    other = torch.rand(1, 6, 32, 32)
-    for channel in GUIDE_CHANNELS[guides]:
-        other[:, channel] = stack[:, channel]
-    assert torch.equal(network(radiance, stack), network(radiance, other))
 
 
 def test_shifted_windows_do_not_wrap_around() -> None:
@@ -77,14 +58,12 @@ def test_untrained_presets_are_what_the_guides_explain(preset: str, scale: int) 
 
 
 @pytest.mark.parametrize("preset", ["fast", "balanced"])
-@pytest.mark.parametrize("guides", ["fast", "full"])
-def test_presets_keep_black_and_grey(preset: str, guides: str) -> None:
+def test_presets_keep_black_and_grey(preset: str) -> None:
     torch.manual_seed(2)
-    config = preset_config(preset, 2, guides)
-    network = XRDS(config).eval()
+    network = XRDS(preset_config(preset, 2)).eval()
     for parameter in network.parameters():  # as far from the base as training can go
         torch.nn.init.normal_(parameter, std=0.2)
-    stack = torch.rand(1, config.guide_count, 32, 32)
+    stack = torch.rand(1, 6, 32, 32)
     black = network(torch.zeros(1, 3, 16, 16), stack)
     assert torch.equal(black, torch.zeros_like(black))
     grey_stack = stack[:, :1].expand_as(stack)
@@ -98,7 +77,6 @@ def test_presets_keep_black_and_grey(preset: str, guides: str) -> None:
     [
         ({"scale": 3}, "scale is 3"),
         ({"cell": 2}, "cell 2"),
-        ({"guides": "depth"}, "'depth'"),
         ({"block": "resnet"}, "'resnet'"),
         ({"heads": 3}, "multiple of heads 3"),
     ],
@@ -114,19 +92,18 @@ def test_wrong_guides_are_refused() -> None:
 
 
 def test_configuration_round_trip() -> None:
-    config = preset_config("fast", 2, "full")
+    config = preset_config("fast", 2)
     assert NetworkConfig.from_dict(config.to_dict()) == config
 
 
 @pytest.mark.parametrize("scale", [2, 4, 8])
-@pytest.mark.parametrize("guides", ["fast", "full"])
-def test_areas_are_of_no_matter_to_the_picture(scale: int, guides: str) -> None:
-    network = XRDS(preset_config("fast", scale, guides)).eval()
+def test_areas_are_of_no_matter_to_the_picture(scale: int) -> None:
+    network = XRDS(preset_config("fast", scale)).eval()
     for parameter in network.tail.parameters():  # those of new weights are all zero
         torch.nn.init.normal_(parameter, std=0.05)
     size = 11 * network.config.cell
     radiance = torch.rand(1, 3, size // scale, size // scale)
-    stack = torch.rand(1, network.config.guide_count, size, size)
+    stack = torch.rand(1, 6, size, size)
     with torch.inference_mode():
         whole = network(radiance, stack)
         network.tail.area_side = 3

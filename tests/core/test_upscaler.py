@@ -18,18 +18,17 @@ from xrds_core.superres.upscaler import Upscaler, upscale
 from xrds_lab.weights import save_network
 
 
-def network(scale: int = 2, guides: str = "fast", preset: str = "fast") -> XRDS:
+def network(scale: int = 2, preset: str = "fast") -> XRDS:
     """A network that does something with all it sees, though it was never trained."""
     torch.manual_seed(3)
-    net = XRDS(preset_config(preset, scale, guides))
+    net = XRDS(preset_config(preset, scale))
     if preset != "paper":
         torch.nn.init.normal_(net.tail.predict.weight, std=0.1)
     return net
 
 
-def make(scale: int = 2, guides: str = "fast", preset: str = "fast") -> Upscaler:
-    net = network(scale, guides, preset)
-    return Upscaler(preset, scale, guides, device="cpu", weights=net)
+def make(scale: int = 2, preset: str = "fast") -> Upscaler:
+    return Upscaler(preset, scale, device="cpu", weights=network(scale, preset))
 
 
 @pytest.fixture(scope="module")
@@ -91,16 +90,6 @@ def test_every_preset_runs(preset: str) -> None:
     result = make(4, preset=preset)(*picture(7, 5, 4)).radiance
     assert result.shape == (28, 20, 3)
     assert np.isfinite(result).all()
-
-
-def test_full_guides_are_seen() -> None:
-    full = make(guides="full")
-    inputs = picture(12, 12)
-    light = 10.0 * textured(24, 24, 3, seed=5) ** 4
-    first = full(*inputs, guide_radiance=light).radiance
-    second = full(*inputs, guide_radiance=light[::-1].copy()).radiance
-    assert first.shape == (24, 24, 3)
-    assert not np.allclose(first, second, rtol=0.01)
 
 
 def test_radiance_before_denoising_is_seen(fast: Upscaler) -> None:
@@ -192,14 +181,6 @@ def test_arrays_that_are_no_picture(
         fast(radiance, albedo, normal)
 
 
-def test_guide_radiance_belongs_to_full_guides(fast: Upscaler) -> None:
-    inputs = picture(4, 4)
-    with pytest.raises(PictureError, match="take no guide_radiance"):
-        fast(*inputs, guide_radiance=inputs[1])
-    with pytest.raises(PictureError, match="need guide_radiance"):
-        make(guides="full")(*inputs)
-
-
 @pytest.mark.parametrize("exposure", [0.0, -1.0, math.nan, math.inf])
 def test_exposures_that_are_none(fast: Upscaler, exposure: float) -> None:
     with pytest.raises(UsageError, match="exposure"):
@@ -216,8 +197,6 @@ def test_devices_precisions_and_weights_that_are_not_there() -> None:
         Upscaler(precision="fp8", weights=network())
     with pytest.raises(WeightsError, match="scale 2"):
         Upscaler(scale=4, weights=network(2))
-    with pytest.raises(WeightsError, match="full guides"):
-        Upscaler(guides="full", weights=network(2))
 
 
 # --- bad pixels -----------------------------------------------------------------------
@@ -525,4 +504,4 @@ def test_upscale_uses_shipped_presets(
     assert fractions[-1] == 1.0
     assert upscaler._upscaler.cache_info().hits == 1
     with pytest.raises(WeightsError, match="it holds: fast_x4"):
-        upscale(*inputs, scale=4, guide_radiance=inputs[1])
+        upscale(*inputs, scale=4, preset="balanced")

@@ -165,7 +165,6 @@ def test_tensors_that_do_not_fit_the_configuration(
         {"channels": 0},
         {"heads": 0},
         {"scale": 3},
-        {"guides": "none of ours"},
         {"window_size": 4096},
         {"future": 1},
         {"channels": "many"},
@@ -177,6 +176,14 @@ def test_configurations_that_the_file_cannot_be_of(
 ) -> None:
     rewrite(path, {**CONFIG.to_dict(), **change})
     with pytest.raises(WeightsError, match="fast_x2"):
+        weights.load(path)
+
+
+def test_other_guides_are_told_by_name(path: Path) -> None:
+    rewrite(path, {**CONFIG.to_dict(), "guides": "fast"})
+    assert weights.load(path)[0].config == CONFIG
+    rewrite(path, {**CONFIG.to_dict(), "guides": "full"})
+    with pytest.raises(WeightsError, match=r"fast_x2.* does not render \('full'\)"):
         weights.load(path)
 
 
@@ -207,12 +214,12 @@ def test_a_preset_under_a_false_name(path: Path) -> None:
 
 
 def test_what_is_available_is_told(path: Path) -> None:
-    (path.parent / "notes_x2.safetensors").write_text("not ours")
+    for other in ("notes_x2", "fast_full_x2"):
+        (path.parent / f"{other}.safetensors").write_text("not ours")
     (record,) = weights.available(path.parent)
     assert record == {
         "preset": "fast",
         "scale": 2,
-        "guides": "fast",
         "file": "fast_x2.safetensors",
         "sha256": record["sha256"],
         "blender_series": "4.5",
@@ -222,4 +229,3 @@ def test_what_is_available_is_told(path: Path) -> None:
 
 def test_file_names() -> None:
     assert weights.file_name("fast", 4) == "fast_x4.safetensors"
-    assert weights.file_name("paper", 2, "full") == "paper_full_x2.safetensors"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -15,8 +16,8 @@ from xrds_lab.weights import save_network
 
 
 def test_headers_tell_what_loading_tells() -> None:
-    told = {(h.preset, h.scale, h.guides, h.blender_series) for h in headers()}
-    keys = ("preset", "scale", "guides", "blender_series")
+    told = {(h.preset, h.scale, h.blender_series) for h in headers()}
+    keys = ("preset", "scale", "blender_series")
     assert told == {tuple(r[key] for key in keys) for r in weights.available()}
 
 
@@ -40,6 +41,15 @@ def test_other_files_are_left_out(tmp_path: Path, content: bytes) -> None:
     path.write_bytes(content)
     assert headers(tmp_path) == []
     assert read_header(tmp_path / "nowhere_x2.safetensors") is None
+
+
+def test_networks_for_other_guides_are_left_out(tmp_path: Path) -> None:
+    for guides in ("fast", "full"):
+        config = json.dumps({"scale": 2, "guides": guides})
+        header = json.dumps({"__metadata__": {"config": config}}).encode()
+        path = tmp_path / f"{guides}_x2.safetensors"
+        path.write_bytes(len(header).to_bytes(8, "little") + header)
+    assert [h.preset for h in headers(tmp_path)] == ["fast"]
 
 
 def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:

@@ -46,7 +46,6 @@ def write_window() -> WriteWindow:
         low = reference.reshape(half, scale, half, scale, 3).mean((1, 3))
         guides = np.concatenate((albedo, normal), axis=-1)
         arrays = {"reference": reference, "guides_a": guides, "guides_b": guides}
-        arrays |= {"guide_radiance_a": reference, "guide_radiance_b": reference}
         for i in (0, 1):
             arrays |= {f"low{scale}_{i}": low, f"low{scale}_{i}_noisy": low}
         meta = {"guide_spp": [1, 4], "blender_series": "4.5"}

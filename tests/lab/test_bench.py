@@ -36,7 +36,7 @@ from xrds_lab.bench.sweep import Sweep
 from xrds_lab.bench.windows import find_shots
 
 SWEEP = Sweep(
-    (Network("fast", 4, "fast"),),
+    (Network("fast", 4),),
     plain_samples=(1, 2),
     low_samples={4: (4,)},
     guide_samples=(1, 2),

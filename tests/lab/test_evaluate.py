@@ -96,14 +96,12 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> World:
 
 @pytest.fixture(scope="module")
 def report(world: World) -> dict[str, Any]:
-    return world.run(scales=[2, 4], guides=["fast", "full"])
+    return world.run(scales=[2, 4])
 
 
 def test_every_rival_is_measured(report: dict[str, Any]) -> None:
-    keys = [
-        (r["scene"], r["scale"], r["preset"], r["guides"]) for r in report["scenes"]
-    ]
-    assert keys == [("floor", s, "fast", g) for s in (2, 4) for g in ("fast", "full")]
+    keys = [(r["scene"], r["scale"], r["preset"]) for r in report["scenes"]]
+    assert keys == [("floor", scale, "fast") for scale in (2, 4)]
     for record in report["scenes"]:
         rivals = set(ENLARGEMENTS) | {"oidn_equal_spp"}
         assert rivals <= set(record["methods"])
@@ -147,7 +145,7 @@ def test_a_second_run_renders_nothing(
     # the package's attribute of this name is the public function
     module = importlib.import_module("xrds_blender.frame.rendering")
     monkeypatch.setattr(module, "run_job", lambda *a, **k: pytest.fail("rendered"))
-    again = world.run(scales=[2, 4], guides=["fast", "full"], out=world.folder)
+    again = world.run(scales=[2, 4], out=world.folder)
     assert again == report
     assert json.loads((world.folder / "results.json").read_text()) == again
 
@@ -194,8 +192,6 @@ def test_rivals_are_timed_without_weights(world: World) -> None:
 
 
 def test_unknown_names_are_refused(world: World) -> None:
-    with pytest.raises(UsageError, match="noisy"):
-        world.run(guides=["noisy"])
     with pytest.raises(UsageError, match="boat"):
         world.run(timing=True, timing_scenes=["floor", "boat"])
 
@@ -203,9 +199,8 @@ def test_unknown_names_are_refused(world: World) -> None:
 def test_table_of_samples(world: World, capsys: pytest.CaptureFixture[str]) -> None:
     folder = world.folder / "networks"
     folder.mkdir()
-    for guides in ("fast", "full"):
-        network = XRDS(preset_config("fast", 2, guides))
-        save_network(network, folder / weights.file_name("fast", 2, guides), {})
+    network = XRDS(preset_config("fast", 2))
+    save_network(network, folder / weights.file_name("fast", 2), {})
     report = samples_table(
         [world.scene],
         windows=world.windows,
@@ -215,26 +210,17 @@ def test_table_of_samples(world: World, capsys: pytest.CaptureFixture[str]) -> N
         out=world.folder,
     )
     assert json.loads((world.folder / "samples.json").read_text()) == report
-    rows = {
-        (r["method"], r["guides"], r["samples"], r["denoiser"]): r
-        for r in report["records"]
-    }
-    assert len(rows) == 5 + 3 + 2 * 4  # fast and full guides, two modes of OIDN
+    rows = {(r["method"], r["samples"], r["denoiser"]): r for r in report["records"]}
+    assert len(rows) == 5 + 2 * 4  # ours, two modes of OIDN
     assert all(row["seconds"] > 0 for row in rows.values())
     summary = report["summary"]
-    ours = rows["xrds", "fast", 16, "HIGH-ACCURATE"]
+    ours = rows["xrds", 16, "HIGH-ACCURATE"]
     for mode, denoiser in (("default", "HIGH-ACCURATE"), ("fast", "FAST-FAST")):
-        theirs = rows["oidn", "", 4, denoiser]
+        theirs = rows["oidn", 4, denoiser]
         cell = summary["over_oidn"][mode]["4"]
         assert cell["gain"] == {"floor": ours["psnr"] - theirs["psnr"]}
         assert cell["seconds"] == {"floor": ours["seconds"] / theirs["seconds"]}
-        full = rows["xrds", "full", 16, "HIGH-ACCURATE"]
-        assert full["guide_samples"] == 4  # eight on the average, half of them each
-        eight = rows["oidn", "", 8, denoiser]
-        gain = summary["full_over_oidn"][mode]["8"]["mean_gain"]
-        assert gain == full["psnr"] - eight["psnr"]
     few, some, many = summary["more_samples"]["floor"]
     assert few < some < many + 1
     shown = capsys.readouterr().err
     assert f"{many - some:+.2f}" in shown or f"{some - few:+.2f}" in shown
-    assert "full guides" in shown

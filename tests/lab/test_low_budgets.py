@@ -89,7 +89,7 @@ def test_nothing_within_a_budget_is_no_line(measured: list[dict[str, Any]]) -> N
 
 
 def test_every_network_is_tried_with_both_kinds_of_guides() -> None:
-    networks = tuple(Network("fast", scale, "fast") for scale in (2, 4, 8))
+    networks = tuple(Network("fast", scale) for scale in (2, 4, 8))
     configs = LowSweep(networks).configurations()
     assert len(set(configs)) == len(configs)
     tried = {(c.scale, c.guide_samples) for c in configs if c.method == "xrds"}

@@ -26,7 +26,7 @@ from xrds_lab.bench.sweep import Config, Sweep, adaptive, anchor, anchors, xrds
 
 
 def point(seconds: float, psnr: float, method: str = "oidn", **more: Any) -> Any:
-    settings = {"denoiser": "HIGH-ACCURATE", "scale": 1, "guides": ""} | more
+    settings = {"denoiser": "HIGH-ACCURATE", "scale": 1} | more
     stages = {"total": seconds, "guides": 1.0, "beauty": seconds - 1.0}
     return {
         "scene": "car",
@@ -41,8 +41,8 @@ def point(seconds: float, psnr: float, method: str = "oidn", **more: Any) -> Any
 
 OIDN = [point(10, 20), point(20, 30), point(15, 19), point(40, 33)]
 XRDS = [
-    point(5, 22, "xrds", scale=4, guides="fast"),
-    point(12, 26, "xrds", scale=2, guides="fast"),
+    point(5, 22, "xrds", scale=4),
+    point(12, 26, "xrds", scale=2),
 ]
 
 
@@ -76,7 +76,7 @@ def test_seconds_of_the_same_picture_are_read_off_the_rivals_frontier() -> None:
         point(40, 30, samples=4),
         point(15, 19, samples=2),
     ]
-    ours = point(8, 25, "xrds", samples=16, scale=4, guides="fast", guide_samples=2)
+    ours = point(8, 25, "xrds", samples=16, scale=4, guide_samples=2)
     lost = point(60, 26, "full_size", samples=4)
     found = same_picture.entries("car", [*plain, ours, lost], 10.0, (0.5, 1.0, 8.0))
     assert [e["budget"] for e in found] == [1.0, 8.0]
@@ -89,7 +89,7 @@ def test_seconds_of_the_same_picture_are_read_off_the_rivals_frontier() -> None:
     more = same_picture.entries("car", [*plain, ours, quick], 10.0, (1.0,))
     assert 10 < more[0]["rival_seconds"] < 12  # on the way to the adaptive one
     assert more[0]["rival_samples"] == first["rival_samples"]
-    unreached = point(9, 31, "xrds", samples=4, scale=2, guides="fast")
+    unreached = point(9, 31, "xrds", samples=4, scale=2)
     (none,) = same_picture.entries("cave", [*plain, unreached], 10.0, (1.0,))
     assert none["rival_seconds"] is none["gain"] is None
     assert same_picture.in_order([none, first, last]) == [last, first, none]
@@ -115,14 +115,6 @@ def test_full_size_is_one_of_our_ways() -> None:
     assert ours in groups[pareto.CACHED]
 
 
-def test_sets_of_guides_are_apart_where_there_are_two() -> None:
-    full = point(9, 27, "xrds", scale=2, guides="full")
-    assert "XRDS, fast guides" not in pareto.groups(XRDS)
-    groups = pareto.groups([*XRDS, full])
-    assert groups["XRDS, full guides"] == [full]
-    assert groups["XRDS, fast guides"] == XRDS
-
-
 def test_mean_curve_is_over_all_scenes_alike() -> None:
     scenes = {"a": (OIDN, 10.0), "b": ([point(2, 25)], 1.0)}
     curve = pareto.mean_curve(scenes)
@@ -132,7 +124,7 @@ def test_mean_curve_is_over_all_scenes_alike() -> None:
 
 # --- seconds as sums of stages --------------------------------------------------------
 
-NETWORK = Network("fast", 2, "fast")
+NETWORK = Network("fast", 2)
 SWEEP = Sweep((NETWORK,))
 FULL_SIZE = Config("full_size", 4, Denoising.XRDS_HIGH)
 
@@ -177,10 +169,10 @@ def test_seconds_are_sums_of_the_stages_medians(tmp_path: Path) -> None:
         }
     )
     assert plain.peak_memory == 100
-    own = times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", "fast", 4))
+    own = times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", 4))
     assert own.seconds["beauty"] == pytest.approx(4.1)
     assert own.seconds["network"] == 4.0
-    few = times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", "fast", 3))
+    few = times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", 3))
     assert few.seconds["network"] == 4.5  # with their filter
     assert own.seconds["denoise"] == pytest.approx(0.25)
     assert own.seconds["guides"] == pytest.approx(6.6)  # with their denoiser
@@ -223,7 +215,7 @@ def test_adaptive_sampling_costs_what_its_own_frames_took(tmp_path: Path) -> Non
 
 
 def test_a_coarse_sweep_leaves_out_super_resolution_alone() -> None:
-    networks = tuple(Network("fast", scale, "fast") for scale in (2, 4, 8))
+    networks = tuple(Network("fast", scale) for scale in (2, 4, 8))
     whole = Sweep(networks)
     every, kept = (set(x.configurations()) for x in (whole, whole.coarser()))
     assert kept < every
@@ -258,7 +250,7 @@ def test_a_stage_that_failed_is_told_by_its_name(tmp_path: Path) -> None:
     times = timed(tmp_path)
     del times.runs[task_name(anchor("guides", more=True))]
     with pytest.raises(KeyError, match="guides"):
-        times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", "fast", 4))
+        times.cost(Config("xrds", 8, "HIGH-FAST", 2, "fast", 4))
     times.cost(Config("oidn", 1, "HIGH-ACCURATE"))
 
 

@@ -156,7 +156,6 @@ def test_window_files_hold_what_training_reads(made: Path) -> None:
     expected = {"reference": (64, 64, 3)}
     for letter in "ab":
         expected[f"guides_{letter}"] = (64, 64, 6)
-        expected[f"guide_radiance_{letter}"] = (64, 64, 3)
     for scale in (2, 4, 8):
         for name in (f"low{scale}_0", f"low{scale}_1"):
             expected[name] = expected[name + "_noisy"] = (64 // scale, 64 // scale, 3)
@@ -188,7 +187,7 @@ def test_datasheet_counts_and_shows(made: Path, tmp_path: Path) -> None:
     assert sum(sheet["kinds"].values()) == 2
     assert sheet["scenes"] == 1
     assert sheet["mean_bytes"] > 10_000
-    stages = {"low2", "low4", "low8", "guides", "full", "reference"}
+    stages = {"low2", "low4", "low8", "guides", "reference"}
     assert set(sheet["mean_cpu_seconds"]) == stages
     assert "2 validation" in datasheet.lines(sheet)[0]
     datasheet.contact_sheet(found, tmp_path / "contact.jpg")

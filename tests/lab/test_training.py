@@ -418,8 +418,8 @@ def test_batch_that_processes_cannot_share_is_said() -> None:
 
 def test_validation_knows_where_demodulation_is_exact(config: TrainingConfig) -> None:
     paths = sorted((Path(config.data[0]) / "train").glob("*.npz"))
-    windows = WindowSet(paths, 2, "fast", memory=0)
-    validation = Validation(windows, 2, 2, "fast")
+    windows = WindowSet(paths, 2, memory=0)
+    validation = Validation(windows, 2, 2)
 
     def scores() -> list[Score]:
         places = reversed(validation.places)

@@ -28,24 +28,19 @@ def first_window(config: TrainingConfig) -> Path:
     return Path(config.data[0]) / "train" / "0.npz"
 
 
-@pytest.mark.parametrize("guides", ["fast", "full"])
-def test_crops_stay_aligned(
-    config: TrainingConfig, guides: str, full_variation: Variation
-) -> None:
-    window = read_window(first_window(config), 2, guides)
+def test_crops_stay_aligned(config: TrainingConfig, full_variation: Variation) -> None:
+    window = read_window(first_window(config), 2)
     variation = replace(full_variation, black=0.0, shaded=0.0)
     for seed in range(20):
         random = np.random.default_rng(seed)
-        batch = draw(window, 2, guides, variation, random, 16)
-        assert batch.guides.shape == (1, 9 if guides == "full" else 6, 16, 16)
+        batch = draw(window, 2, variation, random, 16)
+        assert batch.guides.shape == (1, 6, 16, 16)
         reference = torch.expm1(batch.reference)
         low = torch.expm1(batch.radiance)
         means = torch.nn.functional.avg_pool2d(reference, 2)
         torch.testing.assert_close(means, low, rtol=2e-2, atol=1e-3)
         ratio = reference / batch.guides[:, :3]
         assert ratio.std() / ratio.mean() < 1e-2  # one light, whatever the variation
-        if guides == "full":
-            torch.testing.assert_close(batch.guides[:, 6:], batch.reference)
 
 
 def test_normals_turn_with_the_picture() -> None:
@@ -57,7 +52,7 @@ def test_normals_turn_with_the_picture() -> None:
     for seed in range(64):
         random = np.random.default_rng(seed)
         marked = np.arange(64, dtype=np.float32).reshape(8, 8, 1)
-        whole = Crop(marked, marked, marked, marked, dome, None, 1.0)
+        whole = Crop(marked, marked, marked, marked, dome, 1.0)
         turned = transpose_and_flip(whole, random)
         np.testing.assert_allclose(turned.normal, dome, atol=1e-6)
         seen.add(turned.low.tobytes())
@@ -77,10 +72,10 @@ def test_over_denoised_radiance_loses_a_part_of_its_texture() -> None:
 def test_crops_lit_anew_are_over_denoised_only_where_asked(
     config: TrainingConfig,
 ) -> None:
-    window = read_window(first_window(config), 2, "fast")
+    window = read_window(first_window(config), 2)
 
     def differs(variation: Variation, seed: int) -> bool:
-        batch = draw(window, 2, "fast", variation, np.random.default_rng(seed))
+        batch = draw(window, 2, variation, np.random.default_rng(seed))
         means = torch.nn.functional.avg_pool2d(torch.expm1(batch.reference), 2)
         return not torch.allclose(means, torch.expm1(batch.radiance), rtol=1e-2)
 
@@ -91,9 +86,9 @@ def test_crops_lit_anew_are_over_denoised_only_where_asked(
 
 
 def test_shaded_crops_are_albedo_under_smooth_light(config: TrainingConfig) -> None:
-    window = read_window(first_window(config), 2, "fast")
+    window = read_window(first_window(config), 2)
     random = np.random.default_rng(1)
-    batch = draw(window, 2, "fast", Variation(shaded=1.0), random)
+    batch = draw(window, 2, Variation(shaded=1.0), random)
     reference, low = torch.expm1(batch.reference), torch.expm1(batch.radiance)
     means = torch.nn.functional.avg_pool2d(reference, 2)
     torch.testing.assert_close(means, low, rtol=1e-3, atol=1e-4)
@@ -104,7 +99,7 @@ def test_shaded_crops_are_albedo_under_smooth_light(config: TrainingConfig) -> N
     assert light.std() / light.mean() > 0.1
 
 
-def test_light_of_our_own_keeps_the_noise_of_full_guides() -> None:
+def test_light_of_our_own_keeps_the_noise_of_what_was_rendered() -> None:
     random = np.random.default_rng(2)
     rendered, reference = random.uniform(1, 2, (2, 8, 8, 3)).astype(np.float32)
     noise = random.exponential(1, (8, 8, 3)).astype(np.float32)
@@ -112,6 +107,18 @@ def test_light_of_our_own_keeps_the_noise_of_full_guides() -> None:
     np.testing.assert_allclose(lit, reference * noise, atol=0.05)
     dark = with_noise_of(rendered * 0, rendered * 0, reference, exposure=1.0)
     np.testing.assert_allclose(dark, reference)
+
+
+def test_hidden_guides_are_not_seen() -> None:
+    guides = torch.rand(1, 6, 2, 2)
+    batch = Batch(guides, guides, guides, guides)
+    hidden = {name: batch.seen(name) for name in ("", "albedo", "normal", "guides")}
+    assert torch.equal(hidden[""], guides)
+    assert torch.equal(hidden["albedo"][:, 3:], guides[:, 3:])
+    assert torch.equal(hidden["normal"][:, :3], guides[:, :3])
+    assert not hidden["albedo"][:, :3].any()
+    assert not hidden["normal"][:, 3:].any()
+    assert not hidden["guides"].any()
 
 
 def test_rotations_are_rotations() -> None:
@@ -157,8 +164,8 @@ def test_loader_tells_what_went_wrong() -> None:
 
 def test_windows_beyond_the_memory_are_read_again(config: TrainingConfig) -> None:
     paths = sorted((Path(config.data[0]) / "train").glob("*.npz"))
-    size = read_window(paths[0], 2, "fast").size
-    windows = WindowSet(paths, 2, "fast", memory=2.5 * size)
+    size = read_window(paths[0], 2).size
+    windows = WindowSet(paths, 2, memory=2.5 * size)
     kept = [windows[i] is windows[i] for i in range(len(paths))]
     assert kept == [True, True, False]
     again = windows[2]
@@ -170,14 +177,14 @@ def test_windows_beyond_the_memory_are_read_again(config: TrainingConfig) -> Non
 def test_radiance_before_denoising_comes_with_its_render(
     config: TrainingConfig,
 ) -> None:
-    window = read_window(first_window(config), 2, "fast")
+    window = read_window(first_window(config), 2)
     rough = {f"low2_{i}_noisy": window.arrays[f"low2_{i}"] * i for i in range(2)}
     window = replace(window, arrays=window.arrays | rough)
 
     def drawn(variation: Variation) -> list[float]:
         """Of each crop, how bright the noisy radiance is beside the denoised."""
         crops = [
-            draw(window, 2, "fast", variation, np.random.default_rng(seed))
+            draw(window, 2, variation, np.random.default_rng(seed))
             for seed in range(12)
         ]
         means = [(torch.expm1(x).mean() for x in (b.noisy, b.radiance)) for b in crops]
@@ -208,17 +215,17 @@ def test_damaged_window_is_named(config: TrainingConfig) -> None:
     path = first_window(config)
     path.write_bytes(path.read_bytes()[:500])
     with pytest.raises(PictureError, match=r"0\.npz"):
-        read_window(path, 2, "fast")
+        read_window(path, 2)
     with pytest.raises(PictureError, match=r"0\.npz"):
         find_windows([Path(config.data[0])], "train", ["low2_0"])
 
 
 def test_window_smaller_than_a_crop_is_named(config: TrainingConfig) -> None:
-    window = read_window(first_window(config), 2, "fast")
+    window = read_window(first_window(config), 2)
     with pytest.raises(PictureError, match=r"0\.npz is smaller than a crop of 64"):
-        draw(window, 2, "fast", Variation(), np.random.default_rng(0), 64)
+        draw(window, 2, Variation(), np.random.default_rng(0), 64)
 
 
 def test_missing_scale_is_named(config: TrainingConfig) -> None:
     with pytest.raises(PictureError, match="scale 4"):
-        read_window(first_window(config), 4, "fast")
+        read_window(first_window(config), 4)

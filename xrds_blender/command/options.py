@@ -110,12 +110,6 @@ def add_scene(command: argparse.ArgumentParser) -> None:
 def add_network(command: argparse.ArgumentParser) -> None:
     """Add what chooses a network and how it runs."""
     add = command.add_argument
-    add(
-        "--guides",
-        choices=GUIDES,
-        default="fast",
-        help="albedo and normal, or full: noisy radiance too (default: fast)",
-    )
     add("--preset", choices=PRESETS, default="fast", help="the network (default: fast)")
     add(
         "--exposure",

@@ -67,7 +67,6 @@ def _upscale(options: argparse.Namespace) -> dict[str, Any]:
         options.out,
         scale=options.scale,
         preset=options.preset,
-        guides=options.guides,
         guide_samples=options.guide_samples,
         exposure=options.exposure,
         device=options.device,

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import time
-from contextlib import nullcontext
 
 import numpy as np
 
@@ -152,26 +151,18 @@ class CyclesPasses(LayerSession):
         picture = self._read_corner(self._radiance(self.views[0], False), whole)
         return auto_exposure(np.ascontiguousarray(picture[..., :3]))
 
-    def guides(
-        self,
-        samples: int,
-        *,
-        full: bool = False,
-        seed: int | None = None,
-    ) -> Guides:
+    def guides(self, samples: int, *, seed: int | None = None) -> Guides:
         """Render albedo and normal at full size with the file's own filter.
 
         Only mirror and glass bounces are followed, which is all that albedo and normal
-        need; `full` keeps every bounce and gives the noisy radiance too.
-        Beauty and full guides in order of rising samples share one sync of the scene.
+        need.
         """
-        return self.guides_by_view(samples, full=full, seed=seed)[self.views[0]]
+        return self.guides_by_view(samples, seed=seed)[self.views[0]]
 
     def guides_by_view(
         self,
         samples: int,
         *,
-        full: bool = False,
         seed: int | None = None,
         how: GuideRender | None = None,
         portion: Portion | None = None,
@@ -181,17 +172,14 @@ class CyclesPasses(LayerSession):
         `portion` is of a longer sequence, in the place of samples and seed.
         """
         how = how or GuideRender(shadows=False)
-        settings = nullcontext() if full else guide_settings(self._depsgraph, how)
-        with Borrowed() as borrowed, settings:
+        with Borrowed() as borrowed, guide_settings(self._depsgraph, how):
             set_samples(borrowed, self._scene, samples, seed, portion)
             set_blue_noise(borrowed, self._scene)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             live.guides()
-            clock = self._run((self.width, self.height), self.region, exact=full)
+            clock = self._run((self.width, self.height), self.region, exact=False)
         seconds = {"sync": clock.sync, "guides": clock.render}
-        return {
-            view: self._read_guides(view, full, samples, seconds) for view in self.views
-        }
+        return {view: self._read_guides(view, samples, seconds) for view in self.views}
 
     def time_guides(self, scale: int, samples: int) -> dict[str, float]:
         """Seconds (sync, guides) of guides at 1/scale of the size; no pixels."""
@@ -246,23 +234,17 @@ class CyclesPasses(LayerSession):
         return LowPlace(grid, window, grid.offset(self.region), others, dict(seconds))
 
     def _read_guides(
-        self,
-        view: str,
-        full: bool,
-        samples: int,
-        seconds: dict[str, float],
+        self, view: str, samples: int, seconds: dict[str, float]
     ) -> Guides:
         albedo, normal = self._read(ALBEDO, view), self._read(NORMAL, view)
         assert albedo is not None
         assert normal is not None
         depth = self._read(DEPTH, view)
-        radiance = self._radiance(view, False)
         return Guides(
             albedo,
             normal,
-            radiance[..., 3].copy(),
+            self._radiance(view, False)[..., 3].copy(),
             None if depth is None else depth[..., 0],
-            radiance[..., :3].copy() if full else None,
             samples,
             seconds,
         )

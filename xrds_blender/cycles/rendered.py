@@ -35,15 +35,13 @@ class Guides:
     """Full-resolution albedo and normal (H, W, 3), alpha and depth (H, W).
 
     Albedo is as Cycles writes it, not clamped; normals are in camera space.
-    `radiance` (H, W, 3) is there for full guides only. `samples` are per pixel, None
-    for guides without noise. `seconds`: sync, guides.
+    `samples` are per pixel, None for guides without noise. `seconds`: sync, guides.
     """
 
     albedo: Array
     normal: Array
     alpha: Array
     depth: Array | None
-    radiance: Array | None
     samples: int | None
     seconds: dict[str, float] = field(default_factory=dict)
 

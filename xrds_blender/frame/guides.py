@@ -120,7 +120,7 @@ class GuideSource:
             albedo, alpha = large(beauty.radiance), large(beauty.alpha)
             normal = np.zeros_like(albedo)
             seconds = {"sync": 0.0, "guides": 0.0}
-            guides[view] = Guides(albedo, normal, alpha, None, None, None, seconds)
+            guides[view] = Guides(albedo, normal, alpha, None, None, seconds)
             self._passes.put_back({(view, ALBEDO): albedo, (view, NORMAL): normal})
         return guides
 

@@ -37,7 +37,6 @@ class XRDS_OT_preset_add(AddPresetBase, bpy.types.Operator):
         "scene.xrds.denoise",
         "scene.xrds.temporal_radius",
         "scene.xrds.preset",
-        "scene.xrds.guides",
         "scene.xrds.guide_samples",
         "scene.xrds.use_exposure",
         "scene.xrds.exposure",

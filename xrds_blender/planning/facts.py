@@ -52,7 +52,6 @@ class Facts:
     scale: int
     width: int
     height: int
-    guides: str
     max_bounces: int
     has_denoiser: bool
     exact_camera: bool

@@ -171,9 +171,6 @@ def _render_guides(facts: Facts, allowed: bool) -> tuple[bool, Decision]:
     scene, name = facts.scene, "guides"
     seen = scene.surfaces or scene.volumes or scene.world == "varies"
     seen = seen or bool(scene.passes)  # they come with the guides
-    if facts.guides == "full":
-        reason = "albedo, normal and radiance are requested"
-        return True, Decision(name, "rendered", reason)
     if seen or not allowed:
         reason = "albedo and normal carry what the low resolution cannot"
         return True, Decision(name, "rendered", reason)
@@ -221,9 +218,6 @@ def _fine_detail(scene: SceneFacts) -> str:
 
 def _bounces(facts: Facts, allowed: bool) -> tuple[int, Decision]:
     scene, name = facts.scene, "guide bounces"
-    if facts.guides == "full":
-        reason = "full guides hold the light of every bounce"
-        return facts.max_bounces, Decision(name, str(facts.max_bounces), reason)
     # A ray that glances off a part-transparent surface carries its features along.
     if not allowed or scene.smooth or scene.transparent or scene.volumes:
         bounces = guide_bounces(facts.max_bounces)
@@ -235,7 +229,7 @@ def _bounces(facts: Facts, allowed: bool) -> tuple[int, Decision]:
 
 def _lights(facts: Facts, allowed: bool) -> tuple[GuideRender, Decision]:
     scene, name = facts.scene, "guide lights"
-    if not allowed or facts.guides == "full":
+    if not allowed:
         return GuideRender(), Decision(name, "all", "as in the picture")
     saving = _part(facts, LIGHT_SHARE)
     # Without lamps volumes would be sampled by other random numbers.

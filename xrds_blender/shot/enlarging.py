@@ -37,10 +37,8 @@ def enlarge(
     rows, columns = beauty.offset
     matrix = to_rec709(working_space())
 
-    def placed(guide: Array | None) -> Array | None:
+    def placed(guide: Array) -> Array:
         """Guides start where the first low-resolution pixel does."""
-        if guide is None:
-            return None
         margin = ((rows, 0), (columns, 0), *[(0, 0)] * (guide.ndim - 2))
         return np.pad(guide, margin, mode="edge")
 

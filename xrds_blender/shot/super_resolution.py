@@ -493,7 +493,7 @@ def gathered_guides(own: View, others: Sequence[View], movement: Movement) -> Gu
     assert found.alpha is not None
     # their own number: where nothing is gathered there are no more
     samples = max(1, int(target.samples))
-    return Guides(found.albedo, found.normal, found.alpha, None, None, samples)
+    return Guides(found.albedo, found.normal, found.alpha, None, samples)
 
 
 def lacks_guides(own: View, others: Sequence[View]) -> bool:

@@ -61,7 +61,6 @@ class Guides:
 
     albedo: Array
     normal: Array
-    radiance: Array | None
     alpha: Array | None
 
 
@@ -77,21 +76,14 @@ def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
     return Beauty(radiance, file.alpha(names.beauty), noisy)
 
 
-def read_guides(
-    path: str | Path, *, full: bool = False, names: Names = CYCLES
-) -> Guides:
-    """Read albedo and normal and, where there is one, alpha; for `full`, radiance.
+def read_guides(path: str | Path, names: Names = CYCLES) -> Guides:
+    """Read albedo and normal and, where there is one, alpha.
 
-    The radiance is that of the noisy pass or, in a file of an undenoised render, that
-    of the picture. Raises PictureError if the file cannot be read or lacks a pass.
+    Raises PictureError if the file cannot be read or lacks a pass.
     """
     file = File(path)
-    radiance = None
-    if full:
-        noisy = names.noisy if file.has(names.noisy) else names.beauty
-        radiance = file.colour(noisy, plain=True)
     albedo, normal = file.colour(names.albedo), file.colour(names.normal)
-    return Guides(albedo, normal, radiance, file.alpha(names.beauty))
+    return Guides(albedo, normal, file.alpha(names.beauty))
 
 
 def write_picture(

@@ -14,7 +14,7 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils._pytree import tree_leaves
 
 from ..progress import Progress
-from .kernels import KernelTail
+from .kernels import GUIDE_COUNT, KernelTail
 from .network import XRDS
 
 _SMALL_AREA = 4  # cells
@@ -77,7 +77,7 @@ def measure(network: XRDS) -> Cost:
     low = 2 * config.low_multiple
     high = low * config.scale
     radiance = torch.zeros(1, 3, low, low, device=device)
-    guides = torch.zeros(1, config.guide_count, high, high, device=device)
+    guides = torch.zeros(1, GUIDE_COUNT, high, high, device=device)
     values = 0
 
     def count(module: nn.Module, inputs: Any, output: Tensor) -> None:

@@ -26,7 +26,6 @@ def upscale_file(
     *,
     scale: int = 2,
     preset: str = "fast",
-    guides: str = "fast",
     guide_samples: int | None = None,
     exposure: float | None = None,
     device: str = "auto",
@@ -42,7 +41,7 @@ def upscale_file(
     Args:
         beauty: the low-resolution render, denoised, with alpha or without; the noisy
             picture, where the file has one too, shows what the denoiser took away.
-        guide_file: albedo and normal; for `full` guides also a noisy picture.
+        guide_file: albedo and normal.
         output: gets R, G, B, scene-linear, and A where `beauty` has alpha; its folder
             is made.
         weights: a folder of presets, or a file, in place of the shipped ones.
@@ -64,15 +63,14 @@ def upscale_file(
     _check_output(Path(output), (beauty, guide_file))
     if threads is not None:
         torch.set_num_threads(threads)
-    upscaler = Upscaler(preset, scale, guides, device, weights=weights)
+    upscaler = Upscaler(preset, scale, device, weights=weights)
     low = read_beauty(beauty, names)
-    passes = read_guides(guide_file, full=guides == "full", names=names)
+    passes = read_guides(guide_file, names)
     result = upscaler(
         low.picture,
         passes.albedo,
         passes.normal,
         noisy=low.noisy,
-        guide_radiance=passes.radiance,
         guide_alpha=None if low.alpha is None else passes.alpha,
         guide_samples=guide_samples,
         exposure=exposure,

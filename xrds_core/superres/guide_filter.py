@@ -36,13 +36,8 @@ MARGIN = STRIDE * (LAYERS + KERNEL // 2)
 
 
 def filter_guides(network: GuideFilter, guides: Tensor) -> Tensor:
-    """Return guides of few samples, (B, 6 or more, H, W), with less noise.
-
-    The first six channels are those of `GuideFilter.forward`; others stay.
-    """
-    noisy = guides[:, :6]
-    quiet = torch.lerp(noisy, network(noisy), STRENGTH)
-    return torch.cat((quiet, guides[:, 6:]), dim=1)
+    """Return guides of few samples, as `GuideFilter.forward`'s, with less noise."""
+    return torch.lerp(guides, network(guides), STRENGTH)
 
 
 class GuideFilter(nn.Module):

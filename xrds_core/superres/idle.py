@@ -35,8 +35,6 @@ def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
     """
     height, width = inputs.low.shape[:2]
     whole = slice(0, height), slice(0, width)
-    if inputs.guide_radiance is not None:
-        return whole
     busy = ~_idle(inputs, block)
     if not busy.any():
         return None

@@ -33,8 +33,6 @@ class Inputs:
     albedo: Array
     """(H, W, 3), as the normal; scale (h - 1) < H <= scale h, and so W."""
     normal: Array
-    guide_radiance: Array | None
-    """(H, W, 3)"""
     guide_alpha: Array | None
     """(H, W)"""
     bad_pixels: int
@@ -48,8 +46,7 @@ class Inputs:
 
     def is_black(self) -> bool:
         """Whether there is no light at all in the picture."""
-        seen = (self.low[..., :3], self.guide_radiance)
-        return not any(x is not None and x.any() for x in seen)
+        return not self.low[..., :3].any()
 
     def with_guides(self, quiet: Quiet) -> Inputs:
         """The same with albedo and normal as `quiet` makes them of these."""
@@ -64,17 +61,15 @@ class Inputs:
         """Return the same before denoising, or None."""
         return None if self.noisy is None else _low_tensor(self.noisy, tile, exposure)
 
-    def guide_tensor(self, tile: Tile, exposure: float) -> Tensor:
-        """Return the guides of a tile as the network takes them, (1, 6 or 9, H, W).
+    def guide_tensor(self, tile: Tile) -> Tensor:
+        """Return the guides of a tile as the network takes them, (1, 6, H, W).
 
         Where they end before the low-resolution picture does, their edge is repeated.
         """
-        guides = (self.albedo, self.normal, self.guide_radiance)
-        planes = [to_planes(self._cut(x, tile)) for x in guides if x is not None]
-        planes[0] = planes[0].clamp(0.0, 1.0)
-        planes[1] = planes[1].clamp(-1.0, 1.0)
-        planes[2:] = [transfer(x, exposure) for x in planes[2:]]
-        return torch.cat(planes, dim=1)
+        albedo, normal = (
+            to_planes(self._cut(x, tile)) for x in (self.albedo, self.normal)
+        )
+        return torch.cat((albedo.clamp(0.0, 1.0), normal.clamp(-1.0, 1.0)), dim=1)
 
     def _cut(self, guide: Array, tile: Tile) -> Array:
         spans = (tile.rows, tile.columns)
@@ -104,7 +99,6 @@ def check(
     radiance: Any,
     albedo: Any,
     normal: Any,
-    guide_radiance: Any = None,
     guide_alpha: Any = None,
     noisy: Any = None,
     guide_samples: int | None = None,
@@ -121,20 +115,18 @@ def check(
         "albedo": float_array("albedo", albedo, (3,)),
         "normal": float_array("normal", normal, (3,)),
     }
-    if guide_radiance is not None:
-        guides["guide_radiance"] = float_array("guide_radiance", guide_radiance, (3,))
     if guide_alpha is not None:
         plane = np.asarray(guide_alpha)
         plane = plane[..., None] if plane.ndim == 2 else plane
         guides["guide_alpha"] = float_array("guide_alpha", plane, (1,))
     _check_sizes(scale, low, guides)
     cleaned = {
-        name: _CLEAN.get(name, fill_holes)(guide) for name, guide in guides.items()
+        name: (clean_alpha if name == "guide_alpha" else fill_holes)(guide)
+        for name, guide in guides.items()
     }
     before, faults = (None, 0) if noisy is None else _noisy(noisy, low)
     low, bad_pixels = _picture(low)
     bad_pixels += faults + sum(count for _, count in cleaned.values())
-    light, _ = cleaned.get("guide_radiance", (None, 0))
     cover, _ = cleaned.get("guide_alpha", (None, 0))
     if cover is not None and low.shape[2] == 3:
         low = np.concatenate((low, _low_alpha(cover, low, scale)), axis=2)
@@ -144,15 +136,10 @@ def check(
         before,
         cleaned["albedo"][0],
         cleaned["normal"][0],
-        light,
         None if cover is None else cover[..., 0],
         bad_pixels,
         guide_samples is not None and guide_samples < FEW_SAMPLES,
     )
-
-
-# Of guides; all others just have their holes filled.
-_CLEAN = {"guide_radiance": clean_radiance, "guide_alpha": clean_alpha}
 
 
 def _picture(low: Array) -> tuple[Array, int]:

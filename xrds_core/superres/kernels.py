@@ -14,8 +14,11 @@ from torch.nn import functional as F
 
 from .regression import ALBEDO_EPSILON, FEATURES, explain
 
-# Added to the radiance of `full` guides, in units of k e x, before it divides.
-RADIANCE_EPSILON = 0.05
+GUIDE_COUNT = 6
+"""Channels of the guides: albedo 0-2, normal 3-5."""
+SOURCES = 3
+"""Pictures that the base is gathered from: see `find_sources`."""
+
 # Unit of the predicted sharpness: logits per squared distance between guides.
 SHARPNESS_UNIT = 4.0
 # Bicubic interpolation may leave bilinear by this share of it: spikes do not ring.
@@ -46,12 +49,11 @@ FACTS = FEATURES + 1
 def find_sources(
     radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int
 ) -> tuple[Sources, Tensor]:
-    """The radiance as it is and demodulated in several ways, and facts (B, 5, h, w).
+    """The radiance as it is and demodulated in two ways, and facts (B, 5, h, w).
 
-    By albedo, by the radiance of `full` guides, and last by what albedo and normal
-    explain of it around every pixel; see `regression.explain`, which also restores
-    what denoising took away. The facts are the slopes found there, and the mean over
-    the colours of the grain.
+    By albedo, and last by what albedo and normal explain of it around every pixel; see
+    `regression.explain`, which also restores what denoising took away. The facts are
+    the slopes found there, and the mean over the colours of the grain.
 
     `radiance` and `noisy` (B, 3, h, w) are in the transfer domain. The division is by
     the area mean of the modulator, so that modulating again keeps the mean of the
@@ -62,10 +64,7 @@ def find_sources(
         torch.expm1(radiance.float()), torch.expm1(noisy.float()), guides, scale
     )
     plain = Source(low, torch.ones_like(guides[:, :1]))
-    modulators = [guides[:, :3] + ALBEDO_EPSILON]
-    if guides.shape[1] > 6:
-        modulators.append(torch.expm1(guides[:, 6:9]) + RADIANCE_EPSILON)
-    modulators.append(explained)
+    modulators = (guides[:, :3] + ALBEDO_EPSILON, explained)
     demodulated = [Source(low / F.avg_pool2d(m, scale), m) for m in modulators]
     return [plain, *demodulated], torch.cat((slopes, grain.mean(1, True)), dim=1)
 
@@ -186,15 +185,7 @@ class KernelTail(nn.Module):
     and forgotten area by area, small enough for the processor's caches.
     """
 
-    def __init__(
-        self,
-        scale: int,
-        cell: int,
-        channels: int,
-        width: int,
-        guides: int,
-        sources: int,
-    ) -> None:
+    def __init__(self, scale: int, cell: int, channels: int, width: int) -> None:
         super().__init__()
         self.scale, self.cell = scale, cell
         self.area_side = AREA_SIDE
@@ -203,13 +194,13 @@ class KernelTail(nn.Module):
         # what these two are given has a rim
         self.expand = nn.Conv2d(channels, width * cell**2, 3)
         # features, guides, and how the other sources differ from plain radiance
-        inputs = width + guides + 3 * (sources - 1)
+        inputs = width + GUIDE_COUNT + 3 * (SOURCES - 1)
         self.mix = nn.Conv2d(inputs, width, 3)
         # per pixel: logits of sources, sharpness by albedo and by normal, gain, trust
-        self.predict = PixelLayer(width, 9 * sources + 4)
+        self.predict = PixelLayer(width, 9 * SOURCES + 4)
         for parameter in self.predict.parameters():
             nn.init.zeros_(parameter)
-        prior = torch.tensor([-3.0] * (sources - 1) + [0.0])
+        prior = torch.tensor([-3.0] * (SOURCES - 1) + [0.0])
         logits = prior[:, None, None] + bilinear_logits(scale)
         self.prior: Tensor
         self.register_buffer("prior", logits, persistent=False)
@@ -218,7 +209,7 @@ class KernelTail(nn.Module):
         cells = self.norm(features.permute(0, 2, 3, 1)).permute(0, 3, 1, 2)
         height, width = cells.shape[-2:]
         cells = with_rim(cells.contiguous())
-        means = F.avg_pool2d(guides[:, :6].float(), self.scale)
+        means = F.avg_pool2d(guides.float(), self.scale)
         squares = (x.square().sum(1, True) for x in means.split(3, dim=1))
         means = with_rim(torch.cat((means, *squares), dim=1))
         rims = [with_rim(source.low) for source in sources]
@@ -241,7 +232,7 @@ class KernelTail(nn.Module):
     ) -> tuple[Tensor, list[Tensor]]:
         """What is predicted of every pixel of an area, and each source's sharpening.
 
-        (B, 9 * sources + 4, s*s, h, w) and, of every source, (B, 3, s*s, h, w). The
+        (B, 9 * SOURCES + 4, s*s, h, w) and, of every source, (B, 3, s*s, h, w). The
         last convolution sees a pixel around the area, and replicates those that the
         picture does not have.
         """
@@ -277,12 +268,12 @@ class KernelTail(nn.Module):
     def kernels(
         self, area: Area, predicted: Tensor, guides: Tensor, means: Tensor
     ) -> Tensor:
-        """Softmax over the neighbours of all sources: (B, sources, 9, s*s, h, w).
+        """Softmax over the neighbours of all sources: (B, SOURCES, 9, s*s, h, w).
 
         They fall with the squared distance between the pixel's guides and a neighbour's
         means. The square of the pixel's own is the same for all, and left out.
         """
-        pixels = self.fold(area.of(guides[:, :6], self.cell)).float()
+        pixels = self.fold(area.of(guides, self.cell)).float()
         albedo, normal = (SHARPNESS_UNIT * predicted[:, -4:-2]).split(1, dim=1)
         twice = torch.cat((pixels[:, :3] * albedo, pixels[:, 3:] * normal), dim=1) * 2
         twice = twice.split(1, dim=1)

@@ -23,16 +23,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from .kernels import FACTS, KernelTail, Sources, find_sources
-
-# Channels of the guide stack: albedo 0-2, normal 3-5, full-resolution radiance 6-8.
-GUIDE_CHANNELS: dict[str, tuple[int, ...]] = {
-    "none": (),
-    "albedo": (0, 1, 2),
-    "normal": (3, 4, 5),
-    "fast": (0, 1, 2, 3, 4, 5),
-    "full": (0, 1, 2, 3, 4, 5, 6, 7, 8),
-}
+from .kernels import FACTS, GUIDE_COUNT, SOURCES, KernelTail, Sources, find_sources
 
 
 @dataclass(frozen=True)
@@ -57,8 +48,6 @@ class NetworkConfig:
     """`rdst`, or the ablations `rdb` (no Swin layers) and `rstb` (SwinIR's block)."""
     cross_attention: bool = True
     """False leaves out XM: guide features are then added to radiance features."""
-    guides: str = "fast"
-    """A key of `GUIDE_CHANNELS`."""
     cell: int = 0
     """Output pixels per cell along one axis; 0 means `scale`, the paper's grid."""
     guide_stride: int = 1
@@ -80,10 +69,6 @@ class NetworkConfig:
                 f"cell {self.cell} must be a multiple of scale {self.scale} "
                 f"and of guide_stride {self.guide_stride}"
             )
-        if self.guides not in GUIDE_CHANNELS:
-            raise ValueError(
-                f"guides is {self.guides!r}, not one of {[*GUIDE_CHANNELS]}"
-            )
         if self.block not in BLOCKS:
             raise ValueError(f"block is {self.block!r}, not one of {[*BLOCKS]}")
         if self.channels % self.heads:
@@ -92,19 +77,9 @@ class NetworkConfig:
             )
 
     @property
-    def guide_count(self) -> int:
-        """Channels of the guide stack that `XRDS.forward` is given: 6 or 9."""
-        return 9 if self.guides == "full" else 6
-
-    @property
-    def source_count(self) -> int:
-        """Pictures that the base is gathered from, see `find_sources`; 1 without."""
-        return self.guide_count // 3 + 1 if self.base else 1
-
-    @property
     def radiance_count(self) -> int:
         """Channels that the radiance branch is given: see `find_sources`."""
-        return 3 * self.source_count + (FACTS if self.base else 0)
+        return 3 * SOURCES + FACTS if self.base else 3
 
     @property
     def low_multiple(self) -> int:
@@ -129,13 +104,13 @@ SMALL_PRESETS: dict[str, dict[str, Any]] = {
 PRESETS = ("paper", *SMALL_PRESETS)
 
 
-def preset_config(preset: str, scale: int, guides: str = "fast") -> NetworkConfig:
+def preset_config(preset: str, scale: int) -> NetworkConfig:
     """The configuration of a named preset.
 
     `paper` is the published network. `balanced` and `fast` are the same class with
     smaller numbers, a grid of at most a quarter of the output and the kernel base.
     """
-    paper = NetworkConfig(scale=scale, guides=guides)
+    paper = NetworkConfig(scale=scale)
     if preset == "paper":
         return paper
     if preset not in SMALL_PRESETS:
@@ -460,13 +435,12 @@ class XRDS(nn.Module):
         c, g = config.channels, config.guide_channels
         fold = config.cell // config.scale  # low-resolution pixels per cell, one axis
         steps = int(math.log2(config.cell // config.guide_stride))
-        inputs = len(GUIDE_CHANNELS[config.guides]) or config.guide_count
         self.radiance_head = nn.Sequential(
             nn.PixelUnshuffle(fold), conv3(config.radiance_count * fold**2, c)
         )
         self.guide_head = nn.Sequential(
             nn.PixelUnshuffle(config.guide_stride),
-            conv3(inputs * config.guide_stride**2, g),
+            conv3(GUIDE_COUNT * config.guide_stride**2, g),
         )
         self.guide_blocks = nn.ModuleList(
             ResidualBlock(g) for _ in range(config.groups)
@@ -478,8 +452,7 @@ class XRDS(nn.Module):
         self.fuse = conv3(2 * c, c)
         if config.base:
             sizes = config.scale, config.cell, c, config.tail_channels
-            counts = config.guide_count, config.source_count
-            self.tail: nn.Module = KernelTail(*sizes, *counts)
+            self.tail: nn.Module = KernelTail(*sizes)
             # the paper pads with zeros, which darkens or tints the rim
             for layer in self.modules():
                 if isinstance(layer, nn.Conv2d) and layer.padding != (0, 0):
@@ -494,9 +467,7 @@ class XRDS(nn.Module):
 
         Args:
             radiance: (B, 3, h, w), scene-linear, in the transfer domain log(1 + k e x).
-            guides: (B, 6, s*h, s*w), albedo in [0, 1] and camera-space normal; with
-                `full` guides (B, 9, s*h, s*w), the full-resolution radiance in the
-                transfer domain behind them.
+            guides: (B, 6, s*h, s*w), albedo in [0, 1] and camera-space normal.
             noisy: as `radiance`, but before denoising; None where it was not denoised
                 or that is lost. Of use to networks with a base alone.
 
@@ -505,7 +476,7 @@ class XRDS(nn.Module):
         """
         s = self.config.scale
         h, w = radiance.shape[-2:]
-        expected = (self.config.guide_count, s * h, s * w)
+        expected = (GUIDE_COUNT, s * h, s * w)
         if guides.shape[1:] != expected:
             raise ValueError(f"guides are {tuple(guides.shape[1:])}, not {expected}")
         noisy = radiance if noisy is None else noisy
@@ -522,7 +493,7 @@ class XRDS(nn.Module):
     def features(self, radiance: Tensor, guides: Tensor) -> Tensor:
         """The transformer: (B, C, cells, cells)."""
         head = features = self.radiance_head(radiance)
-        guide = self.guide_head(self.select(guides))
+        guide = self.guide_head(guides)
         detail = self.deshuffles[0](guide)
         for block, deshuffle, group in zip(
             self.guide_blocks, self.deshuffles[1:], self.groups, strict=True
@@ -531,12 +502,6 @@ class XRDS(nn.Module):
             guide = block(guide)
             detail = deshuffle(guide)
         return self.fuse(torch.cat((features, detail), dim=1)) + head
-
-    def select(self, guides: Tensor) -> Tensor:
-        channels = GUIDE_CHANNELS[self.config.guides]
-        if not channels:
-            return torch.zeros_like(guides)
-        return guides[:, channels[0] : channels[-1] + 1]
 
     def pad(self, x: Tensor, factor: int) -> Tensor:
         """Pad bottom and right to whole windows; `factor` pixels per low pixel."""

@@ -65,7 +65,7 @@ def explain(radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int) -> Expl
     """Restore the radiance and regress it on the guides.
 
     `radiance` and `noisy`, the same before denoising, (B, 3, h, w), are linear, in
-    units of k e x; `guides` (B, 6 or more, H, W).
+    units of k e x; `guides` (B, 6, H, W).
     """
     height = radiance.shape[-2]
     bands = []

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from ..arrays import Array
 from ..devices import choose_device, choose_precision, free_memory, is_out_of_memory
-from ..errors import OutOfMemory, PictureError, WeightsError
+from ..errors import OutOfMemory, WeightsError
 from ..progress import Callback, Progress
 from . import guide_noise, tiling
 from .alpha import finish
@@ -62,7 +62,6 @@ class Upscaler:
     Args:
         preset: `paper`, `balanced` or `fast`.
         scale: output pixels per low-resolution pixel along one axis.
-        guides: `fast` (albedo and normal) or `full` (and noisy radiance).
         device: `auto`, or what torch knows: `cpu`, `cuda`, `cuda:1`, `mps`.
         precision: `auto`, `fp32` or `bf16`; only the layers of the network
             ever run in bf16.
@@ -78,14 +77,13 @@ class Upscaler:
         self,
         preset: str = "fast",
         scale: int = 2,
-        guides: str = "fast",
         device: str = "auto",
         precision: str = "auto",
         weights: str | Path | XRDS | None = None,
     ) -> None:
         self.device = choose_device(device)
         self.precision = choose_precision(precision, self.device)
-        self.network = choose_network(preset, scale, guides, weights).to(self.device)
+        self.network = choose_network(preset, scale, weights).to(self.device)
         folder = None if isinstance(weights, XRDS) else weights
         self.guide_filter = load_guide_filter(folder).to(self.device)
 
@@ -106,7 +104,6 @@ class Upscaler:
         normal: Array,
         *,
         noisy: Array | None = None,
-        guide_radiance: Array | None = None,
         guide_alpha: Array | None = None,
         guide_samples: int | None = None,
         exposure: float | None = None,
@@ -123,7 +120,6 @@ class Upscaler:
             normal: (H, W, 3), in camera space.
             noisy: (h, w, 3), the radiance before it was denoised: tells how much of
                 the guides' texture is in the light. None where it never was, or lost.
-            guide_radiance: (H, W, 3), for `full` guides and only for them.
             guide_alpha: (H, W), the alpha of the guides' render; in place of the
                 picture's own, too, where `radiance` has none.
             guide_samples: per pixel of albedo and normal; the noise of few of them
@@ -135,7 +131,7 @@ class Upscaler:
             progress: called with fractions from 0 to exactly 1; False cancels.
 
         Raises:
-            PictureError: the arrays do not fit each other or this network.
+            PictureError: the arrays do not fit each other or the scale.
             WeightsError: what the network gives is no picture.
             OutOfMemory: the device has no room even for the smallest tiles.
             Cancelled: `progress` returned False.
@@ -145,12 +141,10 @@ class Upscaler:
             radiance,
             albedo,
             normal,
-            guide_radiance,
             guide_alpha,
             noisy,
             guide_samples,
         )
-        self._check_guides(inputs)
         exposure = choose_exposure(exposure, inputs.low)
         area = self._area(inputs, skip_idle)
         device = self.device.type
@@ -168,17 +162,6 @@ class Upscaler:
                 if smaller is None:
                     raise
                 plan = smaller
-
-    def _check_guides(self, inputs: Inputs) -> None:
-        full = self.network.config.guides == "full"
-        if full and inputs.guide_radiance is None:
-            raise PictureError(
-                "these weights need guide_radiance; pass it or use fast guides"
-            )
-        if not full and inputs.guide_radiance is not None:
-            raise PictureError(
-                "these weights take no guide_radiance; omit it or use full guides"
-            )
 
     def _area(self, inputs: Inputs, skip_idle: bool) -> Area | None:
         """Return the low-resolution rows and columns that the network is to see."""
@@ -287,7 +270,7 @@ class Upscaler:
         bf16 = self.precision == torch.bfloat16
         try:
             with torch.inference_mode():
-                guides = self._guides(inputs, tile, exposure)
+                guides = self._guides(inputs, tile)
                 noisy = inputs.noisy_tensor(tile, exposure)
                 with torch.autocast(self.device.type, torch.bfloat16, enabled=bf16):
                     t = self.network(
@@ -311,9 +294,9 @@ class Upscaler:
             ) from error
         return to_picture(result)
 
-    def _guides(self, inputs: Inputs, tile: tiling.Tile, exposure: float) -> Tensor:
+    def _guides(self, inputs: Inputs, tile: tiling.Tile) -> Tensor:
         """Return the guides of a tile, without the noise of few samples."""
-        guides = inputs.guide_tensor(tile, exposure).to(self.device)
+        guides = inputs.guide_tensor(tile).to(self.device)
         if not inputs.has_noisy_guides:
             return guides
         return filter_guides(self.guide_filter, guides)
@@ -331,7 +314,6 @@ def upscale(
     scale: int = 2,
     preset: str = "fast",
     noisy: Array | None = None,
-    guide_radiance: Array | None = None,
     alpha: Array | None = None,
     guide_samples: int | None = None,
     exposure: float | None = None,
@@ -342,18 +324,16 @@ def upscale(
     """Enlarge one picture with the shipped weights; see `Upscaler` for the arrays.
 
     `alpha` (H, W) is that of the guides' render; the picture's own is the fourth
-    channel of `radiance`. With `guide_radiance` the guides are `full`. Returns
-    (H, W, 3), with either alpha (H, W, 4). The last network used stays loaded.
+    channel of `radiance`. Returns (H, W, 3), with either alpha (H, W, 4). The last
+    network used stays loaded.
 
     Raises WeightsError, UsageError, PictureError and Cancelled, as `Upscaler`.
     """
-    guides = "fast" if guide_radiance is None else "full"
-    return _upscaler(preset, scale, guides, device)(
+    return _upscaler(preset, scale, device)(
         radiance,
         albedo,
         normal,
         noisy=noisy,
-        guide_radiance=guide_radiance,
         guide_alpha=alpha,
         guide_samples=guide_samples,
         exposure=exposure,
@@ -363,5 +343,5 @@ def upscale(
 
 
 @lru_cache(maxsize=1)
-def _upscaler(preset: str, scale: int, guides: str, device: str) -> Upscaler:
-    return Upscaler(preset, scale, guides, device)
+def _upscaler(preset: str, scale: int, device: str) -> Upscaler:
+    return Upscaler(preset, scale, device)

@@ -23,6 +23,7 @@ from torch import Tensor
 from ..errors import WeightsError
 from .guide_filter import FILE_NAME, GuideFilter
 from .network import PRESETS, XRDS, NetworkConfig
+from .weights_header import GUIDES
 
 DIRECTORY = Path(__file__).with_name("weights")
 GUIDE_FILTER = DIRECTORY / FILE_NAME
@@ -31,10 +32,9 @@ FACTORS = ".factors"
 _LARGEST_SETTING = 4096  # far above any real width or count; bounds hostile files
 
 
-def file_name(preset: str, scale: int, guides: str = "fast") -> str:
-    """Return the name of a preset's file: fast_x2, or fast_full_x2 for full guides."""
-    kind = "" if guides == "fast" else f"_{guides}"
-    return f"{preset}{kind}_x{scale}.safetensors"
+def file_name(preset: str, scale: int) -> str:
+    """Return the name of a preset's file: fast_x2.safetensors."""
+    return f"{preset}_x{scale}.safetensors"
 
 
 def unpack(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
@@ -120,6 +120,12 @@ def _described(
         numbers = [v for v in values.values() if not isinstance(v, (str, bool))]
         if not all(isinstance(v, int) and 0 <= v <= _LARGEST_SETTING for v in numbers):
             raise ValueError(f"a setting is outside 0 to {_LARGEST_SETTING}")
+        guides = values.pop("guides", GUIDES)
+        if guides != GUIDES:
+            raise WeightsError(
+                f"{path} was trained for guides that this version does not render "
+                f"({guides!r}); choose other weights"
+            )
         config = NetworkConfig.from_dict(values)
         layers = (config.groups, config.blocks, config.dense_layers)
         if math.prod(max(n, 1) for n in layers) > tensors:
@@ -154,55 +160,51 @@ def _compare(
 
 
 def load_preset(
-    preset: str, scale: int, guides: str = "fast", directory: str | Path | None = None
+    preset: str, scale: int, directory: str | Path | None = None
 ) -> tuple[XRDS, dict[str, str]]:
     """Return (network, metadata) of a shipped preset, or of one in `directory`.
 
     Raises WeightsError, naming what there is, if there is no such file.
     """
     folder = Path(directory or DIRECTORY)
-    path = folder / file_name(preset, scale, guides)
+    path = folder / file_name(preset, scale)
     if not path.is_file():
         known = ", ".join(sorted(p.stem for p in _files(folder))) or "none"
         raise WeightsError(
-            f"no weights for preset {preset!r} at scale {scale} with {guides} guides "
-            f"in {folder}; it holds: {known}"
+            f"no weights for preset {preset!r} at scale {scale} in {folder}; "
+            f"it holds: {known}"
         )
     network, metadata = load(path)
-    config = network.config
-    if (config.scale, config.guides) != (scale, guides):
+    if network.config.scale != scale:
         raise WeightsError(
-            f"{path} is for scale {config.scale} and {config.guides} guides, "
-            "unlike its name; download it again"
+            f"{path} is for scale {network.config.scale}, unlike its name; "
+            "download it again"
         )
     return network, metadata
 
 
-def choose_network(
-    preset: str, scale: int, guides: str, weights: str | Path | XRDS | None
-) -> XRDS:
+def choose_network(preset: str, scale: int, weights: str | Path | XRDS | None) -> XRDS:
     """Return the network that `weights` names: a folder, a file, or the network itself.
 
     None means the shipped ones. Raises WeightsError if there is none such, or if it is
-    for another scale or other guides.
+    for another scale.
     """
     if isinstance(weights, XRDS):
         network = weights.eval()
     elif weights is None or Path(weights).is_dir():
-        network, _ = load_preset(preset, scale, guides, weights)
+        network, _ = load_preset(preset, scale, weights)
     else:
         network, _ = load(weights)
-    config = network.config
-    if config.scale != scale or (config.guides == "full") != (guides == "full"):
+    if network.config.scale != scale:
         raise WeightsError(
-            f"these weights are for scale {config.scale} and {config.guides} guides, "
-            f"not for scale {scale} and {guides} guides; choose others"
+            f"these weights are for scale {network.config.scale}, "
+            f"not for scale {scale}; choose others"
         )
     return network
 
 
 def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
-    """Return records {preset, scale, guides, file, sha256, blender_series}.
+    """Return records {preset, scale, file, sha256, blender_series}.
 
     Raises WeightsError if a file named as a preset's is damaged.
     """
@@ -211,7 +213,7 @@ def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
 
 def _files(folder: Path) -> list[Path]:
     paths = sorted(folder.glob("*_x*.safetensors"))
-    return [path for path in paths if path.name.split("_")[0] in PRESETS]
+    return [path for path in paths if path.name.split("_x")[0] in PRESETS]
 
 
 def _record(path: Path) -> dict[str, Any]:
@@ -220,7 +222,6 @@ def _record(path: Path) -> dict[str, Any]:
     return {
         "preset": path.name.split("_")[0],
         "scale": config.scale,
-        "guides": config.guides,
         "file": path.name,
         "sha256": _digest(path),
         "blender_series": metadata.get("blender_series"),

@@ -12,19 +12,20 @@ from functools import lru_cache
 from pathlib import Path
 
 DIRECTORY = Path(__file__).with_name("weights")
+GUIDES = "fast"
+"""What a configuration calls albedo and normal: the only guides there are."""
 _LARGEST_HEADER = 1 << 20  # far above any real one; bounds hostile files
 
 
 @dataclass(frozen=True)
 class WeightsHeader:
-    """A network's preset, enlargement, guides and the Blender series of its training.
+    """A network's preset, enlargement and the Blender series of its training.
 
     `blender_series` as 4.5; empty where the file does not tell.
     """
 
     preset: str
     scale: int
-    guides: str
     blender_series: str = ""
 
 
@@ -54,9 +55,10 @@ def _read(path: Path, _changed: int) -> WeightsHeader:
             raise ValueError(f"a header of {length} bytes")
         metadata = json.loads(file.read(length))["__metadata__"]
     config = json.loads(metadata["config"])
+    if config.get("guides", GUIDES) != GUIDES:
+        raise ValueError("guides that are not rendered")
     return WeightsHeader(
         preset=path.name.partition("_")[0],
         scale=int(config["scale"]),
-        guides=str(config["guides"]),
         blender_series=str(metadata.get("blender_series", "")),
     )

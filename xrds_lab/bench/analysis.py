@@ -237,7 +237,7 @@ def _weights(scene: SceneBench) -> str:
     """The networks, each with the first digits of its file's checksum."""
     chosen = scene.settings
     return ", ".join(
-        f"{n.preset} x{n.scale} {n.guides} {chosen.networks.digest(n)}"
+        f"{n.preset} x{n.scale} {chosen.networks.digest(n)}"
         for n in chosen.sweep.networks
     )
 

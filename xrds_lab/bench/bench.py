@@ -135,8 +135,8 @@ def of_presets(
 
 def _report_missing(networks: Networks, presets: Sequence[str] | None) -> None:
     lacking = [
-        f"{preset} x{scale} {guides}"
-        for preset, scale, guides in _absent(networks)
+        f"{preset} x{scale}"
+        for preset, scale in _absent(networks)
         if presets is None or preset in presets
     ]
     if lacking:
@@ -146,10 +146,7 @@ def _report_missing(networks: Networks, presets: Sequence[str] | None) -> None:
 def _absent(networks: Networks) -> list[Network]:
     """Networks of the product without weights."""
     wanted = [
-        Network(preset, scale, guides)
-        for preset in ("fast", "balanced")
-        for scale in (2, 4, 8)
-        for guides in ("fast", "full")
+        Network(preset, scale) for preset in ("fast", "balanced") for scale in (2, 4, 8)
     ]
     return [network for network in wanted if network not in networks.records]
 

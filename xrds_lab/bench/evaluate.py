@@ -41,8 +41,6 @@ if TYPE_CHECKING:
     Configs = dict[str, Config]
     Record = dict[str, Any]
 
-GUIDES = ("fast", "full")
-
 
 def evaluate(
     scenes: Sequence[Path],
@@ -52,7 +50,6 @@ def evaluate(
     cache: Path | None = None,
     scales: Sequence[int] = (2, 4),
     presets: Sequence[str] = ("fast",),
-    guides: Sequence[str] = ("fast",),
     samples: int = 16,
     guide_samples: int = 4,
     timing: bool = False,
@@ -73,13 +70,11 @@ def evaluate(
     `sheets` a JPEG of enlarged crops for each scene.
     Raises UsageError for missing files and unknown names.
     """
-    _check_guides(guides)
     networks = Networks(weights, "auto")
     rows = {
         network: _configurations(network, networks, samples, guide_samples, progress)
         for network in (
-            Network(preset, scale, kind)
-            for scale, preset, kind in product(scales, presets, guides)
+            Network(preset, scale) for scale, preset in product(scales, presets)
         )
     }
     shots = find_shots(scenes, windows, references)
@@ -96,7 +91,6 @@ def evaluate(
         "settings": {
             "scales": list(scales),
             "presets": list(presets),
-            "guides": list(guides),
             "samples": samples,
             "guide_samples": guide_samples,
             "device": networks.device,
@@ -113,14 +107,6 @@ def evaluate(
         out.mkdir(parents=True, exist_ok=True)
         write_json(out / "results.json", report)
     return report
-
-
-def _check_guides(guides: Sequence[str]) -> None:
-    unknown = set(guides) - set(GUIDES)
-    if unknown:
-        raise UsageError(
-            f"unknown guides {', '.join(sorted(unknown))}: take {' or '.join(GUIDES)}"
-        )
 
 
 def _timed(
@@ -144,8 +130,8 @@ def _configurations(
     progress: Progress,
 ) -> Configs:
     """One block of the table by method: the product first, if there are weights."""
-    preset, scale, guides = network
-    xrds = Config("xrds", samples, None, scale, preset, guides, guide_samples)
+    preset, scale = network
+    xrds = Config("xrds", samples, None, scale, preset, guide_samples)
     configs = {"xrds": xrds}
     configs |= {name: replace(xrds, method=name, preset="") for name in ENLARGEMENTS}
     configs["bicubic"] = Config("bicubic", samples, None, scale)
@@ -199,7 +185,6 @@ class _Scene:
             "scene": shot.name,
             "scale": network.scale,
             "preset": network.preset,
-            "guides": network.guides,
             "methods": methods,
             "gain": table.gain(methods),
             "reference_psnr_floor": shot.window.floor_psnr,

@@ -160,13 +160,8 @@ def _alone(denoiser: Denoising) -> str:
 def _limited_network(shot: Shot, settings: Settings, network: Network) -> Task:
     def task() -> Run:
         low, full = tasks.noise(shot.window, network.scale)
-        extra = full if network.guides == "full" else None
         upscaler = settings.networks[network]
-        return clocked(
-            lambda: upscaler(
-                low, full, full, guide_radiance=extra, memory_limit=MEMORY_LIMIT
-            )
-        )
+        return clocked(lambda: upscaler(low, full, full, memory_limit=MEMORY_LIMIT))
 
     return task
 

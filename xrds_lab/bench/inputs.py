@@ -38,8 +38,9 @@ SEEDS = {"low": 101, "guides": 202, "full": 404, "plain": 404}
 class Request:
     """One rendered input.
 
-    low: beauty at 1/scale, denoised and before; guides: albedo and normal; full: the
-    same with the radiance of all bounces; plain: denoised full-resolution Cycles.
+    low: beauty at 1/scale, denoised and before; guides: albedo and normal; full: noisy
+    full-resolution beauty, with the guides that our denoiser asks for; plain: denoised
+    full-resolution Cycles.
     `denoiser` None is the standard measure's: Blender's default for plain, the scene's
     own mode for low. With a `noise_threshold`, of plain alone, Cycles samples
     adaptively: `samples` are the most that a pixel gets.
@@ -53,7 +54,7 @@ class Request:
     noise_threshold: float | None = None
 
     @property
-    def is_guide(self) -> bool:
+    def has_guides(self) -> bool:
         """Whether it holds albedo and normal."""
         return self.kind in {"guides", "full"}
 
@@ -76,13 +77,15 @@ class Request:
         Adaptive sampling is the scene's: `sample_adaptively` sets it before.
         """
         seed = self._seed
-        if self.is_guide:
-            full = self.kind == "full"
-            guides = passes.guides(self.samples, full=full, seed=seed)
-            arrays = {"albedo": guides.albedo, "normal": guides.normal}
-            return arrays | ({"radiance": guides.radiance} if full else {}), (
-                guides.seconds
-            )
+        if self.kind == "guides":
+            guides = passes.guides(self.samples, seed=seed)
+            return {"albedo": guides.albedo, "normal": guides.normal}, guides.seconds
+        if self.kind == "full":
+            noisy = passes.low_samples(1, self.samples, seed=seed)[passes.views[0]]
+            found = noisy.samples
+            arrays = {"radiance": found.picture[..., :3]}
+            arrays |= {"albedo": found.albedo, "normal": found.normal}
+            return arrays, noisy.place.seconds
         samples = self.samples if self.noise_threshold is None else None
         beauty = passes.beauty(self.scale, samples, seed=seed, **self._denoising())
         if any(beauty.offset):

@@ -106,7 +106,7 @@ def _row(passes: Any, count: int, reference: Any, exposure: float) -> Row:
     noisy = passes.guides(count, full=True, seed=SEED)
     for mode in OUR_DENOISING:
         denoise = OurDenoiser(mode.quality)
-        ours = denoise(noisy.radiance, noisy.albedo, noisy.normal).radiance
+        ours = denoise(noisy.picture[..., :3], noisy.albedo, noisy.normal).radiance
         row[str(mode)] = metrics.psnr(ours * exposure, reference)
     return row
 

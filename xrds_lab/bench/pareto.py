@@ -44,23 +44,15 @@ GROUPS: dict[str, Callable[[Point], bool]] = {
 
 
 def groups(points: Sequence[Point]) -> dict[str, list[Point]]:
-    """Points by group; XRDS also by scale, by guides, and with guides for free."""
+    """Points by group; XRDS also by scale, and with guides for free."""
     members = {name: [p for p in points if has(p)] for name, has in GROUPS.items()}
     ours = members["XRDS"]
     for scale in sorted({p["settings"]["scale"] for p in ours}):
         same = [p for p in ours if p["settings"]["scale"] == scale]
         members[f"XRDS x{scale}"] = same
-    guides = {
-        f"XRDS, {kind} guides": [p for p in ours if p["settings"]["guides"] == kind]
-        for kind in ("fast", "full")
-    }
     members[CACHED] = [
-        p if p["method"] == "full_size" else without_guides(p)
-        for p in ours
-        if p["settings"]["guides"] != "full"
+        p if p["method"] == "full_size" else without_guides(p) for p in ours
     ]
-    if all(guides.values()):  # one alone is all of XRDS
-        members |= guides
     return {name: group for name, group in members.items() if group}
 
 

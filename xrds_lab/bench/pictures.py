@@ -49,7 +49,7 @@ class Networks:
         self.weights, self.device = weights, device
         self._loaded: dict[Network, Any] = {}
         self.records = {
-            Network(record["preset"], record["scale"], record["guides"]): record
+            Network(record["preset"], record["scale"]): record
             for record in files.available(weights)
         }
         self.filter_digest = files.guide_filter_record(weights)["sha256"][:12]
@@ -165,7 +165,6 @@ class Pictures:
                 guide["albedo"],
                 guide["normal"],
                 noisy=beauty.get("noisy"),
-                guide_radiance=guide.get("radiance"),
                 guide_samples=config.guide_samples,
             )
             return np.asarray(upscaled.radiance[..., :3])

@@ -233,8 +233,7 @@ def _gap(gap: float | None) -> str:
 def _machine(report: Report) -> str:
     rows = [[key, value] for key, value in report["machine"].items()]
     lacking = ", ".join(
-        f"{preset} x{scale} {guides}"
-        for preset, scale, guides in report["settings"]["without_weights"]
+        f"{preset} x{scale}" for preset, scale in report["settings"]["without_weights"]
     )
     rows.append(["without weights, so not measured", lacking or "none"])
     return f"<h2>Machine</h2>{_rows(['', ''], rows)}"

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 RATES = (1, 2, 4, 8)
 """Full-resolution samples n of OIDN, and n * scale * scale of the low resolution."""
 LOW_SAMPLES = (4, 16, 64)
-AVERAGES = (2, 4, 8)
-"""Samples per full-resolution pixel with `full` guides, which get a half of them."""
 GUIDE_SAMPLES = 4
 OIDN = {"default": DEFAULT_DENOISING, "fast": Denoising.FAST_FAST}
 
@@ -61,8 +59,7 @@ def samples_table(
     """
     shots = find_shots(scenes, windows, references)
     networks = Networks(weights, "auto")
-    full = Network(preset, scale, "full") in networks.records
-    configs = list(configurations(scale, preset, full))
+    configs = list(configurations(scale, preset))
     records: list[Record] = []
     with kept(cache) as folder:
         for shot in shots:
@@ -76,7 +73,7 @@ def samples_table(
     return report
 
 
-def configurations(scale: int, preset: str, full: bool) -> Iterator[Config]:
+def configurations(scale: int, preset: str) -> Iterator[Config]:
     """Every configuration of the table, each once."""
     low = sorted({*LOW_SAMPLES, *(n * scale**2 for n in RATES)})
     for n in low:
@@ -127,32 +124,24 @@ def summary(records: list[Record]) -> dict[str, Any]:
     """The table's figures, by scene and on the mean.
 
     `over_oidn`: dB over OIDN of n samples, and of its seconds the product's share;
-    `full_over_oidn`: the same for `full` guides at so many samples on the average;
     `more_samples`: PSNR over LOW_SAMPLES.
     """
     by_scene: dict[str, dict[tuple[Any, ...], Record]] = {}
     for record in records:
-        key = (record["method"], record["guides"], record["samples"])
+        key: tuple[Any, ...] = (record["method"], record["samples"])
         key += (record["denoiser"],) if record["method"] == "oidn" else ()
         by_scene.setdefault(record["scene"], {})[key] = record
     area = max(record["scale"] for record in records) ** 2
-    full = any(record["guides"] == "full" for record in records)
-
-    def over_oidn(guides: str, samples: dict[int, int]) -> dict[str, Any]:
-        return {
+    return {
+        "over_oidn": {
             mode: {
-                str(n): _against(by_scene, ("xrds", guides, low), ("oidn", "", n, oidn))
-                for n, low in samples.items()
+                str(n): _against(by_scene, ("xrds", area * n), ("oidn", n, oidn))
+                for n in RATES
             }
             for mode, oidn in OIDN.items()
-        }
-
-    averages = {n: area * n // 2 for n in AVERAGES if full}
-    return {
-        "over_oidn": over_oidn("fast", {n: area * n for n in RATES}),
-        "full_over_oidn": over_oidn("full", averages),
+        },
         "more_samples": {
-            scene: [by_key["xrds", "fast", n]["psnr"] for n in LOW_SAMPLES]
+            scene: [by_key["xrds", n]["psnr"] for n in LOW_SAMPLES]
             for scene, by_key in by_scene.items()
         },
     }
@@ -180,18 +169,13 @@ def text(report: dict[str, Any]) -> str:
     """The summary as text."""
     answers, scale = report["summary"], report["scale"]
     name = f"XRDS {report['preset']} x{scale}"
-    blocks = [
-        _block(f"{name}, {scale**2} n spp + {GUIDE_SAMPLES}", answers["over_oidn"]),
-        _block(f"{name}, full guides, n spp on average", answers["full_over_oidn"]),
-        "\n".join(_growth(name, answers["more_samples"])),
-    ]
-    return "\n\n".join(block for block in blocks if block)
+    title = f"{name}, {scale**2} n spp + {GUIDE_SAMPLES}"
+    growth = "\n".join(_growth(name, answers["more_samples"]))
+    return f"{_block(title, answers['over_oidn'])}\n\n{growth}"
 
 
 def _block(title: str, by_mode: dict[str, dict[str, Any]]) -> str:
     columns = [(m, n, cell) for m, row in by_mode.items() for n, cell in row.items()]
-    if not columns:
-        return ""
     lines = [
         f"{title}: dB over OIDN of n spp (seconds, of OIDN's)",
         _row("", [f"{mode} {n}" for mode, n, _ in columns]),

@@ -190,7 +190,7 @@ class StageTimes:
 
 def task_name(request: Request) -> str:
     """Name of a render in the file of runs."""
-    undenoised = request.is_guide or request.denoiser == OFF
+    undenoised = request.has_guides or request.denoiser == OFF
     denoiser = "" if undenoised else f" {request.denoiser or 'default'}"
     return f"{request.kind} x{request.scale}, {request.samples} spp{denoiser}"
 
@@ -201,8 +201,7 @@ def in_process_name(config: Config) -> str:
         return f"denoising at full size, {config.denoiser}"
     if config.method != "xrds":
         return f"{config.method} x{config.scale}"
-    full = " full" if config.guides == "full" else ""
-    return f"XRDS {config.preset}{full} x{config.scale}"
+    return f"XRDS {config.preset} x{config.scale}"
 
 
 class Stopwatch:

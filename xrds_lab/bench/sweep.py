@@ -38,7 +38,6 @@ COARSE_GUIDE_SAMPLES = (1, 2)
 NOISE_THRESHOLDS = (0.01, 0.03, 0.1, 0.3)
 MOST_ADAPTIVE_SAMPLES = 64
 GUIDE_SAMPLES = (1, 2, 4, 8, 16)
-FULL_SAMPLES = (1, 2, 4)
 
 
 @dataclass(frozen=True)
@@ -55,7 +54,6 @@ class Config:
     denoiser: Mode | None = OFF
     scale: int = 1
     preset: str = ""
-    guides: str = ""
     guide_samples: int = 0
     noise_threshold: float | None = None
 
@@ -71,10 +69,9 @@ class Config:
             name = "Cycles" if self.method == "cycles" else f"OIDN {self.denoiser}"
             return f"{name}, {self.samples} spp"
         name = {"xrds": f"XRDS {self.preset}"}.get(self.method, self.method)
-        full = "full " if self.guides == "full" else ""
         samples = f"{self.samples}"
-        if self.guides:
-            samples += f" + {full}{self.guide_samples}"
+        if self.guide_samples:
+            samples += f" + {self.guide_samples}"
         return f"{name} x{self.scale}, {samples} spp, {self.denoiser}"
 
     @property
@@ -85,7 +82,7 @@ class Config:
     @property
     def network(self) -> Network:
         """The weights it needs."""
-        return Network(self.preset, self.scale, self.guides)
+        return Network(self.preset, self.scale)
 
     @property
     def has_noisy_guides(self) -> bool:
@@ -116,11 +113,9 @@ class Config:
 
     def guide(self) -> Request | None:
         """The guides' render, None for methods that need none."""
-        if not self.guides:
+        if not self.guide_samples:
             return None
-        return Request(
-            "full" if self.guides == "full" else "guides", self.guide_samples
-        )
+        return Request("guides", self.guide_samples)
 
     def requests(self) -> list[Request]:
         """All renders that it needs."""
@@ -138,7 +133,6 @@ class Sweep:
         default_factory=lambda: dict(LOW_SAMPLES)
     )
     guide_samples: tuple[int, ...] = GUIDE_SAMPLES
-    full_samples: tuple[int, ...] = FULL_SAMPLES
     noise_thresholds: tuple[float, ...] = ()
     """Of Cycles' adaptive sampling; each is timed as whole frames of its own."""
 
@@ -148,7 +142,6 @@ class Sweep:
             self,
             low_samples=COARSE_LOW_SAMPLES,
             guide_samples=COARSE_GUIDE_SAMPLES,
-            full_samples=FULL_SAMPLES[:1],
         )
 
     @property
@@ -190,7 +183,6 @@ class Sweep:
                 replace(
                     bicubic,
                     method="demodulated_bilinear",
-                    guides="fast",
                     guide_samples=guide_samples,
                 )
                 for guide_samples in self.guide_samples
@@ -198,7 +190,6 @@ class Sweep:
         return configs
 
     def _enlarged(self, network: Network) -> list[Config]:
-        full = network.guides == "full"
         return [
             xrds(network, n, denoiser, guide_samples)
             for n, denoiser, guide_samples in product(
@@ -216,8 +207,8 @@ def xrds(
     guide_samples: int = 0,
 ) -> Config:
     """A configuration of the product."""
-    preset, scale, guides = network
-    return Config("xrds", samples, denoiser, scale, preset, guides, guide_samples)
+    preset, scale = network
+    return Config("xrds", samples, denoiser, scale, preset, guide_samples)
 
 
 def adaptive(noise_threshold: float, denoiser: Mode) -> Config:
@@ -235,8 +226,8 @@ def anchor(
 ) -> Request:
     """A render that is timed: of few samples, or of `more` for the line's slope."""
     samples = (scale if kind == "low" else 1) * (4 if more else 1)
-    is_guide = kind in {"guides", "full"}
-    return Request(kind, samples, scale, None if is_guide else denoiser)
+    request = Request(kind, samples, scale, denoiser)
+    return replace(request, denoiser=None) if request.has_guides else request
 
 
 def anchors(configs: Iterable[Config]) -> list[Request]:
@@ -250,7 +241,7 @@ def anchors(configs: Iterable[Config]) -> list[Request]:
     for request in (request for config in lines for request in config.requests()):
         for more in (False, True):
             needed[anchor(request.kind, request.scale, more=more)] = None
-        if not request.is_guide and request.denoiser != OFF:
+        if not request.has_guides and request.denoiser != OFF:
             needed[anchor(request.kind, request.scale, request.denoiser)] = None
     return list(needed)
 

@@ -24,9 +24,8 @@ _DIGITS = {"psnr": 2, "relmse": 4, "relmse_trimmed": 4, "flip": 4, "seconds": 1}
 
 
 def case(network: Network) -> str:
-    """A block of the table by name: x2 fast, or x2 fast_full for those guides."""
-    suffix = "" if network.guides == "fast" else f"_{network.guides}"
-    return f"x{network.scale} {network.preset}{suffix}"
+    """A block of the table by name: x2 fast."""
+    return f"x{network.scale} {network.preset}"
 
 
 def gain(methods: dict[str, dict[str, Any]]) -> float | None:
@@ -38,10 +37,7 @@ def gain(methods: dict[str, dict[str, Any]]) -> float | None:
 
 
 def means(records: list[Record]) -> dict[str, dict[str, dict[str, Any]]]:
-    """Mean figures over the scenes that have them: {scale: {preset: {method: ..}}}.
-
-    A preset with `full` guides is named as its weights file: PRESET_full.
-    """
+    """Mean figures over the scenes that have them: {scale: {preset: {method: ..}}}."""
     return _by_case(records, _mean_methods)
 
 
@@ -94,13 +90,12 @@ def _cell(value: float | None, digits: int) -> str:
 
 
 def _case(record: Record) -> str:
-    return case(Network(record["preset"], record["scale"], record["guides"]))
+    return case(Network(record["preset"], record["scale"]))
 
 
 def _key(record: Record) -> tuple[str, str]:
     """Scale and preset as keys of the JSON."""
-    scale, preset = _case(record).removeprefix("x").split()
-    return scale, preset
+    return str(record["scale"]), record["preset"]
 
 
 def _cases(records: list[Record]) -> dict[tuple[str, str], list[Record]]:

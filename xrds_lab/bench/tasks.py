@@ -194,10 +194,9 @@ def _network(networks: Networks, network: Network, window: Window) -> Task:
     def task() -> Run:
         load = clocked(lambda: networks[network])["seconds"]
         upscaler, (low, full) = networks[network], noise(window, network.scale)
-        extra = full if network.guides == "full" else None
 
         def run() -> Any:
-            return upscaler(low, full, full, guide_radiance=extra)
+            return upscaler(low, full, full)
 
         if not warm:
             warm.append(bool(run()))

@@ -8,7 +8,7 @@ from typing import Any
 
 from xrds_blender.command import arguments
 from xrds_blender.command.deferred import need_blender, no_lines
-from xrds_blender.command.options import DEVICE_HELP, GUIDES, PRESETS
+from xrds_blender.command.options import DEVICE_HELP, PRESETS
 from xrds_core.errors import UsageError, XRDSError
 
 from ..progress import report_line
@@ -32,9 +32,6 @@ def add_evaluate(commands: Any) -> argparse.ArgumentParser:
         type=arguments.names(PRESETS),
         default=("fast",),
         help="as fast,balanced",
-    )
-    add(
-        "--guides", type=arguments.names(GUIDES), default=("fast",), help="as fast,full"
     )
     add("--table", choices=("standard", "samples"), default="standard")
     add("--timing", action="store_true", help="also time whole frames")
@@ -70,7 +67,6 @@ def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
         cache=options.cache,
         scales=options.scale,
         presets=options.preset,
-        guides=options.guides,
         timing=options.timing,
         timing_scenes=options.timing_scenes,
         out=options.out,

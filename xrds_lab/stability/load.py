@@ -86,15 +86,13 @@ def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
     for frame, angle in ((1, 0.0), (FRAMES, 6.0)):
         thing.rotation_euler[2] = angle
         thing.keyframe_insert("rotation_euler", frame=frame)
-    guides = subject.upscaler.network.config.guides
     with stdout_to(Path(os.devnull)):  # Blender prints a line for every sample
         frames = drive(
             scene,
             FRAMES,
             scale=subject.scale,
             samples=2,
-            preset=subject.preset.removesuffix("_full"),
-            guides="full" if guides == "full" else "fast",
+            preset=subject.preset,
             device=str(subject.upscaler.device),
             weights=weights,
         )

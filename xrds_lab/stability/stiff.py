@@ -107,9 +107,6 @@ def before_denoising(beauty: Any) -> Array:
 def enlarged(subject: Subject, arrays: Arrays) -> Array:
     """Return the product's picture (H, W, 4) of a scene."""
     low = arrays[f"low{subject.scale}"]
-    extra = {}
-    if subject.upscaler.network.config.guides == "full":
-        extra["guide_radiance"] = baselines.bicubic(low[..., :3], subject.scale)
     cover = arrays["alpha"] if low[..., 3].min() < 1.0 else None
     low = low if cover is not None else low[..., :3]
     return subject.upscaler(
@@ -118,7 +115,6 @@ def enlarged(subject: Subject, arrays: Arrays) -> Array:
         arrays["normal"],
         noisy=arrays[f"noisy{subject.scale}"],
         guide_alpha=cover,
-        **extra,
     ).radiance
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from xrds_core.superres import weights
 from xrds_core.superres.upscaler import Upscaler
 
@@ -51,17 +49,13 @@ class Subject:
 
     def __call__(self, inputs: Inputs, **options: Any) -> Array:
         """Return the picture (H, W, 3 or 4) of `inputs`."""
-        if self.upscaler.network.config.guides == "full":
-            options["guide_radiance"] = _enlarged(inputs, self.scale)
         return self.upscaler(*inputs, **options).radiance
 
     def at(self, precision: str) -> Subject:
         """Return the same weights at another precision."""
-        kind = self.upscaler.network.config.guides
         made = Upscaler(
             self.preset,
             self.scale,
-            "full" if kind == "full" else "fast",
             str(self.upscaler.device),
             precision,
             self.upscaler.network,
@@ -69,13 +63,6 @@ class Subject:
         return Subject(
             self.preset, self.scale, precision, made, self.side, self.thorough
         )
-
-
-def _enlarged(inputs: Inputs, scale: int) -> Array:
-    """Stand in for the radiance of full guides: pixels repeated."""
-    height, width = inputs.albedo.shape[:2]
-    large = inputs.radiance[..., :3].repeat(scale, 0).repeat(scale, 1)
-    return np.ascontiguousarray(large[:height, :width])
 
 
 def shipped(
@@ -92,13 +79,12 @@ def shipped(
     """
     return [
         Subject(
-            record["preset"] + ("_full" if record["guides"] == "full" else ""),
+            record["preset"],
             record["scale"],
             precision,
             Upscaler(
                 record["preset"],
                 record["scale"],
-                "full" if record["guides"] == "full" else "fast",
                 device,
                 precision,
                 directory,

@@ -7,7 +7,6 @@ a whole frame. One `.npz` file per window holds, in half precision and row 0 on 
 - `low{S}_{i}`, `low{S}_{i}_noisy` (H / S, W / S, 3): radiance at 1 / S of the size
   through a box filter, denoised and as rendered, for two sample counts i = 0, 1;
 - `guides_a`, `guides_b` (H, W, 6): albedo and camera-space normal, two seeds;
-- `guide_radiance_a`, `guide_radiance_b` (H, W, 3): one full sample each;
 - `meta`: a JSON string with seeds, window, sample counts, seconds and assets.
 """
 
@@ -190,12 +189,13 @@ def _probe(stage: Stage, view: View, seed: int) -> tuple[Array, ...]:
     framing.set_border(stage.scene, None)
     stage.scene.render.resolution_percentage = framing.PROBE_PERCENT
     try:
-        guides = run_job(
-            stage.scene, lambda passes: passes.guides(2, full=True, seed=seed)
-        )
+        (low,) = run_job(
+            stage.scene, lambda passes: passes.low_samples(1, 2, seed=seed)
+        ).values()
     finally:
         stage.scene.render.resolution_percentage = 100
-    return guides.radiance, guides.albedo, guides.normal
+    probe = low.samples
+    return probe.picture[..., :3], probe.albedo, probe.normal
 
 
 def _write(
@@ -212,7 +212,6 @@ def _write(
         "frame": [render.resolution_x, render.resolution_y],
         "low_spp": {f"{scale}_{i}": n for (scale, i), n in samples.low.items()},
         "guide_spp": list(samples.guides),
-        "guide_radiance_spp": 1,
         "reference_spp": samples.reference,
         "seconds": seconds | {"total": round(time.perf_counter() - start, 3)},
         "blender_series": "{}.{}".format(*bpy.app.version),
@@ -253,8 +252,6 @@ def _arrays(passes: CyclesPasses, samples: Samples) -> tuple[Arrays, dict[str, f
     for name, count in zip("ab", samples.guides, strict=True):
         guides = timed("guides", lambda seed, n=count: passes.guides(n, seed=seed))
         arrays[f"guides_{name}"] = np.concatenate([guides.albedo, guides.normal], -1)
-        full = timed("full", lambda seed: passes.guides(1, full=True, seed=seed))
-        arrays[f"guide_radiance_{name}"] = full.radiance
     reference = timed(
         "reference",
         lambda seed: passes.beauty(

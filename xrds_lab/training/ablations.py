@@ -33,11 +33,10 @@ TABLES: dict[str, dict[str, Changes]] = {
         "kernels over demodulated radiance": (),
     },
     "guides": {
-        "none": (NO_BASE, 'network.guides = "none"'),
-        "normal": (NO_BASE, 'network.guides = "normal"'),
-        "albedo": (NO_BASE, 'network.guides = "albedo"'),
+        "none": (NO_BASE, 'hidden = "guides"'),
+        "normal": (NO_BASE, 'hidden = "albedo"'),
+        "albedo": (NO_BASE, 'hidden = "normal"'),
         "albedo and normal": (NO_BASE,),
-        "and radiance": (NO_BASE, 'guides = "full"'),
     },
     "blocks": {
         "RDB": (NO_BASE, NO_XM, 'network.block = "rdb"'),
@@ -55,7 +54,7 @@ TABLES: dict[str, dict[str, Changes]] = {
             NO_BASE,
             NO_XM,
             'network.block = "rstb"',
-            'network.guides = "none"',
+            'hidden = "guides"',
         ),
         "XRDS, albedo and normal": (NO_BASE,),
     },

@@ -17,6 +17,7 @@ from xrds_core.devices import choose_precision
 from xrds_core.errors import UsageError
 from xrds_core.superres.network import NetworkConfig, preset_config
 
+from .crop import HIDDEN
 from .data import Variation
 from .losses import LOSSES
 from .rivals import RIVALS
@@ -42,11 +43,12 @@ class TrainingConfig:
     """Folders of `xrds dataset`, with `train` and `validation` in them."""
     preset: str = "fast"
     scale: int = 2
-    guides: str = "fast"
     network: dict[str, Any] = field(default_factory=dict)
     """Changes to the preset's `NetworkConfig`."""
     rival: str = ""
     """One of `rivals.RIVALS`, trained in the preset's place for comparison."""
+    hidden: str = ""
+    """One of `crop.HIDDEN`, black to the network, for comparison."""
     start: str = ""
     """Weights file to start from: tensors of the same name and shape are taken."""
     seed: int = 0
@@ -84,6 +86,8 @@ class TrainingConfig:
             raise UsageError(f"loss {sorted(unknown)} is none of {sorted(LOSSES)}")
         if self.rival and self.rival not in RIVALS:
             raise UsageError(f"rival {self.rival!r} is none of {sorted(RIVALS)}")
+        if self.hidden and self.hidden not in HIDDEN:
+            raise UsageError(f"hidden {self.hidden!r} is none of {sorted(HIDDEN)}")
         for name, least in _LEAST.items():
             if getattr(self, name) < least:
                 raise UsageError(f"{name} is {getattr(self, name)}, less than {least}")
@@ -98,7 +102,7 @@ class TrainingConfig:
     @property
     def network_config(self) -> NetworkConfig:
         """The preset's, with the changes of `network`."""
-        shape = preset_config(self.preset, self.scale, self.guides)
+        shape = preset_config(self.preset, self.scale)
         return replace(shape, **self.network)
 
     def learning_rate_at(self, step: int) -> float:

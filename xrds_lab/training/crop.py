@@ -12,6 +12,9 @@ from torch import Tensor
 from xrds_core.arrays import Array
 from xrds_core.superres.front_end import transfer
 
+# Channels of guides that a network can be kept from seeing, to find what they bring.
+HIDDEN = {"albedo": slice(3), "normal": slice(3, 6), "guides": slice(6)}
+
 
 @dataclass(frozen=True)
 class Crop:
@@ -23,19 +26,15 @@ class Crop:
     reference: Array
     albedo: Array
     normal: Array
-    guide_radiance: Array | None
-    """Of `full` guides."""
     exposure: float
 
     def with_light(self, change: Callable[[Array], Array]) -> Crop:
         """Change the radiance."""
-        guide = None if self.guide_radiance is None else change(self.guide_radiance)
         return replace(
             self,
             low=change(self.low),
             noisy=change(self.noisy),
             reference=change(self.reference),
-            guide_radiance=guide,
         )
 
     def with_colours(self, change: Callable[[Array], Array]) -> Crop:
@@ -48,13 +47,10 @@ class Crop:
 
     def to_batch(self) -> Batch:
         """A batch of one."""
-        guides = [self.albedo, self.normal]
-        if self.guide_radiance is not None:
-            guides.append(transfer(self.guide_radiance, self.exposure))
         return Batch(
             to_tensor(transfer(self.low, self.exposure)),
             to_tensor(transfer(self.noisy, self.exposure)),
-            to_tensor(np.concatenate(guides, axis=-1)),
+            to_tensor(np.concatenate((self.albedo, self.normal), axis=-1)),
             to_tensor(transfer(self.reference, self.exposure)),
         )
 
@@ -65,7 +61,7 @@ class Batch:
 
     radiance: Tensor  # (B, 3, h, w)
     noisy: Tensor  # (B, 3, h, w)
-    guides: Tensor  # (B, 6 or 9, H, W)
+    guides: Tensor  # (B, 6, H, W)
     reference: Tensor  # (B, 3, H, W)
 
     @staticmethod
@@ -77,6 +73,14 @@ class Batch:
                 for field in fields(Batch)
             )
         )
+
+    def seen(self, hidden: str) -> Tensor:
+        """The guides, 0 where they are `hidden`."""
+        if not hidden:
+            return self.guides
+        guides = self.guides.clone()
+        guides[:, HIDDEN[hidden]] = 0.0
+        return guides
 
     def to(self, device: torch.device) -> Batch:
         """The same on a device."""

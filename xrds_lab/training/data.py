@@ -61,13 +61,12 @@ class Variation:
 def draw(
     window: Window,
     scale: int,
-    guides: str,
     variation: Variation,
     random: np.random.Generator,
     size: int | None = None,
 ) -> Batch:
     """Cut one varied crop of `size` output pixels (None: the whole window)."""
-    crop = cut(window, scale, guides, variation, random, size)
+    crop = cut(window, scale, variation, random, size)
     if random.random() < variation.black:
         crop = crop.with_light(np.zeros_like)
     if variation.symmetries:
@@ -83,7 +82,6 @@ def draw(
 def cut(
     window: Window,
     scale: int,
-    guides: str,
     variation: Variation,
     random: np.random.Generator,
     size: int | None,
@@ -105,17 +103,13 @@ def cut(
     )
     reference, _ = clean_radiance(window.array("reference", box))
     albedo, normal = mix_guides(window, box, random)
-    lit_anew = random.random() < variation.shaded
-    full = noisy_radiance(window, box, random) if guides == "full" else None
-    if lit_anew:
-        rendered, denoised = reference, low
+    if random.random() < variation.shaded:
+        denoised = low
         low, reference = shade(mean_albedo(window, box), scale, exposure, random)
         noisy = with_noise_of(noisy, denoised, low, exposure)
         if random.random() < variation.over_denoised:
             low = over_denoised(low, random)
-        if full is not None:
-            full = with_noise_of(full, rendered, reference, exposure)
-    return Crop(low, noisy, reference, albedo, normal, full, exposure)
+    return Crop(low, noisy, reference, albedo, normal, exposure)
 
 
 def boxes(
@@ -146,13 +140,6 @@ def mean_albedo(window: Window, box: Box) -> Array:
     """Of both guide renders: the least noisy there is."""
     both = [window.array(name, box)[..., :3] for name in ("guides_a", "guides_b")]
     return clean_albedo((both[0] + both[1]) / 2)[0]
-
-
-def noisy_radiance(window: Window, box: Box, random: np.random.Generator) -> Array:
-    """The full-resolution radiance of one of the two guide renders, or their mean."""
-    names = (("a",), ("b",), ("a", "b"))[random.integers(3)]
-    renders = [window.array(f"guide_radiance_{name}", box) for name in names]
-    return clean_radiance(np.mean(renders, axis=0))[0]
 
 
 def with_noise_of(

@@ -109,7 +109,7 @@ class Learner:
     def _inputs(self, batch: Batch) -> tuple[Tensor, ...]:
         """What the network takes of a batch."""
         batch = batch.to(self.device)
-        return batch.radiance, batch.guides, batch.noisy
+        return batch.radiance, batch.seen(self.config.hidden), batch.noisy
 
     def _copy(self) -> dict[str, Tensor]:
         return {k: v.clone() for k, v in self.network.state_dict().items()}
@@ -132,8 +132,8 @@ class Learner:
             self.network.load_state_dict(learnt)
 
     def save_average(self, path: Path, record: dict[str, str]) -> None:
-        """Write the averaged weights; nothing of a rival."""
-        if self.config.rival:
+        """Write the averaged weights; nothing of a rival or where guides are hidden."""
+        if self.config.rival or self.config.hidden:
             return  # a figure in a table, never a preset
         network = XRDS(self.config.network_config)
         network.load_state_dict({k: v.cpu() for k, v in self.average.items()})

@@ -36,7 +36,7 @@ FREE = {
 
 def find_files(config: TrainingConfig) -> dict[str, Files]:
     """The window files that a run can use, by split and folder."""
-    low, high = array_names(config.scale, config.guides)
+    low, high = array_names(config.scale)
     folders = [Path(folder) for folder in config.data]
     return {split: find_windows(folders, split, low + high) for split in SPLITS}
 
@@ -84,10 +84,11 @@ class RunFolder:
         """The run's windows, by split."""
         files = read_json(self.files)
         folders = [Path(folder) for folder in config.data]
-        what = config.scale, config.guides
         memory = config.cache_gigabytes * 1e9 / (config.workers + 1)
         return {
-            split: WindowSet(paths_of(folders, split, files[split]), *what, memory)
+            split: WindowSet(
+                paths_of(folders, split, files[split]), config.scale, memory
+            )
             for split in SPLITS
         }
 

@@ -49,7 +49,7 @@ class Crops:
         random = np.random.default_rng((c.seed, step, place))
         window = self.windows[int(random.integers(len(self.windows)))]
         size = crop_size(c, step)
-        return draw(window, c.scale, c.guides, c.variation, random, size)
+        return draw(window, c.scale, c.variation, random, size)
 
 
 class Run:
@@ -69,7 +69,7 @@ class Run:
         self.windows = self.folder.open_windows(config)
         crops = Crops(config, self.windows["train"])
         self.loader = CropLoader(crops, places, config.workers)
-        shown = config.validation_windows, config.scale, config.guides
+        shown = config.validation_windows, config.scale
         self.validation = Validation(self.windows["validation"], *shown)
         self.step, self.validated = 0, -1
         self.best, self.best_step = -math.inf, 0

@@ -71,18 +71,18 @@ def in_order(scores: Iterable[Score]) -> list[Score]:
 class Validation:
     """The windows to score: `count` spread over the split, the same ones each time."""
 
-    def __init__(self, windows: WindowSet, count: int, scale: int, guides: str) -> None:
+    def __init__(self, windows: WindowSet, count: int, scale: int) -> None:
         count = min(count, len(windows))
         self._windows = windows
         self._chosen = [i * len(windows) // count for i in range(count)]
-        self._what = (scale, guides)
+        self._scale = scale
         self.places = [(name, i) for name in SETS for i in range(count)]
 
     def batch(self, set_name: str, index: int) -> Batch:
         """One whole window; which renders and which light follows from the index."""
         window = self._windows[self._chosen[index]]
         random = np.random.default_rng(index)
-        return draw(window, *self._what, SETS[set_name], random)
+        return draw(window, self._scale, SETS[set_name], random)
 
     def score(self, forward: Callable[[Batch], Tensor], name: str, index: int) -> Score:
         """Enlarge one window by every method."""

@@ -65,24 +65,21 @@ def low_name(scale: int, index: int, noisy: bool = False) -> str:
     return f"low{scale}_{index}{'_noisy' if noisy else ''}"
 
 
-def array_names(scale: int, guides: str) -> tuple[list[str], list[str]]:
+def array_names(scale: int) -> tuple[list[str], list[str]]:
     """What training at one scale reads: low-resolution renders, and the rest."""
     kinds = (False, True)
     low = [low_name(scale, i, kind) for i in range(LOW_RENDERS) for kind in kinds]
-    high = ["reference", "guides_a", "guides_b"]
-    if guides == "full":
-        high += ["guide_radiance_a", "guide_radiance_b"]
-    return low, high
+    return low, ["reference", "guides_a", "guides_b"]
 
 
-def read_window(path: Path, scale: int, guides: str) -> Window:
+def read_window(path: Path, scale: int) -> Window:
     """Read what training at one scale needs.
 
     Raises:
         PictureError: the file is damaged or was rendered without that scale.
     """
-    low, high = array_names(scale, guides)
-    arrays, meta = read_arrays(path, low + high, f"scale {scale}, {guides} guides")
+    low, high = array_names(scale)
+    arrays, meta = read_arrays(path, low + high, f"scale {scale}")
     clean = {name: clean_radiance(arrays[name].astype(np.float32))[0] for name in low}
     exposures = {name: auto_exposure(picture) for name, picture in clean.items()}
     return Window(path, arrays, exposures, meta)
@@ -121,15 +118,9 @@ class WindowSet:
     What does not fit into `memory` bytes is read again each time.
     """
 
-    def __init__(
-        self,
-        paths: Sequence[Path],
-        scale: int,
-        guides: str,
-        memory: float,
-    ) -> None:
+    def __init__(self, paths: Sequence[Path], scale: int, memory: float) -> None:
         self.paths = paths
-        self._what = (scale, guides)
+        self._scale = scale
         self._free = memory
         self._kept: dict[int, Window] = {}
 
@@ -139,7 +130,7 @@ class WindowSet:
     def __getitem__(self, index: int) -> Window:
         if index in self._kept:
             return self._kept[index]
-        window = read_window(self.paths[index], *self._what)
+        window = read_window(self.paths[index], self._scale)
         if window.size <= self._free:
             self._free -= window.size
             self._kept[index] = window

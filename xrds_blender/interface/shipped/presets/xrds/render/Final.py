@@ -10,7 +10,6 @@ scene.xrds.time_budget = 60.0
 scene.xrds.denoise = "high"
 scene.xrds.temporal_radius = 4
 scene.xrds.preset = "fast"
-scene.xrds.guides = "fast"
 scene.xrds.guide_samples = 4
 scene.xrds.use_exposure = False
 scene.xrds.exposure = 1.0
