@@ -126,8 +126,9 @@ def select(
     decision = found.decision(request.goal)
     settings = replace(settings, temporal_radius=wanted.temporal_radius)
     if not settings.is_enlarged:
-        unused = {"preset": wanted.preset, "guide_samples": wanted.guide_samples}
-        settings = replace(settings, **unused)
+        settings = replace(
+            settings, preset=wanted.preset, guide_samples=wanted.guide_samples
+        )
     result = Chosen(replace(request, settings=settings, goal=None), (decision,))
     is_ours = settings.mode is Mode.FULL_SIZE
     if seconds is None or shot or not is_ours or not found.fits:  # or late by intent

@@ -28,7 +28,6 @@ def join_facts(scene: Any, settings: Settings, scene_facts: SceneFacts) -> Facts
     camera = scene.camera
     return Facts(
         scale=settings.scale,
-        guides="fast",
         width=width,
         height=height,
         max_bounces=scene.cycles.max_bounces,

@@ -208,7 +208,6 @@ def _guides(cached: CachedGuides, seconds: dict[str, float]) -> dict[str, Guides
             cached.passes[view, NORMAL],
             alpha,
             None,
-            None,
             cached.samples,
             seconds,
         )

@@ -188,10 +188,6 @@ def _samples(facts: Facts, allowed: bool) -> tuple[int, Decision]:
         decision = Decision(name, str(CRYPTOMATTE_SAMPLES), reason)
         return CRYPTOMATTE_SAMPLES, decision
     fine = _fine_detail(facts.scene)
-    if facts.guides == "full":
-        return requested, Decision(
-            name, str(requested), "full guides hold light, and so noise"
-        )
     if fine or masks or not allowed or requested <= CRISP_SAMPLES:
         reason = f"as requested; the scene has {fine}" if fine else "as requested"
         return requested, Decision(name, str(requested), reason)

@@ -54,7 +54,6 @@ def enlarge(
             placed(seen(guides.albedo)),
             placed(guides.normal),
             noisy=seen(beauty.noisy),
-            guide_radiance=placed(seen(guides.radiance)),
             guide_alpha=placed(clean_alpha(guides, request.machine)),
             guide_samples=guides.samples,
             exposure=exposure,

@@ -77,16 +77,10 @@ def configurations(scale: int, preset: str) -> Iterator[Config]:
     """Every configuration of the table, each once."""
     low = sorted({*LOW_SAMPLES, *(n * scale**2 for n in RATES)})
     for n in low:
-        yield xrds(Network(preset, scale, "fast"), n, DEFAULT_DENOISING, GUIDE_SAMPLES)
+        yield xrds(Network(preset, scale), n, DEFAULT_DENOISING, GUIDE_SAMPLES)
     for n in RATES:
         for denoiser in OIDN.values():
             yield Config("oidn", n, denoiser)
-    if full:
-        network = Network(preset, scale, "full")
-        for average in AVERAGES:
-            # half of the rays for the guides, half for the low-resolution picture
-            half = average // 2
-            yield xrds(network, average * scale**2 // 2, DEFAULT_DENOISING, half)
 
 
 def _measured(

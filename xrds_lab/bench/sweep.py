@@ -195,7 +195,7 @@ class Sweep:
             for n, denoiser, guide_samples in product(
                 self.low_samples[network.scale],
                 LOW_DENOISING,
-                self.full_samples if full else self.guide_samples,
+                self.guide_samples,
             )
         ]
 
