@@ -136,12 +136,11 @@ def stopped_in(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     import bpy
 
     from xrds_blender.cycles import session
-    from xrds_blender.frame import progress
 
     def render(stage: str) -> None:
         with monkeypatch.context() as patch:
             patch.setattr(
-                session, "is_stopped", lambda _: stage in (progress.current() or "")
+                session, "is_stopped", lambda _: stage in (stages.current() or "")
             )
             bpy.ops.render.render(animation=True)
 
@@ -231,7 +230,7 @@ def life(still_life: Callable[..., Any]) -> Any:
     ensure_registered()
     scene = still_life(45, 33)
     scene.cycles.seed = 1
-    scene.xrds.way = "x2"
+    scene.xrds.mode = "x2"
     return scene
 
 

@@ -48,7 +48,7 @@ function compileJob(job) {
     const rendered = chunks.map((chunk) => addTask(job, `render-${chunk}`, [
         "render", settings.blendfile, "--scale", "1",
         "--frames", chunk, "--temporal-radius", radius,
-        "--keep-samples", settings.samples_path,
+        "--sample-cache", settings.samples_path,
     ]));
     // A chunk waits for those that its frames take samples of.
     const reach = Math.ceil(settings.temporal_radius / settings.chunk_size);

@@ -118,7 +118,7 @@ for _ in range(2):
     addon_utils.disable({MODULE!r}); addon_utils.enable({MODULE!r})
 addon_utils.enable({MODULE!r})  # twice, without a disable
 bpy.ops.script.reload()
-assert bpy.context.scene.xrds.way == "automatic"
+assert bpy.context.scene.xrds.mode == "automatic"
 bpy.ops.wm.read_factory_settings()
 assert not hasattr(bpy.types.Scene, "xrds")
 addon_utils.enable({MODULE!r})
@@ -227,7 +227,7 @@ class Without:
 sys.meta_path.insert(0, Without())
 import bpy
 bpy.context.scene.render.engine = "XRDS"
-bpy.context.scene.xrds.way = "x2"
+bpy.context.scene.xrds.mode = "x2"
 try:
     bpy.ops.render.render()
 except RuntimeError as error:

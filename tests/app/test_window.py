@@ -203,7 +203,7 @@ def test_the_picture_grows_and_stays_after_escape(window: Window, way: str) -> N
 bpy.context.preferences.view.render_display_type = 'AREA'
 render = bpy.data.scenes[0].render
 render.resolution_x, render.resolution_y = 320, 180
-bpy.data.scenes[0].xrds.way = {way!r}
+bpy.data.scenes[0].xrds.mode = {way!r}
 bpy.data.scenes[0].cycles.use_adaptive_sampling = False
 """
     )
@@ -221,7 +221,7 @@ bpy.data.scenes[0].cycles.use_adaptive_sampling = False
     window.settle()
     kept = brightness(window.shot(f"10_kept_{way}"))
     leave_picture(window)
-    window.ask("bpy.data.scenes[0].xrds.way = 'full_size'")
+    window.ask("bpy.data.scenes[0].xrds.mode = 'full_size'")
     for picture in (seen, kept):  # the cube's sides differ, and fill the middle
         assert picture.std() > 10.0
         assert picture.max() > 100.0
@@ -232,7 +232,7 @@ SAMPLES_ARE_TAKEN = """
 import sys
 progress = sys.modules.get('xrds_blender.frame.stages')
 lifetimes = sys.modules.get('xrds_blender.internals.lifetimes')
-run = progress and lifetimes.RENDER_JOB.of(progress.Current).run
+run = stages and lifetimes.RENDER_JOB.of(stages.Current).run
 status = sys.modules.get('xrds_blender.internals.status')
 run and (status.fraction(run.engine) or 0) > 0
 """
@@ -285,7 +285,7 @@ bpy.context.preferences.view.render_display_type = 'AREA'
         """
 import sys
 progress = sys.modules.get('xrds_blender.frame.stages')
-progress and 'frame 2' in (progress.current() or '')
+stages and 'frame 2' in (stages.current() or '')
 """
     )
     window.move(400, 620)

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from xrds_blender.command import console, main
-from xrds_blender.command.options import choice_of, encoding_of, job_of
+from xrds_blender.command.options import choice_of, encoding_of, request_of
 from xrds_core.errors import (
     Cancelled,
     PictureError,
@@ -139,7 +139,7 @@ def test_render_options() -> None:
         "--scale 4 --samples 9 --memory-limit 2G --exposure 0.5 --seed 7 --resume "
         "--threads 3 --exr-depth half --exr-codec dwaa -y"
     )
-    assert job_of(options).threads == choice_of(options).threads == 3
+    assert request_of(options).threads == choice_of(options).threads == 3
     assert encoding_of(options) == Encoding(half=True, codec="dwaa")
     assert choice_of(options).trusted
     assert options.scene == Path("a.blend")

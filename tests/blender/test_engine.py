@@ -33,7 +33,7 @@ def low_picture(scene: Any, scale: int = 2) -> np.ndarray:
 def test_a_still_is_the_enlarged_picture(
     life: Any, network: Any, written: Any, scale: str
 ) -> None:
-    life.xrds.way = f"x{scale}"
+    life.xrds.mode = f"x{scale}"
     picture = written(life)
     np.testing.assert_array_equal(picture[..., :3], low_picture(life, int(scale)))
     np.testing.assert_array_equal(picture[..., 3], 1.0)
@@ -45,7 +45,7 @@ def test_plain_is_cycles_bit_for_bit(life: Any, written: Any) -> None:
     picture = render(life, 2, plain=True)
     np.testing.assert_array_equal(picture.radiance, expected[..., :3])
     np.testing.assert_array_equal(picture.alpha, expected[..., 3])
-    life.xrds.way = "plain"
+    life.xrds.mode = "cycles_only"
     np.testing.assert_array_equal(written(life), expected)
 
 

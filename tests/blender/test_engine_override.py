@@ -27,7 +27,7 @@ def renders(life: Any, monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return real(*arguments)
 
     monkeypatch.setattr(render, "render_frame", render_frame)
-    life.xrds.way = "full_size"
+    life.xrds.mode = "full_size"
     return seen
 
 

@@ -26,7 +26,7 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.command.scene_file import SceneChoice
 from xrds_blender.command.whole_file import is_whole
 from xrds_blender.cycles import session
-from xrds_blender.frame import denoisers, guide_cache, networks, progress
+from xrds_blender.frame import denoisers, guide_cache, networks
 from xrds_blender.frame.picture import NetworkFailed
 from xrds_blender.planning.request import request
 from xrds_core.errors import Cancelled, OutOfMemory, PictureError, XRDSError
@@ -62,7 +62,7 @@ def names(folder: Path) -> list[str]:
 # --- cancel ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("stage", [progress.LOW, progress.GUIDES, progress.NETWORK])
+@pytest.mark.parametrize("stage", [stages.LOW, stages.GUIDES, stages.NETWORK])
 def test_cancelling_a_stage_writes_nothing(
     life: Any, network: Any, monkeypatch: pytest.MonkeyPatch, stage: str
 ) -> None:
@@ -71,13 +71,13 @@ def test_cancelling_a_stage_writes_nothing(
     written = []
     with monkeypatch.context() as patch:
         patch.setattr(
-            session, "is_stopped", lambda _: stage in (progress.current() or "")
+            session, "is_stopped", lambda _: stage in (stages.current() or "")
         )
         patch.setattr(session, "write_combined", lambda *_: written.append(1))
         with pytest.raises(Cancelled):
             render(life, 2, seed=1)
     assert not written
-    assert progress.current() is None
+    assert stages.current() is None
     np.testing.assert_array_equal(render(life, 2, seed=1).radiance, expected)
 
 

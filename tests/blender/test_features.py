@@ -240,7 +240,7 @@ def test_two_scenes_in_one_compositor(life: Any, network: Any, written: Any) -> 
     other.world = life.world
     other.render.resolution_x, other.render.resolution_y = 45, 33
     other.render.resolution_percentage = 100
-    other.render.engine, other.xrds.way = "XRDS", "x2"
+    other.render.engine, other.xrds.mode = "XRDS", "x2"
     other.cycles.samples, other.cycles.use_denoising = 2, False
     tree, end = compositor(life)
     layers = tree.nodes.new("CompositorNodeRLayers")
@@ -287,7 +287,7 @@ def test_a_graph_with_a_file_output_gives_what_it_gives_under_cycles(
     life: Any, network: Any, written: Any, load: Any, tmp_path: Path
 ) -> None:
     """Blur of the picture times its depth: the graph is the same under both."""
-    life.xrds.way = "plain"
+    life.xrds.mode = "cycles_only"
     life.view_layers[0].use_pass_z = True
     tree, end = compositor(life)
     layers = tree.nodes.new("CompositorNodeRLayers")
@@ -305,7 +305,7 @@ def test_a_graph_with_a_file_output_gives_what_it_gives_under_cycles(
         tree.nodes.remove(next(n for n in tree.nodes if n.type == "OUTPUT_FILE"))
     for cycles, ours in zip(*results.values(), strict=True):
         np.testing.assert_array_equal(ours, cycles)
-    life.xrds.way = "x2"
+    life.xrds.mode = "x2"
     tree.links.new(invert.outputs[0], file_output(tree, tmp_path / "enlarged"))
     composite = written(life)
     (path,) = (tmp_path / "enlarged").iterdir()

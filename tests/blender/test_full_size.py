@@ -74,7 +74,7 @@ def test_an_unknown_quality_is_named(life: Any) -> None:
 def channels(scene: Any, engine: str, path: Path) -> dict[str, np.ndarray]:
     """Every channel of a multilayer EXR that Blender writes."""
     scene.render.engine = engine
-    scene.xrds.way = "full_size"
+    scene.xrds.mode = "full_size"
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
@@ -124,7 +124,7 @@ def test_noisy_image_is_there_when_asked_for(life: Any, tmp_path: Path) -> None:
 
 
 def test_plain_is_cycles_to_the_bit(life: Any, written: Callable[..., Any]) -> None:
-    life.xrds.way = "plain"
+    life.xrds.mode = "cycles_only"
     np.testing.assert_array_equal(written(life), written(life, "CYCLES"))
 
 

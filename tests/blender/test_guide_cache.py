@@ -104,7 +104,7 @@ def test_more_samples_asked_for_are_rendered_beside_those_kept() -> None:
 def test_the_result_holds_data_passes_of_kept_guides(written: Any) -> None:
     """Not the low-resolution picture's, which was rendered alone."""
     scene = traps.trap("texture", 48, 36)
-    scene.xrds.way = "x4"
+    scene.xrds.mode = "x4"
     written(scene)
     seen: list[np.ndarray] = []
 

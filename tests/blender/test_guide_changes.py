@@ -20,8 +20,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from guides import deeds, settings, stage
-from xrds_blender.choosing.facts import find_facts
 
+from xrds_blender.choosing.plan_facts import find_facts
 from xrds_blender.cycles import passes as cycles_passes
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.frame import guide_cache

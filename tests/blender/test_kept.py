@@ -63,7 +63,7 @@ def render(blend: Path, out: str | None, frames: Any, **more: Any) -> dict[str, 
 
 
 def keep(blend: Path, frames: Any, **more: Any) -> dict[str, Any]:
-    return render(blend, None, frames, keep_samples=blend.parent / "samples", **more)
+    return render(blend, None, frames, sample_cache=blend.parent / "samples", **more)
 
 
 def denoise(blend: Path, out: str, frames: Any = None, **more: Any) -> dict[str, Any]:
@@ -103,7 +103,7 @@ def test_parts_of_a_shot_make_the_whole(
         assert told["rendered"] == list(chunk)
     monkeypatch.setattr(full_size, "sample_frame", None)  # nothing is rendered any more
     assert keep(blend, FRAMES)["samples"]["read"] == list(FRAMES)
-    render(blend, "read", FRAMES, keep_samples=folder / "samples")
+    render(blend, "read", FRAMES, sample_cache=folder / "samples")
     denoise(blend, "denoised")
     for chunk in CHUNKS:
         denoise(blend, "denoised chunks", chunk)
@@ -224,7 +224,7 @@ def test_a_killed_render_is_resumed(blend: Path) -> None:
     frames = range(1, 13)
     render(blend, "whole", frames)
     words = f"render {blend} -o {folder}/out/##.exr --scale 1 --frames 1-12 --resume"
-    words += f" --keep-samples {folder}/samples --temporal-radius 2 --denoise fast"
+    words += f" --sample-cache {folder}/samples --temporal-radius 2 --denoise fast"
     code = "import sys, xrds_blender.command.main as m; m.program()"
     child = subprocess.Popen(
         [sys.executable, "-c", code, *words.split()],
@@ -263,7 +263,7 @@ def test_a_failed_frame_is_rendered_again_by_itself(blend: Path) -> None:
 
 def test_samples_come_from_beyond_a_chunk(blend: Path) -> None:
     keep(blend, [3, 4])
-    told = render(blend, "out", [5, 6], keep_samples=blend.parent / "samples")
+    told = render(blend, "out", [5, 6], sample_cache=blend.parent / "samples")
     assert told["frames"][0]["temporal"]["frames"] == (3, 4, 5, 6)
     assert told["samples"]["rendered"] == [5, 6]
 
@@ -274,7 +274,7 @@ def test_samples_come_from_beyond_a_chunk(blend: Path) -> None:
     ids=str,
 )
 def test_what_keeps_no_samples(blend: Path, more: dict[str, Any]) -> None:
-    with pytest.raises(UsageError, match="--keep-samples needs"):
+    with pytest.raises(UsageError, match="--sample-cache needs"):
         keep(blend, [1], job=more)
 
 
@@ -287,7 +287,7 @@ def test_a_fisheye_keeps_no_samples(blend: Path) -> None:
 
 def test_the_command(blend: Path, capfd: pytest.CaptureFixture[str]) -> None:
     folder = blend.parent
-    words = f"render {blend} --scale 1 --frame 2 --keep-samples {folder}/samples"
+    words = f"render {blend} --scale 1 --frame 2 --sample-cache {folder}/samples"
     assert main.main(words.split()) == 0
     out, err = capfd.readouterr()
     assert f"{folder}/samples: samples of 1 frames rendered, 0 were there" in out

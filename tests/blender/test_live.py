@@ -25,7 +25,7 @@ def test_a_watched_render_is_the_same(
     settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
     life.cycles.use_denoising = True
     life.view_layers[0].cycles.use_denoising = True
-    life.render.engine, life.xrds.way = "XRDS", way
+    life.render.engine, life.xrds.mode = "XRDS", way
 
     def render(name: str, watched: bool) -> dict[str, np.ndarray]:
         monkeypatch.setattr(session, "_is_watched", lambda: watched)

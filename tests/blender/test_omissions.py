@@ -10,9 +10,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
-from xrds_blender.choosing.facts import find_facts
-
 from xrds_blender import run_job
+from xrds_blender.choosing.plan_facts import find_facts
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import plan

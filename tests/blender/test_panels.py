@@ -11,10 +11,10 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-from xrds_blender.planning.modes import Means, Way
 
 import xrds_blender
-from xrds_blender.frame import history, progress
+from xrds_blender.choosing import history
+from xrds_blender.frame import stages
 from xrds_blender.interface import (
     cycles_panels,
     machine,
@@ -30,8 +30,9 @@ from xrds_blender.interface import (
     translations,
 )
 from xrds_blender.internals.lifetimes import FILE, PROCESS
-from xrds_blender.planning import ways
-from xrds_blender.planning.settings import Network
+from xrds_blender.planning import estimates
+from xrds_blender.planning.estimates import Capabilities
+from xrds_blender.planning.settings import Mode, Network
 
 
 @pytest.fixture(autouse=True)
@@ -95,7 +96,7 @@ def test_unregister_takes_everything_back() -> None:
     assert hasattr(bpy.types, "XRDS_PT_settings")
 
 
-ALL = Means(True, True, True, frozenset({Network("fast", 2)}))
+ALL = Capabilities(True, True, True, frozenset({Network("fast", 2)}))
 
 
 class Layout:
@@ -163,12 +164,12 @@ def test_a_new_scene_says_which_way_it_takes() -> None:
     ("way", "named"),
     [
         ("full_size", {"denoise", "temporal_radius", "Samples"}),
-        ("x2", {"Samples per Small Pixel", "guide_samples", "use_exposure"}),
-        ("plain", {"Samples", "Plain"}),
+        ("x2", {"Low-Resolution Samples", "guide_samples", "use_exposure"}),
+        ("cycles_only", {"Samples", "Cycles Only"}),
     ],
 )
 def test_each_way_shows_its_own_settings(way: str, named: set[str]) -> None:
-    bpy.context.scene.xrds.way = way
+    bpy.context.scene.xrds.mode = way
     told = set(drawn())
     assert named <= told
     assert "use_time_budget" not in told
@@ -180,10 +181,10 @@ def test_other_networks_are_offered_where_their_weights_are(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     settings = bpy.context.scene.xrds
-    settings.way = "x2"
+    settings.mode = "x2"
     known = frozenset({Network("fast", 2), Network("paper", 2)})
-    at_hand = Means(True, True, True, known)
-    monkeypatch.setattr(panels, "means", lambda _: at_hand)
+    at_hand = Capabilities(True, True, True, known)
+    monkeypatch.setattr(panels, "capabilities", lambda _: at_hand)
     told = drawn()
     assert {"fast", "paper"} <= set(told)
     assert "balanced" not in told
@@ -195,8 +196,8 @@ def test_a_time_budget_leaves_way_and_samples_open() -> None:
     settings = bpy.context.scene.xrds
     settings.use_time_budget, settings.time_budget = True, 90.0
     assert drawn(panels.XRDS_PT_settings)[0] == "Automatic (within 90 s)"
-    assert rows(bpy.context.scene)["About"] == "known after a first render"
-    settings.way = "full_size"
+    assert rows(bpy.context.scene)["Expected Settings"] == "known after a first render"
+    settings.mode = "full_size"
     assert "within" not in " ".join(drawn(panels.XRDS_PT_settings)[1:])
 
 
@@ -209,23 +210,23 @@ def test_the_table_tells_seconds_after_a_render() -> None:
     scene.render.engine = "XRDS"
     bpy.ops.render.render()
     told = drawn(panels.XRDS_PT_settings)
-    assert "About" in told
+    assert "Estimated Time" in told
     row = told.index("Full Size")
     assert told[row + 1].endswith(" s")
     last = dict(summary.last_render(history.last(scene)))
-    assert last["Way"] == "Full Size, 1 sample"
+    assert last["Mode"] == "Full Size, 1 sample"
     assert "Total" in last
     assert "Samples and Denoising" not in last
     settings = scene.xrds
-    settings.way, settings.use_time_budget = "automatic", True
+    settings.mode, settings.use_time_budget = "automatic", True
     settings.time_budget = 1e5
-    assert rows(scene)["About"].endswith("16384 samples")
+    assert rows(scene)["Expected Settings"].endswith("16384 samples")
     bpy.ops.wm.read_factory_settings()
     assert history.last(bpy.context.scene) is None
 
 
 def rows(scene: object) -> dict[str, str]:
-    return dict(summary.next_render(scene, properties.job_of(scene.xrds), ALL))
+    return dict(summary.next_render(scene, properties.request_of(scene.xrds), ALL))
 
 
 @pytest.mark.parametrize(("scale", "low"), [("2", "683x384"), ("8", "171x96")])
@@ -233,11 +234,11 @@ def test_summary_tells_the_small_size(scale: str, low: str) -> None:
     scene = bpy.context.scene
     scene.render.resolution_x, scene.render.resolution_y = 1366, 768
     scene.render.resolution_percentage = 100
-    scene.xrds.way = f"x{scale}"
+    scene.xrds.mode = f"x{scale}"
     told = rows(scene)
-    assert told["Small Picture"].startswith(low.replace("x", " × "))
+    assert told["Low Resolution"].startswith(low.replace("x", " × "))
     assert told["Guides"] == "1366 × 768, 2 samples"
-    assert "mirrors in the guides" in told["Left Out"]
+    assert "mirrors in the guides" in told["Skipped"]
     assert told["Memory"].endswith(" MB")
     scene.render.resolution_x, scene.render.resolution_y = 3840, 2160
     large = rows(scene)["Memory"]
@@ -247,33 +248,35 @@ def test_summary_tells_the_small_size(scale: str, low: str) -> None:
 def test_no_way_takes_more_than_five_rows() -> None:
     scene = bpy.context.scene
     scene.render.use_motion_blur = True
-    for way in Way:
-        scene.xrds.way = way
+    for mode in Mode:
+        scene.xrds.mode = mode
         assert 2 <= len(rows(scene)) <= summary.MOST_ROWS
     assert "DEFAULT_CLOSED" in panels.XRDS_PT_forecast.bl_options
 
 
-def remarks_of(at_hand: Means) -> list[tuple[str, str]]:
+def remarks_of(at_hand: Capabilities) -> list[tuple[str, str]]:
     scene = bpy.context.scene
-    return remarks.remarks(scene, properties.job_of(scene.xrds), at_hand)
+    return remarks.remarks(scene, properties.request_of(scene.xrds), at_hand)
 
 
 def test_panel_says_what_is_missing() -> None:
     scene = bpy.context.scene
-    scene.xrds.way = "x2"
-    assert ("ERROR", ways.TORCH_IS_MISSING) in remarks_of(replace(ALL, torch=False))
+    scene.xrds.mode = "x2"
+    assert ("ERROR", estimates.TORCH_IS_MISSING) in remarks_of(
+        replace(ALL, torch=False)
+    )
     scene.view_layers[0].use_pass_glossy_direct = True
     noisy = replace(ALL, denoiser=False, cycles_denoiser=False)
     told = remarks_of(noisy)
     assert ("ERROR", remarks.NOISY_INPUT) in told
     assert any("Light passes" in text for _, text in told)
-    scene.xrds.way = "x4"
-    assert ("ERROR", ways.WEIGHTS_ARE_MISSING) in remarks_of(ALL)
-    scene.xrds.way = "full_size"
-    assert remarks_of(noisy)[0] == ("ERROR", ways.LIBRARY_IS_MISSING)
-    scene.xrds.way, scene.cycles.use_denoising = "plain", True
+    scene.xrds.mode = "x4"
+    assert ("ERROR", estimates.WEIGHTS_ARE_MISSING) in remarks_of(ALL)
+    scene.xrds.mode = "full_size"
+    assert remarks_of(noisy)[0] == ("ERROR", estimates.LIBRARY_IS_MISSING)
+    scene.xrds.mode, scene.cycles.use_denoising = "cycles_only", True
     assert remarks_of(noisy)[0] == ("ERROR", remarks.CYCLES_CANNOT_DENOISE)
-    scene.xrds.way, scene.xrds.use_time_budget = "automatic", True
+    scene.xrds.mode, scene.xrds.use_time_budget = "automatic", True
     assert remarks_of(noisy)[0] == ("ERROR", remarks.NO_BUDGET)
 
 
@@ -285,8 +288,8 @@ def test_other_denoising_passes_are_warned_of_above_scale_one(
         remarks, "bpy", SimpleNamespace(app=SimpleNamespace(version=version))
     )
     settings = bpy.context.scene.xrds
-    for way in ("x2", "full_size", "plain"):
-        settings.way = way
+    for way in ("x2", "full_size", "cycles_only"):
+        settings.mode = way
         told = ("ERROR", remarks.OTHER_PASSES) in remarks_of(ALL)
         assert told == (warns and way == "x2")
 
@@ -316,8 +319,8 @@ def test_job_takes_the_preferences(monkeypatch: pytest.MonkeyPatch) -> None:
     here = machine.Machine("cuda:1", 1 << 30, Path("folder"))
     monkeypatch.setattr(properties, "machine", lambda: here)
     settings = bpy.context.scene.xrds
-    job = properties.job_of(settings)
-    assert (job.device, job.memory_limit, job.weights) == (
+    found = properties.request_of(settings).machine
+    assert (found.device, found.memory_limit, found.weights) == (
         here.device,
         here.memory_limit,
         here.weights,
@@ -330,7 +333,7 @@ def test_operator_keeps_the_engine() -> None:
     scene.render.resolution_x = scene.render.resolution_y = 16
     scene.cycles.samples = 1
     scene.cycles.use_denoising = False  # plain fails as Cycles does without OIDN
-    scene.xrds.way = "plain"
+    scene.xrds.mode = "cycles_only"
     assert bpy.ops.xrds.render() == {"FINISHED"}
     assert scene.render.engine == "CYCLES"
 
@@ -382,7 +385,7 @@ def test_self_test_tells_what_is_wrong(
 
 def test_status_bar_tells_the_stage(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        PROCESS.of(progress.Speeds), "seconds", {}
+        PROCESS.of(stages.Speeds), "seconds", {}
     )  # measured by no render before
     told: list[str] = []
     shown: list[float] = []
@@ -396,17 +399,17 @@ def test_status_bar_tells_the_stage(monkeypatch: pytest.MonkeyPatch) -> None:
     text = ctypes.create_string_buffer(1024)  # as Blender keeps an engine's status
     engine = running_engine(text, shown)
     status_bar.draw(Bar, None)
-    progress.begin(engine, progress.LOW, 1)
+    stages.begin(engine, stages.LOW, 1)
     status_bar.draw(Bar, None)
     text[64:82] = b"Mem | Sample 12/64"
     time.sleep(0.05)
     status_bar.draw(Bar, None)
-    progress.begin(engine, progress.NETWORK, 3)
+    stages.begin(engine, stages.NETWORK, 3)
     for done in (0.25, 0.75):
         time.sleep(0.05)
-        progress.reporter(engine)(done)
+        stages.reporter(engine)(done)
         status_bar.draw(Bar, None)
-    progress.end()
+    stages.end()
     status_bar.draw(Bar, None)
     assert told[0] == "XRDS 1/3: Low resolution"
     assert re.fullmatch(r"XRDS 1/3: Low resolution, \d:\d\d left", told[1])
@@ -459,14 +462,14 @@ def running_engine(text: object, shown: list[float]) -> SimpleNamespace:
 
 
 def test_the_status_bar_tells_the_frames_left(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(PROCESS.of(progress.Speeds), "seconds", {})
+    monkeypatch.setattr(PROCESS.of(stages.Speeds), "seconds", {})
     engine = running_engine(ctypes.create_string_buffer(1024), [])
-    progress.begin_frame(12, 36, 754.0)
-    progress.begin(engine, "Samples", 1, 2)
-    assert progress.current() == "Frame 12 (36 left, about 13 min). XRDS 1/2: Samples"
-    progress.end()
-    assert progress.current() is None
-    progress.begin_frame(48, 0)
-    progress.begin(engine, "Samples", 1, 2)
-    assert progress.current() == "Frame 48 (the last one). XRDS 1/2: Samples"
-    progress.end()
+    stages.begin_frame(12, 36, 754.0)
+    stages.begin(engine, "Samples", 1, 2)
+    assert stages.current() == "Frame 12 (36 left, about 13 min). XRDS 1/2: Samples"
+    stages.end()
+    assert stages.current() is None
+    stages.begin_frame(48, 0)
+    stages.begin(engine, "Samples", 1, 2)
+    assert stages.current() == "Frame 48 (the last one). XRDS 1/2: Samples"
+    stages.end()

@@ -17,15 +17,15 @@ from xrds_blender.frame.picture import Picture
 from xrds_blender.planning.plan import Decision
 from xrds_blender.planning.request import request
 
-NAMES = ("version", "way", "scale", "preset", "samples", "device", "seconds")
+NAMES = ("version", "mode", "scale", "preset", "samples", "device", "seconds")
 
 
 @pytest.fixture
 def metadata(life: Any, tmp_path: Path) -> Any:
     """Text and float fields that Blender writes into a PNG."""
 
-    def render(way: str) -> dict[str, str]:
-        life.render.engine, life.xrds.way = "XRDS", way
+    def render(mode: str) -> dict[str, str]:
+        life.render.engine, life.xrds.mode = "XRDS", mode
         life.render.image_settings.file_format = "PNG"
         life.render.filepath = str(tmp_path / "frame.png")
         bpy.ops.render.render(write_still=True)
@@ -48,8 +48,8 @@ def texts(png: bytes) -> dict[str, str]:
 @pytest.mark.parametrize(
     ("way", "told"),
     [
-        ("x2", {"way": "super-resolution", "scale": "2", "preset": "fast"}),
-        ("full_size", {"way": "full size", "scale": "1", "preset": "high"}),
+        ("x2", {"mode": "super-resolution", "scale": "2", "preset": "fast"}),
+        ("full_size", {"mode": "full size", "scale": "1", "preset": "high"}),
     ],
 )
 def test_blenders_files_tell_what_made_them(
@@ -81,7 +81,7 @@ def test_the_log_has_one_line_a_frame_and_few_others(
     for word in ("super-resolution", "samples 2", "scale 2"):
         assert word in line
     assert len(lines) <= 6
-    assert any("Light passes are those of the small" in each for each in lines)
+    assert any("Light passes are those of the low-resolution" in each for each in lines)
 
 
 def test_what_was_left_out_is_named() -> None:
@@ -92,8 +92,8 @@ def test_what_was_left_out_is_named() -> None:
         Decision("guide cache", "used 4 samples", ""),
     )
     picture = Picture(None, None, plan=plan, device="cpu", seconds={"total": 1.26})
-    told = record.fields(picture, request(scale=4), 16)
-    assert told["left_out"] == "motion blur, guides, kept from before"
+    told = record.fields(picture, request(scale=4).settings, 16)
+    assert told["left_out"] == "motion blur, guides, from the cache"
     assert told["guide_samples"] == "2"
     assert told["seconds"] == "1.3"
     line = record.line(told, 7, "Main")
@@ -117,7 +117,7 @@ def test_the_commands_files_tell_what_made_them(
     else:
         found = library.read(output)[0].attributes
     told = {name: found[f"xrds.{name}"] for name in (*NAMES, "left_out")}
-    assert (told["way"], told["scale"], told["samples"]) == ("full size", "1", "3")
+    assert (told["mode"], told["scale"], told["samples"]) == ("full size", "1", "3")
 
 
 def test_text_beyond_latin_is_kept(tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ def test_text_beyond_latin_is_kept(tmp_path: Path) -> None:
 
     path = tmp_path / "one.png"
     image.new("RGB", (3, 2)).save(path)
-    png_text.add(path, {"xrds.way": "フルサイズ", "xrds.scale": "1"})
+    png_text.add(path, {"xrds.mode": "フルサイズ", "xrds.scale": "1"})
     with image.open(path) as opened:
         opened.load()
-        assert opened.text == {"xrds.way": "フルサイズ", "xrds.scale": "1"}
+        assert opened.text == {"xrds.mode": "フルサイズ", "xrds.scale": "1"}

@@ -180,7 +180,7 @@ def test_a_plan_is_told_and_nothing_is_rendered(folder: Path) -> None:
         assert set(each) == {"decision", "value", "reason", "saving_seconds"}
     assert "Sample" not in done.stderr
     files = set(folder.iterdir())
-    explained = xrds(folder, "render scene.blend --explain --keep-all")
+    explained = xrds(folder, "render scene.blend --explain --skip-nothing")
     assert explained.returncode == 0, explained.stderr
     assert "guide lights: all" in explained.stdout
     assert set(folder.iterdir()) == files

@@ -14,7 +14,7 @@ bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
 from xrds_blender import run_job
-from xrds_blender.choosing.chosen import ChosenJob
+from xrds_blender.choosing.chosen import Chosen
 from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
@@ -112,7 +112,7 @@ def test_no_two_frames_have_the_same_noise(blend: Path) -> None:
     job = request(scale=1, temporal_radius=1)
     pictures = [p for _, p in shot.render_shot(scene, job, [1, 2])]
     assert pictures[0].temporal.mean_samples == pytest.approx(2.0, abs=0.05)
-    method = engine_shots.method_of(ChosenJob(job))
+    method = engine_shots.method_of(Chosen(job))
     first, second = (
         call_engine(scene, method.sample).views[""].picture[:, :3].astype(np.float32)
         for _ in map(scene.frame_set, (1, 2))
@@ -180,10 +180,10 @@ def test_a_cancelled_shot_keeps_the_frames_before(
     ],
 )
 def test_the_radius_by_default(line: str, radius: int) -> None:
-    from xrds_blender.command.options import job_of
+    from xrds_blender.command.options import request_of
 
     words = ["render", "a.blend", "-o", "b_#.exr", *line.split()]
-    assert job_of(main._parser(words).parse_args(words)).temporal_radius == radius
+    assert request_of(main._parser(words).parse_args(words)).temporal_radius == radius
 
 
 def test_a_radius_that_cannot_be_is_refused(capfd: pytest.CaptureFixture[str]) -> None:
@@ -201,7 +201,7 @@ def animation(blend: Path) -> Any:
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     scene = bpy.context.scene
     scene.render.engine = "XRDS"
-    scene.xrds.way, scene.xrds.temporal_radius = "full_size", 2
+    scene.xrds.mode, scene.xrds.temporal_radius = "full_size", 2
     scene.frame_start, scene.frame_end = 1, 5
     scene.view_layers[0].use_pass_normal = True
     settings = scene.render.image_settings
@@ -393,7 +393,7 @@ def test_equirectangular_frames_lend_by_direction(blend: Path) -> None:
         scene.camera.rotation_euler.z = 0.05 * frame
         scene.camera.keyframe_insert("rotation_euler", frame=frame)
     job = request(scale=1, samples=16, temporal_radius=1)
-    method = engine_shots.method_of(ChosenJob(job))
+    method = engine_shots.method_of(Chosen(job))
     here, there = (
         call_engine(scene, method.sample).views[""]
         for _ in map(scene.frame_set, (1, 4))

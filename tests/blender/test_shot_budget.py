@@ -14,26 +14,25 @@ from channels import read_channels
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
+from xrds_blender.choosing import chosen, probing
 from xrds_blender.command.render_file import render_file
-from xrds_blender.frame import picking
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
-from xrds_blender.planning.budget import Choice, Costs, Curve, ErrorModel
+from xrds_blender.planning.budget import Costs, Curve, ErrorModel
 from xrds_blender.planning.request import request
-from xrds_blender.planning.settings import Denoising
+from xrds_blender.planning.settings import Denoising, Mode, Settings
 from xrds_blender.shot.explain import explain
 
 FRAMES = [1, 2, 3]
-FULL = Choice(Denoising.XRDS_FAST, 0)
-LOW = Choice(Denoising.HIGH_FAST, 0, 4, "fast", "fast", 1)
-FULL_GUIDES = replace(LOW, guides="full")
+FULL = Settings(Mode.FULL_SIZE, None, Denoising.XRDS_FAST).family
+LOW = Settings(Mode.X4, None, Denoising.HIGH_FAST, "fast", 1)
 # So dear that two samples are many: no test depends on how busy the machine is.
 COSTS = Costs(
     fixed=1.0,
     beauty=100.0,
     guide=10.0,
     denoise=dict.fromkeys(Denoising, 10.0),
-    network={LOW.network: 1.0, FULL_GUIDES.network: 1.0},
+    network={LOW.network: 1.0},
 )
 
 
@@ -46,9 +45,9 @@ def probed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         numbers.append(passes._depsgraph.scene_eval.frame_current)
         return COSTS
 
-    monkeypatch.setattr(picking, "probe", probe)
-    monkeypatch.setattr(picking, "with_guides", lambda costs, _: costs)
-    monkeypatch.setattr(picking, "network_seconds_per_pixel", lambda *_: 1e-6)
+    monkeypatch.setattr(chosen, "probe", probe)
+    monkeypatch.setattr(chosen, "with_guides", lambda costs, _: costs)
+    monkeypatch.setattr(probing, "network_seconds_per_pixel", lambda *_: 1e-6)
     return numbers
 
 
@@ -56,7 +55,7 @@ def probed(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def best(monkeypatch: pytest.MonkeyPatch, probed: list[int]) -> Callable[..., None]:
     """Let one family be the best, whatever it costs."""
 
-    def leave(family: Choice) -> None:
+    def leave(family: Settings) -> None:
         psnr = dict.fromkeys((FULL, LOW), 20.0) | {family: 40.0}
         curves = {c: Curve((1, 16), (p - 4, p)) for c, p in psnr.items()}
         speed = dict.fromkeys(COSTS.network, 0.1)
@@ -64,7 +63,7 @@ def best(monkeypatch: pytest.MonkeyPatch, probed: list[int]) -> Callable[..., No
             budget.shipped(), errors=ErrorModel(curves), network_speed=speed
         )
         monkeypatch.setattr(budget, "shipped", lambda: model)
-        monkeypatch.setattr(picking, "known_networks", lambda _: tuple(COSTS.network))
+        monkeypatch.setattr(chosen, "_networks", lambda _: tuple(COSTS.network))
 
     leave(FULL)
     return leave
@@ -76,13 +75,13 @@ def rendered(blend: Path, radius: int = 1, **more: Any) -> dict[str, Any]:
     return render_file(blend, frames, job, frames=FRAMES, resume=True)
 
 
-def test_a_shot_is_probed_once_and_lends(
+def test_a_shot_is_probed_once_and_reused(
     blend: Path, probed: list[int], best: Callable[..., None]
 ) -> None:
     result = rendered(blend)
     assert probed == [1]
-    lent = [frame["temporal"]["frames"] for frame in result["frames"]]
-    assert lent == [(1, 2), (1, 2, 3), (2, 3)]
+    reused = [frame["temporal"]["frames"] for frame in result["frames"]]
+    assert reused == [(1, 2), (1, 2, 3), (2, 3)]
     first, *rest = result["plan"]
     assert first["decision"] == "time budget"
     assert first["value"] == "full size, 2 samples, fast denoising"
@@ -94,7 +93,7 @@ def test_a_shot_is_probed_once_and_lends(
     assert result["kept"] == FRAMES
 
 
-def test_frames_of_super_resolution_lend_as_well(
+def test_frames_of_super_resolution_are_reused_as_well(
     blend: Path, probed: list[int], best: Callable[..., None]
 ) -> None:
     best(LOW)
@@ -112,7 +111,7 @@ def test_an_animation_is_the_shot_of_the_command(
     scene.render.engine = "XRDS"
     scene.frame_start, scene.frame_end = 1, 3
     settings = scene.xrds
-    settings.way, settings.temporal_radius = "automatic", 1
+    settings.mode, settings.temporal_radius = "automatic", 1
     settings.use_time_budget, settings.time_budget = True, 300.0
     image = scene.render.image_settings
     image.file_format, image.color_depth = "OPEN_EXR", "32"
@@ -128,7 +127,7 @@ def test_an_animation_is_the_shot_of_the_command(
             np.testing.assert_allclose(ours[name], theirs[name], atol=2e-3)
 
 
-def test_each_frame_is_chosen_for_where_none_lends(
+def test_each_frame_is_chosen_for_where_none_is_reused(
     blend: Path, probed: list[int], best: Callable[..., None]
 ) -> None:
     assert rendered(blend, radius=0)["frames"][1]["temporal"] is None

@@ -188,7 +188,7 @@ def animation(moving: Path) -> Any:
     bpy.ops.wm.open_mainfile(filepath=str(moving))
     scene = bpy.context.scene
     scene.render.engine = "XRDS"
-    scene.xrds.way, scene.xrds.temporal_radius = "x2", 2
+    scene.xrds.mode, scene.xrds.temporal_radius = "x2", 2
     scene.xrds.guide_samples = 1
     scene.frame_start, scene.frame_end = 1, 5
     scene.view_layers[0].use_pass_diffuse_direct = True

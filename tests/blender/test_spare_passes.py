@@ -31,7 +31,7 @@ def multilayer(life: Any, tmp_path: Path, stereo: bool) -> Any:
     life.render.use_multiview = stereo
 
     def render(engine: str, way: str) -> dict[str, np.ndarray]:
-        life.render.engine, life.xrds.way = engine, way
+        life.render.engine, life.xrds.mode = engine, way
         bpy.ops.render.render(write_still=True)
         (path,) = tmp_path.glob("*_L.exr") if stereo else tmp_path.glob("*.exr")
         return read_channels(path)
@@ -57,7 +57,7 @@ def test_an_animation_leaves_none_either(life: Any, tmp_path: Path) -> None:
     if hasattr(settings, "media_type"):
         settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format = "OPEN_EXR_MULTILAYER"
-    life.render.engine, life.xrds.way = "XRDS", "full_size"
+    life.render.engine, life.xrds.mode = "XRDS", "full_size"
     life.frame_start, life.frame_end = 1, 3
     life.cycles.use_denoising = False
     life.render.filepath = str(tmp_path / "f")

@@ -121,10 +121,10 @@ def test_a_flamenco_shot_renders_apart_and_is_denoised_as_one() -> None:
     renders, denoised = asked[:5], asked[5:]
     for each in renders:
         assert (each.command, each.scale, each.out) == ("render", 1, None)
-        assert each.keep_samples == Path("/out/samples")
+        assert each.sample_cache == Path("/out/samples")
     assert [each.frames[0] for each in renders] == [1, 5, 9, 13, 17]
     for each in denoised:
-        assert each.source == f"{renders[0].keep_samples}/####.exr"
+        assert each.source == f"{renders[0].sample_cache}/####.exr"
         assert each.out == "/out/######.exr"
         assert each.picture_only
         assert each.temporal_radius == renders[0].temporal_radius == 3
@@ -166,7 +166,7 @@ def test_an_open_job_shot_runs_in_chunks(tmp_path: Path) -> None:
     for each in (asked[:2], asked[2:]):
         assert [x.frames[0] for x in each] == [1, 11]
         assert [n for x in each for n in x.frames] == list(range(1, 21))
-    assert asked[0].keep_samples == tmp_path / "samples"
+    assert asked[0].sample_cache == tmp_path / "samples"
     assert asked[2].source == f"{tmp_path}/samples/####.exr"
 
 

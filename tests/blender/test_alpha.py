@@ -11,12 +11,11 @@ import pytest
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
-from xrds_blender.frame.cover import cover
-
 from xrds_blender import render, run_job
 from xrds_blender.cycles.rendered import Guides
 from xrds_blender.frame import denoisers
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import Machine
+from xrds_blender.shot.enlarging import clean_alpha
 
 SIDE = 96
 
@@ -42,7 +41,7 @@ def error(alpha: np.ndarray) -> float:
 
 def test_noise_goes_and_edges_stay() -> None:
     guides = guides_of(scene())
-    found = cover(guides, request())
+    found = clean_alpha(guides, Machine())
     assert found.dtype == np.float32
     assert error(found) < 0.6 * error(guides.alpha)
     assert 0.0 <= found.min() <= found.max() <= 1.0
@@ -55,7 +54,7 @@ def test_noise_goes_and_edges_stay() -> None:
 def test_what_has_no_noise_stays_as_it_is(alpha: np.ndarray) -> None:
     samples = 4 if alpha.min() == 1.0 else None
     guides = guides_of(alpha, samples)
-    assert cover(guides, request()) is guides.alpha
+    assert clean_alpha(guides, Machine()) is guides.alpha
 
 
 def test_the_network_gets_it(life: Any, network: Any) -> None:
@@ -67,7 +66,7 @@ def test_the_network_gets_it(life: Any, network: Any) -> None:
     (call,) = network[0].calls
     assert np.abs(call["guide_alpha"] - raw).max() > 0.0
     np.testing.assert_array_equal(
-        call["guide_alpha"], cover(guides_like(raw), request())
+        call["guide_alpha"], clean_alpha(guides_like(raw), Machine())
     )
 
 
@@ -80,4 +79,4 @@ def test_without_the_library_it_stays_as_it_is(monkeypatch: Any) -> None:
     denoisers._load.cache_clear()
     monkeypatch.setitem(sys.modules, "mitsuba_oidn", None)
     guides = guides_of(scene())
-    assert cover(guides, request()) is guides.alpha
+    assert clean_alpha(guides, Machine()) is guides.alpha

@@ -11,19 +11,19 @@ from typing import Any
 import pytest
 
 from xrds_blender import render, run_job
+from xrds_blender.choosing import chosen, probing
 from xrds_blender.cycles import session
-from xrds_blender.frame import picking
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
-from xrds_blender.planning.request import request
-from xrds_blender.planning.settings import Denoising
+from xrds_blender.planning.request import Goal, request
+from xrds_blender.planning.settings import Denoising, Mode, Settings
 from xrds_blender.shot.explain import explain
 from xrds_core.errors import UsageError, XRDSError
 
-XRDS = budget.Choice(Denoising.HIGH_FAST, 0, 4, "fast", "fast", 1)
-PLAIN = budget.Choice(Denoising.FAST_FAST, 0)
-FULL = budget.Choice(Denoising.XRDS_FAST, 0)
-BEST = budget.Choice(Denoising.XRDS_BEST, 0)
+XRDS = Settings(Mode.X4, None, Denoising.HIGH_FAST, "fast", 1)
+PLAIN = Settings(Mode.CYCLES_ONLY, None, Denoising.FAST_FAST).family
+FULL = Settings(Mode.FULL_SIZE, None, Denoising.XRDS_FAST).family
+BEST = Settings(Mode.FULL_SIZE, None, Denoising.XRDS_BEST).family
 
 
 # So dear that four samples are many: no test depends on how busy the machine is.
@@ -49,10 +49,10 @@ def only(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
         errors = budget.ErrorModel(curves)
         model = replace(budget.shipped(), errors=errors)
         monkeypatch.setattr(budget, "shipped", lambda: model)
-        monkeypatch.setattr(picking, "_denoisers", lambda: tuple(Denoising))
-        monkeypatch.setattr(picking, "probe", lambda *_: COSTS)
-        monkeypatch.setattr(picking, "with_guides", lambda costs, _: costs)
-        monkeypatch.setattr(picking, "network_seconds_per_pixel", lambda *_: 1e-6)
+        monkeypatch.setattr(chosen, "_denoising", lambda: tuple(Denoising))
+        monkeypatch.setattr(chosen, "probe", lambda *_: COSTS)
+        monkeypatch.setattr(chosen, "with_guides", lambda costs, _: costs)
+        monkeypatch.setattr(probing, "network_seconds_per_pixel", lambda *_: 1e-6)
 
     return leave
 
@@ -62,8 +62,8 @@ def test_probes_measure_the_scene(still_life: Callable[..., Any]) -> None:
     start = time.perf_counter()
 
     def probe(passes: Any) -> tuple[budget.Costs, budget.Costs]:
-        costs = picking.probe(passes, budget.shipped(), networks, start)
-        return costs, picking.with_guides(costs, passes)
+        costs = probing.probe(passes, budget.shipped(), networks, start)
+        return costs, probing.with_guides(costs, passes)
 
     costs, true = run_job(still_life(400, 300), probe)
     assert min(costs.fixed, costs.beauty, true.guide) > 0
@@ -81,7 +81,7 @@ def test_a_sample_is_never_for_nothing() -> None:
         def beauty(self, *_: Any, **__: Any) -> Any:
             return SimpleNamespace(seconds={"beauty": 0.02})
 
-    assert picking._sample_seconds(Passes(), 4) > 0.0
+    assert probing._sample_seconds(Passes(), 4) > 0.0
 
 
 def test_guides_are_timed_only_where_super_resolution_may_win(
@@ -96,12 +96,14 @@ def test_guides_are_timed_only_where_super_resolution_may_win(
         return replace(costs, guide=500.0)
 
     only(xrds=20.0, plain=40.0)
-    monkeypatch.setattr(picking, "with_guides", with_guides)
-    assert render(still_life(64, 48), time_budget=500.0).job.plain
+    monkeypatch.setattr(chosen, "with_guides", with_guides)
+    assert render(still_life(64, 48), time_budget=500.0).settings.is_cycles_only
     assert not timed
     only(xrds=40.0, plain=20.0)
-    monkeypatch.setattr(picking, "with_guides", with_guides)
-    assert render(still_life(64, 48), time_budget=500.0).job.plain  # too dear in truth
+    monkeypatch.setattr(chosen, "with_guides", with_guides)
+    assert render(
+        still_life(64, 48), time_budget=500.0
+    ).settings.is_cycles_only  # too dear in truth
     assert len(timed) == 1
 
 
@@ -114,9 +116,9 @@ def test_plan_tells_what_was_chosen_and_why(
     assert decision.decision == "time budget"
     assert decision.value.startswith("fast x4")
     assert "dB expected in" in decision.reason
-    assert "best plain for 500 s" in decision.reason
-    assert not picture.job.is_picked
-    assert (picture.job.scale, picture.job.guide_samples) == (4, 1)
+    assert "best Cycles only for 500 s" in decision.reason
+    settings = picture.settings
+    assert (settings.mode, settings.guide_samples) == (Mode.X4, 1)
     assert picture.radiance.shape == (96, 160, 3)
     assert picture.low_resolution.shape == (24, 40, 3)
     assert picture.seconds["network"] > 0
@@ -127,10 +129,10 @@ def test_plain_is_rendered_where_it_is_better(
 ) -> None:
     only(xrds=20.0, plain=40.0)
     picture = render(still_life(160, 96), time_budget=500.0)
-    assert picture.job.plain
-    assert picture.job.samples == 4
+    assert picture.settings.is_cycles_only
+    assert picture.settings.samples == 4
     assert picture.low_resolution is None
-    assert picture.plan[0].value.startswith("plain")
+    assert picture.plan[0].value.startswith("Cycles only")
     assert "best super-resolution" in picture.plan[0].reason
 
 
@@ -139,7 +141,7 @@ def test_too_little_time_renders_the_fastest(
 ) -> None:
     only(plain=40.0)
     picture = render(still_life(160, 96), time_budget=0.001)
-    assert picture.job.samples == 1
+    assert picture.settings.samples == 1
     assert "too short for this scene" in picture.plan[0].reason
 
 
@@ -148,7 +150,7 @@ def test_quality_asks_for_no_more_than_it_needs(
 ) -> None:
     only(plain=40.0)
     picture = render(still_life(160, 96), quality=38.0)
-    assert picture.job.samples == 4  # 36 dB at one sample, 40 at 16
+    assert picture.settings.samples == 4  # 36 dB at one sample, 40 at 16
     assert picture.plan[0].decision == "quality"
 
 
@@ -160,11 +162,12 @@ def test_full_size_is_denoised_by_ours_in_any_blender(
     has_own: bool,
 ) -> None:
     pytest.importorskip("mitsuba_oidn")
-    monkeypatch.setattr(picking, "has_denoiser", lambda: has_own)
+    monkeypatch.setattr(chosen, "has_denoiser", lambda: has_own)
     only(full=40.0)
     picture = render(still_life(64, 48), quality=38.0)
-    job = picture.job
-    assert (job.plain, job.scale, job.denoise, job.denoiser) == (False, 1, "fast", None)
+    settings = picture.settings
+    found = settings.mode, settings.denoising
+    assert found == (Mode.FULL_SIZE, Denoising.XRDS_FAST)
     assert picture.plan[0].value == "full size, 4 samples, fast denoising"
     assert picture.seconds["denoise"] > 0.0
 
@@ -184,11 +187,11 @@ def test_time_that_the_samples_leave_is_for_a_better_denoiser(
     costs = replace(
         COSTS, denoise=COSTS.denoise | {Denoising.XRDS_BEST: seconds_of_best}
     )
-    monkeypatch.setattr(picking, "probe", lambda *_: costs)
+    monkeypatch.setattr(chosen, "probe", lambda *_: costs)
     picture = render(still_life(64, 48), time_budget=500.0)
     # Four samples were foreseen to take 400 s; in truth there is all the time.
     assert picture.plan[0].value == "full size, 4 samples, fast denoising"
-    assert (picture.job.samples, picture.job.denoise) == (4, quality)
+    assert (picture.settings.samples, picture.settings.quality) == (4, quality)
     told = [each.value for each in picture.plan if each.decision == "denoise in time"]
     assert told == [quality] * (quality == "best")
 
@@ -200,15 +203,15 @@ def test_what_is_late_by_intent_keeps_its_denoiser(
     only(full=40.0, best=41.0)
     picture = render(still_life(64, 48), time_budget=0.001)
     # As dear as the quickest by what is foreseen, and late whatever is taken.
-    assert picture.job.denoise == "best"
+    assert picture.settings.quality == "best"
     assert "denoise in time" not in [each.decision for each in picture.plan]
 
 
 def test_nothing_is_promised_where_nothing_denoises(
     still_life: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(picking, "has_denoiser", lambda: False)
-    monkeypatch.setattr(picking.denoisers, "is_there", lambda: False)
+    monkeypatch.setattr(chosen, "has_denoiser", lambda: False)
+    monkeypatch.setattr(chosen.denoisers, "is_there", lambda: False)
     with pytest.raises(XRDSError, match=r"has Open Image Denoise.*install XRDS"):
         render(still_life(64, 48), time_budget=5.0)
 
@@ -230,7 +233,7 @@ def test_the_plan_told_is_the_one_rendered(
     decided = [(each.decision, each.value) for each in picture.plan]
     assert before == decided[: len(before)]
     assert before[0][0] == next(iter(goal)).replace("_", " ")
-    assert told["facts"]["scale"] == picture.job.scale
+    assert told["facts"]["scale"] == picture.settings.scale
     # What is left is what only a render can know.
     rest = {decision for decision, _ in decided[len(before) :]}
     assert rest <= {"guide cache", "sessions", "guide prefilter", "denoise in time"}
@@ -256,17 +259,17 @@ def test_the_denoiser_is_the_chosen_one_and_the_scene_is_as_before(
 
 def test_panel_setting_reaches_the_job(still_life: Callable[..., Any]) -> None:
     scene = still_life()
-    from xrds_blender.interface.properties import job_of
+    from xrds_blender.interface.properties import request_of
     from xrds_blender.interface.registration import ensure_registered
 
     ensure_registered()
     scene.xrds.time_budget = 12.5
-    assert job_of(scene.xrds).time_budget is None
+    assert request_of(scene.xrds).goal is None
     scene.xrds.use_time_budget = True
-    assert job_of(scene.xrds).time_budget == 12.5
-    scene.xrds.way = "x2"  # a way of one's own: nothing is left to choose
-    job = job_of(scene.xrds)
-    assert (job.time_budget, job.scale) == (None, 2)
+    assert request_of(scene.xrds).goal == Goal(12.5)
+    scene.xrds.mode = "x2"  # chosen by hand: nothing is left open
+    found = request_of(scene.xrds)
+    assert (found.goal, found.settings.mode) == (None, Mode.X2)
 
 
 @pytest.mark.parametrize(
