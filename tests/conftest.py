@@ -136,6 +136,7 @@ def stopped_in(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     import bpy
 
     from xrds_blender.cycles import session
+    from xrds_blender.frame import stages
 
     def render(stage: str) -> None:
         with monkeypatch.context() as patch:

@@ -26,7 +26,7 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.command.scene_file import SceneChoice
 from xrds_blender.command.whole_file import is_whole
 from xrds_blender.cycles import session
-from xrds_blender.frame import denoisers, guide_cache, networks
+from xrds_blender.frame import denoisers, guide_cache, networks, stages
 from xrds_blender.frame.picture import NetworkFailed
 from xrds_blender.planning.request import request
 from xrds_core.errors import Cancelled, OutOfMemory, PictureError, XRDSError
