@@ -215,8 +215,8 @@ def network(monkeypatch: pytest.MonkeyPatch) -> list[NearestUpscaler]:
 
     made: list[NearestUpscaler] = []
 
-    def load(preset: str, scale: int, *_: Any) -> NearestUpscaler:
-        made.append(NearestUpscaler(scale))
+    def load(network: Any, *_: Any) -> NearestUpscaler:
+        made.append(NearestUpscaler(network.scale))
         return made[-1]
 
     monkeypatch.setattr(networks, "_load", load)

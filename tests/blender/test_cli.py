@@ -139,7 +139,8 @@ def test_render_options() -> None:
         "--scale 4 --samples 9 --memory-limit 2G --exposure 0.5 --seed 7 --resume "
         "--threads 3 --exr-depth half --exr-codec dwaa -y"
     )
-    assert request_of(options).threads == choice_of(options).threads == 3
+    machine = request_of(options).machine
+    assert machine.threads == choice_of(options).threads == 3
     assert encoding_of(options) == Encoding(half=True, codec="dwaa")
     assert choice_of(options).trusted
     assert options.scene == Path("a.blend")

@@ -130,7 +130,7 @@ def guides(job: Request, told: list[str] | None = None) -> tuple[str, str, Passe
 
     def work(engine: Any, depsgraph: Any) -> tuple[str, str, Passes]:
         with CyclesPasses(engine, depsgraph) as passes:
-            facts = find_facts(depsgraph, job)
+            facts = find_facts(depsgraph, job.settings)
             chosen = job.plan(facts)
             source = GuideSource(passes, depsgraph, job, chosen, facts, report)
             found = source.guides()

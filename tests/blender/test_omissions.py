@@ -16,6 +16,7 @@ from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import plan
 from xrds_blender.planning.request import request
+from xrds_blender.planning.settings import Settings
 from xrds_blender.shot.explain import explain
 from xrds_lab.studio import traps
 
@@ -51,7 +52,7 @@ def test_the_plan_leaves_guides_as_they_are(name: str) -> None:
     scene = small(name)
 
     def job(passes: Any) -> Any:
-        facts = find_facts(passes._depsgraph, request())
+        facts = find_facts(passes._depsgraph, Settings())
         how = plan.decide(facts).guides
         whole = [guides(passes, plan.GuideRender(), seed) for seed in (1, 2)]
         return how, whole, guides(passes, how)
@@ -81,7 +82,7 @@ def test_the_traps_are_traps(name: str, omission: str) -> None:
     scene = small(name)
 
     def job(passes: Any) -> Any:
-        facts = find_facts(passes._depsgraph, request())
+        facts = find_facts(passes._depsgraph, Settings())
         whole = [guides(passes, plan.GuideRender(), seed) for seed in (1, 2)]
         return plan.decide(facts).guides, whole, guides(passes, LESS[omission])
 
@@ -106,7 +107,7 @@ def test_a_pass_after_the_guides_has_its_lights_again() -> None:
 
 
 def decided(scene: Any) -> plan.Plan:
-    facts = call_engine(scene, lambda _, graph: find_facts(graph, request()))
+    facts = call_engine(scene, lambda _, graph: find_facts(graph, Settings()))
     return plan.decide(replace(facts, has_denoiser=True))
 
 

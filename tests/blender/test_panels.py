@@ -152,7 +152,7 @@ def test_a_new_scene_says_which_way_it_takes() -> None:
     pytest.importorskip("mitsuba_oidn")
     told = drawn(panels.XRDS_PT_settings)
     assert told[0] == "Automatic (Full Size)"
-    names = ["Full Size", "Super-Resolution", "2×", "4×", "8×", "Plain"]
+    names = ["Full Size", "Super-Resolution", "2×", "4×", "8×", "Cycles Only"]
     assert [text for text in told if text in names] == names
     assert "best" in told
     assert "About" not in told  # no seconds are known before the first render

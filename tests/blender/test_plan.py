@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from xrds_blender.planning.lending import lending
-
 from xrds_blender.planning import plan
 
 FACTS = plan.Facts(
@@ -39,7 +37,7 @@ def test_every_decision_has_a_reason() -> None:
     for decision in (
         plan.decide(FACTS).decisions
         + plan.after(0.5, 0.0)
-        + plan.plain("asked for").decisions
+        + plan.cycles_only("as requested").decisions
     ):
         assert decision.reason
         assert "\n" not in decision.reason
@@ -67,7 +65,7 @@ def test_what_one_session_saved_is_the_second_sync() -> None:
     assert plan.after(0.5, 0.6)[0].saving_seconds == 0.0
 
 
-def test_the_plan_of_a_shot_names_what_lends_less() -> None:
+def test_the_plan_of_a_shot_names_what_is_reused_less() -> None:
     quiet = replace(
         FACTS.scene,
         motion_blur=False,
@@ -79,7 +77,7 @@ def test_the_plan_of_a_shot_names_what_lends_less() -> None:
 
     def lent(cuts: tuple[int, ...] = (), **more: object) -> dict[str, str]:
         scene = replace(quiet, **more)
-        found = lending(replace(FACTS, scene=scene), 3, cuts)
+        found = plan.neighbours(replace(FACTS, scene=scene), 3, cuts)
         assert all(each.reason for each in found)
         return {each.decision: each.value for each in found}
 
@@ -90,5 +88,5 @@ def test_the_plan_of_a_shot_names_what_lends_less() -> None:
     assert lent(moving=(), volumes=True) == {"accumulation": "3 frames to each side"}
     assert lent(cuts=(9, 5))["cuts"] == "frame 5, 9"
     assert lent(cuts=tuple(range(9)))["cuts"] == "frame 0, 1, 2, 3, 4, 5 and 3 more"
-    panorama = lending(replace(FACTS, lends=False), 3)
+    panorama = plan.neighbours(replace(FACTS, reprojects=False), 3)
     assert [each.value for each in panorama] == ["none"]

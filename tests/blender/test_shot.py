@@ -183,7 +183,8 @@ def test_the_radius_by_default(line: str, radius: int) -> None:
     from xrds_blender.command.options import request_of
 
     words = ["render", "a.blend", "-o", "b_#.exr", *line.split()]
-    assert request_of(main._parser(words).parse_args(words)).temporal_radius == radius
+    found = request_of(main._parser(words).parse_args(words))
+    assert found.settings.temporal_radius == radius
 
 
 def test_a_radius_that_cannot_be_is_refused(capfd: pytest.CaptureFixture[str]) -> None:

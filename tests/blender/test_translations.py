@@ -12,11 +12,11 @@ import pytest
 
 from xrds_blender import interface
 from xrds_blender.interface import registration, translations
-from xrds_blender.planning import ways
+from xrds_blender.planning import estimates
 
 FOLDER = Path(interface.__file__).parent
 # The panel shows what a way lacks.
-SOURCES = [*sorted(FOLDER.glob("*.py")), Path(str(ways.__file__))]
+SOURCES = [*sorted(FOLDER.glob("*.py")), Path(str(estimates.__file__))]
 WORDS = translations.read()
 # Shown as they are in every language.
 NAMES = {"XRDS", "CPU", "Metal", "Error: "}
