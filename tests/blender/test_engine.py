@@ -15,7 +15,8 @@ bpy = pytest.importorskip("bpy")
 
 from xrds_blender import render, run_job
 from xrds_blender.frame.denoisers import in_process
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import Machine
+from xrds_blender.planning.settings import Denoising
 from xrds_core.errors import UsageError, WeightsError
 
 BLENDER_5 = bpy.app.version >= (5, 0)
@@ -23,7 +24,7 @@ BLENDER_5 = bpy.app.version >= (5, 0)
 
 def low_picture(scene: Any, scale: int = 2) -> np.ndarray:
     """What the stand-in makes of the scene's low-resolution render."""
-    ours = in_process(request())
+    ours = in_process(Denoising.XRDS_HIGH, Machine())
     beauty = run_job(scene, lambda passes: passes.beauty(scale, in_process=ours))
     large = beauty.radiance.repeat(scale, 0).repeat(scale, 1)
     return large[: scene.render.resolution_y, : scene.render.resolution_x]
@@ -135,7 +136,7 @@ def test_persistent_data_changes_no_pixel(
 
 def test_the_network_sees_the_picture_before_denoising(life: Any, network: Any) -> None:
     render(life, 2, samples=2, seed=1)
-    ours = in_process(request())
+    ours = in_process(Denoising.XRDS_HIGH, Machine())
     rough, smooth = run_job(
         life,
         lambda passes: [

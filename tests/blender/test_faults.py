@@ -223,7 +223,7 @@ def test_without_a_sound_torch_only_plain_renders(
     life.cycles.samples = 1
     assert render(life, plain=True).radiance.any()
     picked = render(life, time_budget=0.1)
-    assert not picked.job.is_enlarged
+    assert not picked.settings.is_enlarged
     monkeypatch.setattr(session, "run", None)  # and nothing is rendered before
     with pytest.raises(XRDSError, match=r"^XRDS needs PyTorch, .* at full size$"):
         render(life, 2)

@@ -18,7 +18,8 @@ bpy = pytest.importorskip("bpy")
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
 from xrds_blender.frame.denoisers import in_process
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import Machine
+from xrds_blender.planning.settings import Denoising
 
 BLENDER_5 = bpy.app.version >= (5, 0)
 
@@ -58,7 +59,7 @@ def settings_of_passes(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 
 def enlarged(scene: Any, scale: int = 2) -> np.ndarray:
     """What the stand-in makes of the scene's small render."""
-    ours = in_process(request())
+    ours = in_process(Denoising.XRDS_HIGH, Machine())
     low = run_job(scene, lambda p: p.beauty(scale, in_process=ours)).radiance
     large = low.repeat(scale, 0).repeat(scale, 1)
     return large[: scene.render.resolution_y, : scene.render.resolution_x]

@@ -41,7 +41,10 @@ def test_a_relit_scene_uses_the_guides_of_before() -> None:
     first = shot(scene)
     bpy.data.objects["Lamp"].data.energy *= 3
     second = shot(scene)
-    assert (cache_use(first), cache_use(second)) == ("kept 2 samples", "used 2 samples")
+    assert (cache_use(first), cache_use(second)) == (
+        "cached 2 samples",
+        "used 2 samples",
+    )
     np.testing.assert_array_equal(second.albedo, first.albedo)
     np.testing.assert_array_equal(second.normal, first.normal)
     assert second.radiance.mean() > 2 * first.radiance.mean()
@@ -54,7 +57,7 @@ def test_a_lamp_that_is_seen_makes_them_anew(name: str) -> None:
     first = shot(scene)
     bpy.data.objects["Lamp"].data.energy /= 40
     second = shot(scene)
-    assert cache_use(second) == "kept 2 samples"
+    assert cache_use(second) == "cached 2 samples"
     assert np.abs(second.albedo.clip(0, 1) - first.albedo.clip(0, 1)).max() > 0.1
 
 
@@ -66,8 +69,8 @@ def test_what_moves_makes_them_anew_and_back_again_does_not() -> None:
         red.location.x = x
         pictures.append(shot(scene, seed=1))
     assert [cache_use(p) for p in pictures] == [
-        "kept 2 samples",
-        "kept 2 samples",
+        "cached 2 samples",
+        "cached 2 samples",
         "used 2 samples",
     ]
     assert np.abs(pictures[0].albedo - pictures[1].albedo).max() > 0.1
@@ -80,7 +83,7 @@ def test_samples_add_up_to_the_limit(network: Any) -> None:
     scene = traps.trap("texture", 48, 36)
     pictures = [shot(scene, seed=1, guide_limit=6) for _ in range(4)]
     assert [cache_use(p) for p in pictures] == [
-        "kept 2 samples",
+        "cached 2 samples",
         "gathered 4 samples",
         "gathered 6 samples",
         "used 6 samples",
@@ -98,7 +101,7 @@ def test_more_samples_asked_for_are_rendered_beside_those_kept() -> None:
     scene = traps.trap("texture", 48, 36)
     shot(scene)
     picture = render(scene, 2, samples=1, guide_samples=5)
-    assert cache_use(picture) == "gathered 5 samples"
+    assert cache_use(picture) == "accumulated 5 samples"
 
 
 def test_the_result_holds_data_passes_of_kept_guides(written: Any) -> None:
@@ -164,7 +167,7 @@ def test_a_folder_that_takes_no_file_costs_no_picture(
     (tmp_path / "file").touch()
     picture = shot(traps.trap("texture", 48, 36), guide_cache=tmp_path / "file")
     (decision,) = [d for d in picture.plan if d.decision == "guide cache"]
-    assert decision.value == "kept 2 samples"
+    assert decision.value == "cached 2 samples"
     assert decision.reason.startswith("in memory only")
     assert f"in memory only: cannot write to {tmp_path / 'file'}" in (
         capsys.readouterr().err

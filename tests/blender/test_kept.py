@@ -281,7 +281,7 @@ def test_what_keeps_no_samples(blend: Path, more: dict[str, Any]) -> None:
 def test_a_fisheye_keeps_no_samples(blend: Path) -> None:
     around(bpy.context.scene.camera.data, "FISHEYE_EQUISOLID")
     saved(blend.parent)
-    with pytest.raises((UsageError, SceneError), match="lend"):
+    with pytest.raises((UsageError, SceneError), match="reuse"):
         keep(blend, [1])
 
 
@@ -291,7 +291,7 @@ def test_the_command(blend: Path, capfd: pytest.CaptureFixture[str]) -> None:
     assert main.main(words.split()) == 0
     out, err = capfd.readouterr()
     assert f"{folder}/samples: samples of 1 frames rendered, 0 were there" in out
-    assert "frame 2: samples kept" in err
+    assert "frame 2: samples cached" in err
     told = exr.File(folder / "samples" / "0002.exr").parts[0].attributes
     assert told["xrds/radius"] == 4  # though it is one frame
     words = f"denoise {folder}/samples/####.exr -o {folder}/out/####.exr --frames 1-2"

@@ -101,7 +101,7 @@ def test_resolution_is_the_one_asked_for(folder: Path) -> None:
     done = xrds(folder, line)
     assert done.returncode == 0, done.stderr
     assert Image.open(folder / "r.png").size == (50, 34)
-    assert "guide cache: kept 2 samples: no kept guides match" in done.stdout
+    assert "guide cache: cached 2 samples: no cached guides match" in done.stdout
     assert "a probe of 50x34 pixels took" in done.stdout
 
 
