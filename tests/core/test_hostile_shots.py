@@ -30,7 +30,7 @@ from xrds_core.errors import PictureError, UsageError
 from xrds_core.frames import in_words
 from xrds_core.sequence import attributes, cameras
 from xrds_core.sequence.denoise import Files, denoise_sequence
-from xrds_core.sequence.errors import NotLending, Unfit
+from xrds_core.sequence.file_errors import NotLending, Unfit
 from xrds_core.sequence.reading import Reading, read_frame
 from xrds_core.temporal.window import Shot
 

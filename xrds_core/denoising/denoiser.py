@@ -16,8 +16,8 @@ from weakref import WeakSet
 import numpy as np
 
 from ..errors import UsageError
-from . import library
-from .pictures import check, sample
+from . import oidn_device
+from .input_images import check, sample
 from .stages import Stages
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from ..arrays import Array
     from ..progress import Callback
-    from .pictures import Pictures
+    from .input_images import Pictures
 
     Image = NDArray[np.floating[Any]]
 
@@ -116,8 +116,8 @@ class Denoiser:
             if number is not None and number < 0:
                 raise UsageError(f"{name} is {number}; it must not be negative")
         self.quality = quality
-        self._oidn = library.load()
-        self._device = library.open_device(device, threads)
+        self._oidn = oidn_device.load()
+        self._device = oidn_device.open_device(device, threads)
         _open.add(self)
         self._memory_limit = memory_limit
         self._filters: dict[str, Any] = {}
@@ -167,7 +167,7 @@ class Denoiser:
         result = np.zeros(np.shape(radiance), np.float32)
         result[..., 3:] = pictures.alpha
         prefiltered: tuple[str, ...] = ()
-        with self._lock, library.explained(self.device, result.shape):
+        with self._lock, oidn_device.explained(self.device, result.shape):
             stages.tell(0.0)
             if pictures.radiance.any():
                 prefiltered = self._to_prefilter(pictures, guides_are_clean)
@@ -197,7 +197,7 @@ class Denoiser:
             raise UsageError("this denoiser is closed; make another one")
         stages = Stages(progress)
         found = {"albedo": albedo, "normal": normal}
-        with self._lock, library.explained(self.device, albedo.shape):
+        with self._lock, oidn_device.explained(self.device, albedo.shape):
             stages.tell(0.0)
             for name, guide in found.items():
                 stages.begin(1 / len(found))

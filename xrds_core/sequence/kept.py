@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import exr
-from ..exr.library import Part
+from ..exr.openexr_io import Part
 from ..temporal.frame import LARGEST_HALF, noise_in
 from .cameras import to_header
 from .names import CAMERA_NORMAL, NOISE, NOISY

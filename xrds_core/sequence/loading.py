@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import PictureError
 from ..frames import frame_path, in_words
-from .errors import NotLending, Unfit
+from .file_errors import NotLending, Unfit
 from .reading import read_frame
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 from ..exr.channels import COMPONENTS
-from .errors import Unfit
+from .file_errors import Unfit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

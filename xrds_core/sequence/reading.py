@@ -17,7 +17,7 @@ from ..temporal.motion import centres, pixels_of
 from ..temporal.noise import Noise
 from . import attributes
 from .cameras import from_header, told_camera
-from .errors import NotLending, Unfit
+from .file_errors import NotLending, Unfit
 from .names import Found, PassNames, find
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..arrays import Array
-    from ..exr.library import Part, Window
+    from ..exr.openexr_io import Part, Window
 
 SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
 NAME = "cameraLabel"

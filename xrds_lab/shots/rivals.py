@@ -60,7 +60,7 @@ def _run(quality: str, clean: bool, **images: Array) -> Array:
 
 @lru_cache(maxsize=1)
 def _device() -> Any:
-    from xrds_core.denoising.library import open_device
+    from xrds_core.denoising.oidn_device import open_device
 
     return open_device("cpu", 0)
 

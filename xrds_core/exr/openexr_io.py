@@ -58,7 +58,7 @@ def read(path: str | Path) -> list[Part]:
     """Read all parts of a file.
 
     Raises PictureError if it is not whole, or its header claims more than
-    `exr_limits.limit_of` allows: then before memory is taken.
+    `limits.limit_of` allows: then before memory is taken.
     """
     limit = limit_of(check_input(Path(path)))
     return _read(path, limit) if not _is_shadowed() else _read_apart(path, limit)
