@@ -11,7 +11,7 @@ from contextlib import nullcontext
 
 import numpy as np
 
-from xrds_core.temporal.samples import Portion
+from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals.borrowed import Borrowed
 from ..planning.denoiser import Denoiser
@@ -104,7 +104,7 @@ class CyclesPasses(LayerSession):
         samples: int | None = None,
         *,
         seed: int | None = None,
-        portion: Portion | None = None,
+        portion: SampleSubset | None = None,
     ) -> dict[str, LowSamples]:
         """Render as `beauties`, and leave the noise in.
 
@@ -174,7 +174,7 @@ class CyclesPasses(LayerSession):
         full: bool = False,
         seed: int | None = None,
         how: GuideRender | None = None,
-        portion: Portion | None = None,
+        portion: SampleSubset | None = None,
     ) -> dict[str, Guides]:
         """As `guides`, for every view by name; `how` names what may be left out.
 
