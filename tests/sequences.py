@@ -11,7 +11,7 @@ import numpy as np
 import shots
 
 from xrds_core import exr
-from xrds_core.exr.library import Part
+from xrds_core.exr.openexr_io import Part
 from xrds_core.sequence import cameras, reading
 from xrds_core.temporal.frame import Camera, Frame
 

@@ -1,8 +1,8 @@
-"""Files that appear whole or not at all, and what killed processes left of them.
+"""Files that appear complete or not at all, and cleaning up after killed processes.
 
-What is being written has a name that tells machine and process. So a later process
-knows whose it was, and whether that one still runs. In the temporary folder a link of
-the same name leads to it, wherever it lies.
+A file being written has a name with the machine and the process in it. So a later
+process knows whose it was, and whether that one still runs. In the temporary folder a
+link of the same name points to it, wherever it is.
 """
 
 from __future__ import annotations
@@ -147,12 +147,12 @@ def _machine() -> str:
         numbering = Path("/proc/self/ns/pid").readlink()  # another in each container
     except OSError:
         started, numbering = str(uuid.getnode()), Path()
-    told = f"{started} {numbering}".encode()
-    return hashlib.blake2b(told, digest_size=4).hexdigest()
+    text = f"{started} {numbering}".encode()
+    return hashlib.blake2b(text, digest_size=4).hexdigest()
 
 
 def _is_running(process: int) -> bool:
-    """Whether a process has this number; True where it cannot be asked."""
+    """Whether a process has this number; True where that cannot be checked."""
     if os.name == "nt":  # os.kill would end it
         return True
     try:

@@ -46,8 +46,8 @@ def choose_precision(name: str, device: torch.device) -> torch.dtype:
     return PRECISIONS[name]
 
 
-# What torch says in a plain RuntimeError where an allocation fails on a processor
-# (Linux, Windows, oneDNN twice, which tells no reason, C++) or under MPS.
+# Texts of torch's plain RuntimeError where an allocation fails on a processor (Linux,
+# Windows, oneDNN twice, which gives no reason, C++) or under MPS.
 _OUT_OF_MEMORY = (
     "can't allocate memory",
     "not enough memory",
@@ -69,7 +69,7 @@ def is_out_of_memory(error: BaseException) -> bool:
 def free_memory(device: torch.device) -> float:
     """Return the bytes that can be taken on `device`, infinity where not known.
 
-    Linux lets a process take more than there is and then kills it, so it is asked.
+    Linux lets a process take more than there is and then kills it, so this is checked.
     """
     if device.type == "cuda":
         return torch.cuda.mem_get_info(device)[0]

@@ -1,4 +1,4 @@
-"""Whether files can be read and written, asked before the work."""
+"""Checks before the work: whether files can be read and written."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def check_place(path: Path) -> None:
 
 
 def check_folder(folder: Path) -> None:
-    """Make a folder; raise PictureError where it takes no file.
+    """Make a folder; raise PictureError if no file can be written to it.
 
     What killed processes left in it is swept up.
     """

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 RADIUS = 4
-"""Frames before and after that lend their samples, by default: more bring little."""
+"""The default temporal radius: frames before and after; more add little."""
 MOST_RADIUS = 32
-"""What a file may recommend: all these frames are kept in memory."""
+"""The largest that a file may recommend: all these frames are in memory."""
 _MOST_RUNS = 50  # of frame numbers that a line has room for
 
 
@@ -27,10 +27,10 @@ def frame_path(pattern: str, frame: int) -> Path:
 
 
 def frame_numbers(pattern: str) -> list[int]:
-    """Return the numbers of the frames that are there, in order.
+    """Return the numbers of the frames that exist, in order.
 
-    [] where there are none, also of a pattern without #. What has such a name need not
-    be a file: whoever reads it tells.
+    [] where there are none, also of a pattern without #. Such a name may belong to a
+    folder: reading it reports that.
     """
     parts = _split(pattern)
     folder = Path(pattern).parent
@@ -44,16 +44,16 @@ def frame_numbers(pattern: str) -> list[int]:
 
 
 def in_words(numbers: Sequence[int]) -> str:
-    """Say frame numbers, which are in order, as 1-24, 30; of many runs the first."""
+    """Format sorted frame numbers as 1-24, 30; only the first of many runs."""
     runs: list[list[int]] = []
     for number in numbers:
         if runs and runs[-1][-1] == number - 1:
             runs[-1].append(number)
         else:
             runs.append([number])
-    told = [f"{x[0]}-{x[-1]}" if len(x) > 1 else f"{x[0]}" for x in runs[:_MOST_RUNS]]
+    text = [f"{x[0]}-{x[-1]}" if len(x) > 1 else f"{x[0]}" for x in runs[:_MOST_RUNS]]
     more = sum(map(len, runs[_MOST_RUNS:]))
-    return ", ".join(told) + (f" and {more} more" if more else "")
+    return ", ".join(text) + (f" and {more} more" if more else "")
 
 
 def _split(pattern: str) -> tuple[str, int, str] | None:

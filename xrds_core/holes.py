@@ -20,8 +20,8 @@ BRIGHTEST = 1e12
 _LARGEST = np.finfo(np.float32).max
 
 
-def told(bad_pixels: int) -> str:
-    """What a user is told of bad pixels."""
+def describe_bad_pixels(bad_pixels: int) -> str:
+    """Return a message about bad pixels."""
     return f"replaced {bad_pixels} bad pixels: NaN, infinities or negative light"
 
 
@@ -43,7 +43,7 @@ def clean_radiance(x: Array) -> tuple[Array, int]:
 def clean_alpha(x: Array) -> tuple[Array, int]:
     """Return (x, holes) as `fill_holes`, but 1 where no pixel has an alpha.
 
-    So a picture whose alpha is lost keeps its colour.
+    So a picture without a valid alpha keeps its colour.
     """
     filled, holes = fill_holes(x)
     return (np.ones_like(x), holes) if holes and holes == x.size else (filled, holes)

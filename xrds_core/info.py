@@ -37,7 +37,7 @@ def info(
     """Everything `xrds info --json` prints.
 
     Args:
-        blender: Blender's version, which this package cannot ask for.
+        blender: Blender's version, which this package cannot find out.
         weights: the folder of weights files; the shipped ones by default.
 
     Raises:

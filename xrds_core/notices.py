@@ -9,7 +9,7 @@ from .errors import printable
 
 
 def warn(text: str) -> None:
-    """Tell the user one line; lost where there is no stderr to take it."""
+    """Print one line for the user; lost where there is no stderr."""
     if sys.stderr is None:
         return
     with suppress(OSError, ValueError):  # full, or closed

@@ -13,7 +13,7 @@ class Clock:
         self._start = self._last = time.perf_counter()
 
     def lap(self, left: int) -> str:
-        """Say it of the piece that has just been finished; `left` are still to come."""
+        """Return it for the piece that was just finished; `left` are still to come."""
         now = time.perf_counter()
         took, self._last = now - self._last, now
         self._done += 1

@@ -63,7 +63,10 @@ def test_wheel_holds_what_renders(unpacked: Path) -> None:
         "xrds_core/superres/network.py",
         "xrds_blender/interface/engine.py",
     } <= names
-    weights = {p.name for p in (ROOT / "xrds_core" / "weights").glob("*.safetensors")}
+    weights = {
+        p.name
+        for p in (ROOT / "xrds_core" / "superres" / "weights").glob("*.safetensors")
+    }
     held = {name for name in weights if f"xrds_core/superres/weights/{name}" in names}
     assert {name for name in weights if not name.startswith("paper_")} == held
     presets = "xrds_blender/interface/shipped/presets/xrds/render"

@@ -209,7 +209,7 @@ def test_cameras_of_a_file_are_those_of_its_samples(blend: Path) -> None:
     assert main.main(["cameras", str(blend), "-o", str(told), "--frames", "4-6"]) == 0
     known = cameras.read_cameras(told)
     assert list(known) == [4, 5, 6]
-    ours = cameras.told_camera(known, 5, (32, 24))
+    ours = cameras.camera_of_frame(known, 5, (32, 24))
     path = blend.parent / "samples" / "0005.exr"
     theirs = read_frame(path, 5, Reading()).stored.camera
     assert ours is not None

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from xrds_blender.cycles.low_camera import Frame, Lens, LowGrid, Region, widened
+from xrds_blender.cycles.low_camera import CameraFrame, Lens, LowGrid, Region, widened
 
 bpy = pytest.importorskip("bpy")
 SIDE = 48  # pixels of the windows in which shifts are measured
@@ -116,14 +116,14 @@ def test_corners_shift_less_than_a_tenth_of_a_pixel(
 
 
 def test_a_frame_that_is_a_multiple_keeps_its_lens() -> None:
-    frame = Frame(1920, 1080)
+    frame = CameraFrame(1920, 1080)
     lens = Lens(36.0, 6.0, 0.1, -0.2)
     assert widened(lens, True, frame, frame.covered(4)) == lens
 
 
 @pytest.mark.parametrize(("along_width", "fit"), [(True, 1368 / 1366), (False, 1.0)])
 def test_the_lens_widens_with_the_fitted_side(along_width: bool, fit: float) -> None:
-    frame = Frame(1366, 768)
+    frame = CameraFrame(1366, 768)
     lens = widened(Lens(36.0, 6.0, 0.0, 0.0), along_width, frame, frame.covered(4))
     assert lens.sensor == pytest.approx(36.0 * fit)
     assert lens.ortho_scale == pytest.approx(6.0 * fit)
@@ -136,7 +136,7 @@ def test_the_lens_widens_with_the_fitted_side(along_width: bool, fit: float) -> 
 def test_a_region_is_covered_by_whole_pixels(scale: int) -> None:
     region = Region(13, 7, 50, 21)
     low = region.low(scale)
-    grid = LowGrid(Frame(100, 80), scale, low, exact=True)
+    grid = LowGrid(CameraFrame(100, 80), scale, low, exact=True)
     top, left = grid.offset(region)
     assert 0 <= top < scale
     assert 0 <= left < scale
@@ -146,7 +146,7 @@ def test_a_region_is_covered_by_whole_pixels(scale: int) -> None:
 
 def test_a_panorama_is_resampled_to_where_its_pixels_belong() -> None:
     """A ramp over the frame stays the same ramp on pixels of exactly the scale."""
-    frame, scale = Frame(1366, 682), 8
+    frame, scale = CameraFrame(1366, 682), 8
     width, height = frame.low_size(scale)
     grid = LowGrid(frame, scale, Region(0, 0, width, height), exact=False)
     x = (np.arange(width) + 0.5) / width * frame.width

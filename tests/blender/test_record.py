@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from xrds_core.exr import library
+from xrds_core.exr import openexr_io
 
 bpy = pytest.importorskip("bpy")
 
@@ -115,7 +115,7 @@ def test_the_commands_files_tell_what_made_them(
     if suffix == ".png":
         found = texts(output.read_bytes())
     else:
-        found = library.read(output)[0].attributes
+        found = openexr_io.read(output)[0].attributes
     told = {name: found[f"xrds.{name}"] for name in (*NAMES, "left_out")}
     assert (told["mode"], told["scale"], told["samples"]) == ("full size", "1", "3")
 

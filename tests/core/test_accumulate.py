@@ -13,8 +13,8 @@ from shots import HEIGHT, WIDTH, World, camera, view
 from xrds_core.errors import PictureError
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.frame import Frame, Stored, store
-from xrds_core.temporal.judge import MARGIN
 from xrds_core.temporal.noise import brightness
+from xrds_core.temporal.similarity import MARGIN
 
 Array = NDArray[np.float32]
 PASSES = ("radiance", "albedo", "normal")

@@ -103,16 +103,16 @@ def test_a_file_tells_the_camera(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "cameras.json"
     path.write_text(json.dumps({"7": told}))
     known = cameras.read_cameras(path)
-    found = cameras.told_camera(known, 7, SIZE)
+    found = cameras.camera_of_frame(known, 7, SIZE)
     assert found is not None
     np.testing.assert_allclose(seen(found), seen(camera), atol=1e-9)
-    assert cameras.told_camera(known, 8, SIZE) is None
+    assert cameras.camera_of_frame(known, 8, SIZE) is None
     path.write_text(json.dumps({"7": cameras.to_json(camera)}))
-    exact = cameras.told_camera(cameras.read_cameras(path), 7, SIZE)
+    exact = cameras.camera_of_frame(cameras.read_cameras(path), 7, SIZE)
     assert exact is not None
     np.testing.assert_allclose(seen(exact), seen(camera), atol=1e-9)
     path.write_text(json.dumps({"all": told}))
-    assert cameras.told_camera(cameras.read_cameras(path), 8, SIZE) is not None
+    assert cameras.camera_of_frame(cameras.read_cameras(path), 8, SIZE) is not None
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from xrds_core import denoising
-from xrds_core.denoising import Denoiser, denoise, devices, library, pictures
+from xrds_core.denoising import Denoiser, denoise, devices, input_images, oidn_device
 from xrds_core.errors import Cancelled, OutOfMemory, PictureError, UsageError, XRDSError
 from xrds_core.holes import BRIGHTEST
 
@@ -466,11 +466,11 @@ def test_clean_guides_help(denoiser: Denoiser) -> None:
 def test_a_sample_holds_what_is_busy() -> None:
     guide = np.zeros((640, 704, 3), np.float32)
     guide[128:192, 192:256] = noise((64, 64, 3), 1.0)
-    found = pictures.sample(guide)
+    found = input_images.sample(guide)
     assert found is not None
     np.testing.assert_array_equal(found[:64, :64], guide[128:192, 192:256])
     assert not found[64:].any()
-    assert pictures.sample(guide[:500, :500]) is None
+    assert input_images.sample(guide[:500, :500]) is None
 
 
 def test_threads(high: Denoiser) -> None:
@@ -595,7 +595,7 @@ def test_no_library(monkeypatch: pytest.MonkeyPatch, broken: str) -> None:
     if broken == "missing":
         monkeypatch.setitem(sys.modules, "mitsuba_oidn", None)
     else:
-        monkeypatch.setattr(library, "import_module", fail)
+        monkeypatch.setattr(oidn_device, "import_module", fail)
     for ask in (Denoiser, devices):
         with pytest.raises(XRDSError) as info:
             ask()

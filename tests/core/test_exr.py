@@ -16,8 +16,8 @@ from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
 from xrds_core.exr import (
     Names,
-    library,
     limits,
+    openexr_io,
     read_beauty,
     read_guides,
     write_picture,
@@ -79,7 +79,7 @@ def path(tmp_path: Path) -> Path:
 @pytest.fixture
 def apart(monkeypatch: pytest.MonkeyPatch) -> None:
     """As in a program that has an OpenEXR of its own."""
-    monkeypatch.setattr(library, "_is_shadowed", lambda: True)
+    monkeypatch.setattr(openexr_io, "_is_shadowed", lambda: True)
 
 
 # --- in a process of its own ----------------------------------------------------------
@@ -90,9 +90,9 @@ def test_a_process_of_its_own_reads_what_this_one_would(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_passes(path, PASSES, "parts")
-    parts = library.read(path)
-    monkeypatch.setattr(library, "_is_shadowed", lambda: False)
-    for part, expected in zip(parts, library.read(path), strict=True):
+    parts = openexr_io.read(path)
+    monkeypatch.setattr(openexr_io, "_is_shadowed", lambda: False)
+    for part, expected in zip(parts, openexr_io.read(path), strict=True):
         assert replace(part, channels={}) == replace(expected, channels={})
         assert part.channels.keys() == expected.channels.keys()
         for name, pixels in part.channels.items():
@@ -106,7 +106,7 @@ def test_a_process_of_its_own_writes(
 ) -> None:
     channels = planes(8, "RGBA")
     write_picture(path, channels)
-    monkeypatch.setattr(library, "_is_shadowed", lambda: False)
+    monkeypatch.setattr(openexr_io, "_is_shadowed", lambda: False)
     written = read_channels(path)
     assert written.keys() == channels.keys()
     for name, plane in channels.items():
@@ -403,7 +403,7 @@ def test_the_limit_can_be_raised_and_lowered(
     path: Path, monkeypatch: pytest.MonkeyPatch, shadowed: bool
 ) -> None:
     write(path, planes(0))
-    monkeypatch.setattr(library, "_is_shadowed", lambda: shadowed)
+    monkeypatch.setattr(openexr_io, "_is_shadowed", lambda: shadowed)
     monkeypatch.setattr(limits, "_allowed", 0)
     limits.allow(4 * 6 * 3 * 4)
     assert read_beauty(path).radiance.shape == (4, 6, 3)

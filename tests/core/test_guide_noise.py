@@ -99,7 +99,7 @@ def test_without_the_library_there_is_nothing_to_take_it_out(
 @pytest.fixture(autouse=True)
 def nothing_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """No test finds what another one has denoised."""
-    monkeypatch.setattr(guide_noise, "_KEPT", guide_noise._Kept())
+    monkeypatch.setattr(guide_noise, "_CACHE", guide_noise._Cache())
 
 
 def test_the_same_guides_are_denoised_once(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -115,7 +115,7 @@ def test_the_same_guides_are_denoised_once(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_large_guides_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(guide_noise, "KEPT_BYTES", 1)
+    monkeypatch.setattr(guide_noise, "CACHE_BYTES", 1)
     noisy, quiet = guides(0.1), remover(FEW_SAMPLES, "cpu")
     assert quiet is not None
     quiet(*noisy)

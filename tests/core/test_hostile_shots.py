@@ -30,7 +30,7 @@ from xrds_core.errors import PictureError, UsageError
 from xrds_core.frames import in_words
 from xrds_core.sequence import attributes, cameras
 from xrds_core.sequence.denoise import Files, denoise_sequence
-from xrds_core.sequence.errors import NotLending, Unfit
+from xrds_core.sequence.file_errors import NotReusable, Unfit
 from xrds_core.sequence.reading import Reading, read_frame
 from xrds_core.temporal.window import Shot
 
@@ -106,7 +106,7 @@ def test_a_frame_whose_camera_is_none_is_denoised_by_itself(
     assert sum(bool(re.search(line, x)) for x in said) == 1
     assert told["frames"][0]["temporal"]["frames"] == (1, 3)
     path = tmp_path / "in" / "0002.exr"
-    assert not read_frame(path, 2, Reading(), lends=False).lends  # radius 0 helps
+    assert not read_frame(path, 2, Reading(), reusable=False).reusable  # radius 0 helps
 
 
 @pytest.mark.parametrize(
@@ -118,7 +118,7 @@ def test_samples_are_told_by_whole_numbers_alone(
     tmp_path: Path, value: Any, count: int
 ) -> None:
     path = write(tmp_path, frame(1), header={"xrds/samples": value})
-    assert read_frame(path, 1, Reading(), lends=False).stored.samples == count
+    assert read_frame(path, 1, Reading(), reusable=False).stored.samples == count
 
 
 @pytest.mark.parametrize(
@@ -130,7 +130,7 @@ def test_a_radius_is_recommended_by_small_numbers_alone(
     tmp_path: Path, value: Any, radius: int | None
 ) -> None:
     path = write(tmp_path, frame(1), header={"xrds/radius": value, "xrds/still": "no"})
-    told = read_frame(path, 1, Reading(), lends=False)
+    told = read_frame(path, 1, Reading(), reusable=False)
     assert told.radius == radius
     assert not told.stored.still
 
@@ -157,9 +157,9 @@ def test_a_shot_in_which_nothing_is_lent_says_so(
         away = replace(own, depth=own.depth * np.float32(10.0**number))
         write(tmp_path / "in", away)
     _, said = denoise(tmp_path, denoiser)
-    assert sum("no frame took samples of another" in line for line in said) == 1
+    assert sum("no frame reused samples of another" in line for line in said) == 1
     _, said = denoise(shot(tmp_path), denoiser)
-    assert not any("no frame took" in line for line in said)
+    assert not any("no frame reused" in line for line in said)
 
 
 def test_a_position_pass_beside_its_camera_is_no_matter_alone(
@@ -169,7 +169,7 @@ def test_a_position_pass_beside_its_camera_is_no_matter_alone(
     names = CYCLES | {"position": "Position.XYZ"}
     names.pop("depth")
     write(tmp_path / "in", frame(1), names, position=moved)
-    with pytest.raises(NotLending, match=r"pixels beside .* or --temporal-radius 0"):
+    with pytest.raises(NotReusable, match=r"pixels beside .* or --temporal-radius 0"):
         denoise(tmp_path, denoiser)
     assert len(denoise(tmp_path, denoiser, radius=0)[0]["frames"]) == 1
 
@@ -317,17 +317,17 @@ def test_windows_far_apart_are_refused_before_memory_is_taken(
     path = tmp_path / "1.exr"
     hostile.write_odd_exr(path, planes(), data=data, display=display)
     with pytest.raises(PictureError, match=message):
-        read_frame(path, 1, Reading(), lends=False)
+        read_frame(path, 1, Reading(), reusable=False)
 
 
 def test_a_crop_of_a_huge_picture_lends_where_it_is_asked_to(tmp_path: Path) -> None:
     path = tmp_path / "1.exr"
     hostile.write_odd_exr(path, planes(), display=(0, 0, 3999, 3999))
-    with pytest.raises(NotLending, match=r"few of the 4000x4000 .* --read-limit"):
+    with pytest.raises(NotReusable, match=r"few of the 4000x4000 .* --read-limit"):
         read_frame(path, 1, Reading())
-    assert read_frame(path, 1, Reading(), lends=False).stored.shape == (48, 64)
+    assert read_frame(path, 1, Reading(), reusable=False).stored.shape == (48, 64)
     hostile.write_odd_exr(path, planes(), display=(0, 0, 2999, 2999))
-    with pytest.raises(NotLending, match="has no camera"):
+    with pytest.raises(NotReusable, match="has no camera"):
         read_frame(path, 1, Reading())
 
 
@@ -342,7 +342,7 @@ def test_deep_files_are_refused_before_they_are_read(tmp_path: Path) -> None:
     }
     OpenEXR.File(header, dict.fromkeys("RGB", deep)).write(str(path))
     with pytest.raises(PictureError, match="is deep; save it with flat channels"):
-        read_frame(path, 1, Reading(), lends=False)
+        read_frame(path, 1, Reading(), reusable=False)
 
 
 def test_guides_that_are_no_numbers_cost_no_light(tmp_path: Path) -> None:
@@ -351,7 +351,7 @@ def test_guides_that_are_no_numbers_cost_no_light(tmp_path: Path) -> None:
     normal[:20], albedo[20:30] = np.nan, np.inf
     path = write(tmp_path, replace(own, normal=normal, albedo=albedo))
     told = read_frame(path, 1, Reading())
-    assert told.stored.spoilt is None
+    assert told.stored.invalid is None
     shown = told.stored.picture.reshape(*own.shape, -1)
     assert not shown[:20, :, 6:].any()
     assert not shown[20:30, :, 3:6].any()

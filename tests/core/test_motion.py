@@ -25,11 +25,11 @@ from shots import (
 from xrds_core.temporal.frame import store
 from xrds_core.temporal.motion import (
     Places,
-    carry,
     grid,
     pair,
-    passage,
     places,
+    reproject,
+    reprojection,
     still_places,
 )
 
@@ -54,8 +54,8 @@ def test_the_wall_is_found_where_rays_say(eye: Camera, flat: bool) -> None:
         eye = camera(*where, orthographic=True, window=eye.window)
     here, there = view(0, camera(orthographic=flat)), view(1, eye)
     own = grid(here.name.shape)
-    forth = passage(here.frame.camera, eye)
-    x, y, near = carry(forth, own.x, own.y, store(here.frame).nearness)
+    forth = reprojection(here.frame.camera, eye)
+    x, y, near = reproject(forth, own.x, own.y, store(here.frame).inverse_depth)
     expected = project(eye, here.point).reshape(-1, 2)
     assert np.stack([x, y], -1) == pytest.approx(expected, abs=2e-3)
     depth = -(np.append(here.point, np.ones((*here.name.shape, 1)), -1) @ eye.view[2])

@@ -39,9 +39,9 @@ def by_vectors(shown: list[View]) -> list[Stored]:
 
 def find(stored: list[Stored], here: int, there: int) -> Places:
     others = [x for k, x in enumerate(stored) if k != here]
-    detours = Movement().detours(stored[here], others)
+    object_motions = Movement().object_motions(stored[here], others)
     at = others.index(stored[there])
-    together = pair(stored[here], stored[there], detours[at])
+    together = pair(stored[here], stored[there], object_motions[at])
     return places(together, grid(stored[here].shape))
 
 
@@ -122,9 +122,9 @@ def test_one_movement_serves_a_whole_shot() -> None:
     movement = Movement()
     for here in FRAMES:
         others = [x for k, x in enumerate(stored) if k != here]
-        kept = movement.detours(stored[here], others)
+        kept = movement.object_motions(stored[here], others)
         for old, new in zip(
-            kept, Movement().detours(stored[here], others), strict=True
+            kept, Movement().object_motions(stored[here], others), strict=True
         ):
             assert old is not None
             assert new is not None

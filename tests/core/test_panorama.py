@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Camera, Frame, Sphere, store
-from xrds_core.temporal.motion import carry, passage
+from xrds_core.temporal.motion import reproject, reprojection
 
 Array = NDArray[np.float64]
 WIDTH, HEIGHT, RADIUS = 96, 48, 4.0
@@ -69,7 +69,7 @@ def test_pixels_pass_to_where_the_other_sees_them(
     point = seen.depth[..., None] * rays(here)
     y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
     given = (each.ravel().astype(np.float32) for each in (x, y, 1 / seen.depth))
-    across, down, near = carry(passage(here, there), *given)
+    across, down, near = reproject(reprojection(here, there), *given)
     away = point - np.linalg.inv(there.view)[:3, 3]
     far = np.linalg.norm(away, axis=-1)
     np.testing.assert_allclose(near, 1 / far.ravel(), rtol=1e-4)

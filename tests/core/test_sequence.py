@@ -22,7 +22,7 @@ pytest.importorskip("mitsuba_oidn")
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.sequence.denoise import Files, denoise_sequence
-from xrds_core.sequence.errors import NotLending, Unfit
+from xrds_core.sequence.file_errors import NotReusable, Unfit
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.sequence.names import PassNames
 from xrds_core.sequence.reading import Reading, read_frame
@@ -114,7 +114,7 @@ def test_where_nothing_is_lent_the_picture_is_that_of_the_frame_alone(
     shot = finish_frame(store(own), [store(other)], counting, Movement(), told.append)
     assert len(counting.pictures) == 2
     assert told == [0.0, 0.5, 0.5, 1.0]
-    lent = shot.gathered.samples > 4.0
+    lent = shot.accumulated.samples > 4.0
     assert lent[:, : half - 4].mean() > 0.5
     np.testing.assert_array_equal(shot.picture[:, half + 2 :], alone[:, half + 2 :])
     assert (shot.picture[:, : half - 8] != alone[:, : half - 8]).mean() > 0.5
@@ -169,7 +169,7 @@ def test_usual_names_are_known(tmp_path: Path, names: dict[str, str]) -> None:
     told = read_frame(path, 1, Reading()).stored
     expected = store(own, np.float16)
     np.testing.assert_allclose(told.picture, expected.picture, atol=1e-3)
-    np.testing.assert_allclose(told.nearness, expected.nearness, rtol=1e-5)
+    np.testing.assert_allclose(told.inverse_depth, expected.inverse_depth, rtol=1e-5)
 
 
 def test_other_names_can_be_told(tmp_path: Path) -> None:
@@ -180,7 +180,7 @@ def test_other_names_can_be_told(tmp_path: Path) -> None:
     told = PassNames(beauty="light", albedo="a", normal="n", depth="far")
     asked = Reading(told, normal_space="camera")
     np.testing.assert_array_equal(
-        read_frame(path, 1, asked).stored.nearness, store(frame(1)).nearness
+        read_frame(path, 1, asked).stored.inverse_depth, store(frame(1)).inverse_depth
     )
     with pytest.raises(Unfit, match=r"no vector \(flow\)"):
         read_frame(path, 1, replace(asked, names=replace(told, vector="flow")))
@@ -193,7 +193,7 @@ def test_positions_in_camera_space(tmp_path: Path) -> None:
     names = FLAT | {"position": "P.XYZ", "depth": "other.Z"}
     path = write(tmp_path, own, names, position=point)
     told = read_frame(path, 1, Reading(position_space="camera")).stored
-    np.testing.assert_allclose(told.nearness, store(own).nearness)
+    np.testing.assert_allclose(told.inverse_depth, store(own).inverse_depth)
 
 
 def test_a_camera_that_positions_belie_is_refused(tmp_path: Path) -> None:
@@ -219,8 +219,8 @@ def test_motion_of_two_channels_is_cycles_vector_of_even_motion(tmp_path: Path) 
 )
 def test_samples_per_pixel(tmp_path: Path, header: Any, count: int) -> None:
     path = write(tmp_path, frame(1), header=header)
-    assert read_frame(path, 1, Reading(), lends=False).stored.samples == count
-    asked = read_frame(path, 1, Reading(samples=8), lends=False)
+    assert read_frame(path, 1, Reading(), reusable=False).stored.samples == count
+    asked = read_frame(path, 1, Reading(samples=8), reusable=False)
     assert asked.stored.samples == 8
 
 
@@ -327,11 +327,11 @@ def without_camera(path: Path) -> None:
 @pytest.mark.parametrize(
     ("harm", "line", "is_left_out"),
     [
-        (Path.unlink, "left out for want of a file, as .*0003.exr: frames 3$", True),
+        (Path.unlink, "left out for lack of a file, .*0003.exr: frames 3$", True),
         (damage, "frame 3 is left out: .* is not a complete OpenEXR file", True),
         (without_guides, "frame 3 is left out: .* has no albedo", True),
         (without_camera, "frame 3 is denoised by itself: .* has no camera", False),
-        (shrink, "lend nothing to each other: their sizes are", False),
+        (shrink, "share no samples: their sizes are", False),
     ],
 )
 def test_a_bad_frame_is_told_and_the_others_go_on(
@@ -357,7 +357,7 @@ def test_what_the_first_frame_lacks_ends_the_work(
 ) -> None:
     for path in (shot / "in").iterdir():
         without_camera(path)
-    with pytest.raises(NotLending, match=r"has no camera; give --camera .*-radius 0"):
+    with pytest.raises(NotReusable, match=r"has no camera; give --camera .*-radius 0"):
         denoise(shot, denoiser)
     assert not list((shot / "out").iterdir())
     told = denoise(shot, denoiser, radius=0)

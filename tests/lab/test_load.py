@@ -18,7 +18,7 @@ pytest.importorskip("torch")
 from xrds_core.superres import weights
 from xrds_core.superres.network import XRDS, preset_config
 from xrds_lab.stability import load
-from xrds_lab.stability.load import Frame, drive, growth, settled
+from xrds_lab.stability.load import FrameLoad, drive, growth, settled
 
 FRAMES = 24
 
@@ -86,5 +86,5 @@ def test_a_leak_is_found() -> None:
 
 
 def test_what_settles_is_left_out() -> None:
-    frames = [Frame(number, 0, 0.0) for number in range(30)]
+    frames = [FrameLoad(number, 0, 0.0) for number in range(30)]
     assert settled(frames)[0].memory == 10

@@ -138,7 +138,7 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _lines(result: dict[str, Any]) -> list[str]:
-    from xrds_core.holes import told
+    from xrds_core.holes import describe_bad_pixels
 
     done = [entry["frame"] for entry in result["frames"]]
     outcomes = {"denoised": done, "skipped, complete": result["kept"]}
@@ -148,7 +148,7 @@ def _lines(result: dict[str, Any]) -> list[str]:
         if numbers
     ]
     return lines + [
-        f"  frame {entry['frame']}: {told(entry['bad_pixels'])}"
+        f"  frame {entry['frame']}: {describe_bad_pixels(entry['bad_pixels'])}"
         for entry in result["frames"]
         if entry["bad_pixels"]
     ]

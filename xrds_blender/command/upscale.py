@@ -78,9 +78,9 @@ def _upscale(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _lines(result: dict[str, Any]) -> list[str]:
-    from xrds_core.holes import told
+    from xrds_core.holes import describe_bad_pixels
 
     lines = [f"{result['output']}: {result['seconds']:.1f} s"]
     if result["bad_pixels"]:
-        lines.append(f"  {told(result['bad_pixels'])}")
+        lines.append(f"  {describe_bad_pixels(result['bad_pixels'])}")
     return lines

@@ -14,7 +14,7 @@ import numpy as np
 
 from xrds_core.arrays import Array
 from xrds_core.temporal.halves import Halves
-from xrds_core.temporal.samples import Portion
+from xrds_core.temporal.sample_subsets import SampleSubset
 
 from . import session
 from .clock import StageClock
@@ -35,7 +35,7 @@ class Half:
 
 
 def sample_halves(
-    engine: Any, depsgraph: Any, portion: Portion, geometry: _Geometry
+    engine: Any, depsgraph: Any, portion: SampleSubset, geometry: _Geometry
 ) -> tuple[dict[str, Half], dict[str, float]]:
     """Render a part of a sequence, of two samples or more, in two halves.
 
@@ -62,7 +62,7 @@ def sample_halves(
     return found, _seconds(clocks)
 
 
-def _counted(samples: Samples, part: Portion, clock: StageClock) -> Samples:
+def _counted(samples: Samples, part: SampleSubset, clock: StageClock) -> Samples:
     """With the number of each pixel's samples in the place of its share of the most."""
     if samples.counts is None:
         return samples

@@ -16,7 +16,7 @@ from xrds_core.arrays import Array
 from ..internals import spare_passes
 from ..internals.borrowed import Borrowed, PipelineSettings
 from . import session
-from .low_camera import Frame, LowGrid, Region, is_exact, widen
+from .low_camera import CameraFrame, LowGrid, Region, is_exact, widen
 from .pass_names import COMBINED, DEPTH, GUIDE_PASSES, NOISY, is_light
 from .samples import Reader, read_geometry
 from .settings import set_box_filter
@@ -55,7 +55,7 @@ class LayerSession:
         self.width, self.height = frame_size(render)
         self._size = result.resolution_x, result.resolution_y
         self.region = self._find_region()
-        self.frame = Frame(
+        self.frame = CameraFrame(
             self.width, self.height, render.pixel_aspect_x, render.pixel_aspect_y
         )
         self.views = [view.name for view in result.views] or [""]

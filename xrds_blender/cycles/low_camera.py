@@ -20,7 +20,7 @@ from ..planning.forecast import low_size
 
 
 @dataclass(frozen=True)
-class Frame:
+class CameraFrame:
     """A camera frame in full-resolution pixels, with the pixels' shape."""
 
     width: int
@@ -32,10 +32,10 @@ class Frame:
         """Width and height in low-resolution pixels, rounded up."""
         return low_size(self.width, self.height, scale)
 
-    def covered(self, scale: int) -> Frame:
+    def covered(self, scale: int) -> CameraFrame:
         """The frame that the low-resolution pixels cover."""
         width, height = self.low_size(scale)
-        return Frame(width * scale, height * scale, self.aspect_x, self.aspect_y)
+        return CameraFrame(width * scale, height * scale, self.aspect_x, self.aspect_y)
 
     def fits_width(self, sensor_fit: str) -> bool:
         """Whether Blender lays the sensor along the width."""
@@ -70,7 +70,7 @@ class LowGrid:
     but over the full frame, and resampled by normalised coordinates.
     """
 
-    frame: Frame
+    frame: CameraFrame
     scale: int
     window: Region
     exact: bool
@@ -137,7 +137,9 @@ class Lens:
     shift_y: float
 
 
-def widened(lens: Lens, along_width: bool, frame: Frame, seen: Frame) -> Lens:
+def widened(
+    lens: Lens, along_width: bool, frame: CameraFrame, seen: CameraFrame
+) -> Lens:
     """The lens that shows `seen`, a frame with the same top left corner.
 
     Shifts are in units of the fitted side, as Blender counts them.
@@ -161,7 +163,7 @@ def is_exact(camera: Any) -> bool:
     return camera.type in {"PERSP", "ORTHO"}
 
 
-def widen(borrowed: Borrowed, camera: Any, frame: Frame, scale: int) -> None:
+def widen(borrowed: Borrowed, camera: Any, frame: CameraFrame, scale: int) -> None:
     """Make the evaluated `camera` show `frame.covered(scale)`, until given back."""
     seen = frame.covered(scale)
     if not is_exact(camera) or seen == frame:

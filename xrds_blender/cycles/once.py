@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from xrds_core.temporal.samples import Portion
+from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals import spare_passes
 from ..internals.borrowed import Borrowed
@@ -23,7 +23,7 @@ def render_once(
     seed: int | None = None,
     denoiser: Denoising | None = None,
     noisy: bool = False,
-    portion: Portion | None = None,
+    portion: SampleSubset | None = None,
     is_even: bool = True,
 ) -> StageClock:
     """Render into the engine's result, exactly as Cycles' own engine would.

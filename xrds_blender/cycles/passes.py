@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from xrds_core.temporal.samples import Portion
+from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals.borrowed import Borrowed
 from ..planning.plan import GuideRender
@@ -103,7 +103,7 @@ class CyclesPasses(LayerSession):
         samples: int | None = None,
         *,
         seed: int | None = None,
-        portion: Portion | None = None,
+        portion: SampleSubset | None = None,
     ) -> dict[str, LowSamples]:
         """Render as `beauties`, and leave the noise in.
 
@@ -165,7 +165,7 @@ class CyclesPasses(LayerSession):
         *,
         seed: int | None = None,
         how: GuideRender | None = None,
-        portion: Portion | None = None,
+        portion: SampleSubset | None = None,
     ) -> dict[str, Guides]:
         """As `guides`, for every view by name; `how` names what may be left out.
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from xrds_core.arrays import Array
-from xrds_core.temporal.samples import Portion
+from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals import spare_passes
 from . import live, session
@@ -60,7 +60,7 @@ def sample_layer(
     *,
     samples: int | None = None,
     seed: int | None = None,
-    portion: Portion | None = None,
+    portion: SampleSubset | None = None,
     is_even: bool = True,
     geometry: Sequence[tuple[str, str]] = (),
 ) -> tuple[dict[str, Samples], session.StageClock]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from xrds_core.temporal.samples import Portion
+from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals.borrowed import Borrowed
 from ..planning.settings import Denoising
@@ -50,7 +50,7 @@ def set_samples(
     scene: Any,
     samples: int | None,
     seed: int | None,
-    portion: Portion | None,
+    portion: SampleSubset | None,
     is_even: bool = True,
 ) -> None:
     """Take samples as `set_sampling`, or in their place a part of a sequence.

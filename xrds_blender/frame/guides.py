@@ -12,7 +12,7 @@ import numpy as np
 
 from xrds_core.arrays import Array
 from xrds_core.notices import warn
-from xrds_core.temporal.samples import Portion
+from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..cycles.pass_names import ALBEDO, NORMAL, is_lasting
 from ..cycles.passes import CyclesPasses
@@ -58,7 +58,7 @@ class GuideSource:
         chosen: Plan,
         facts: Facts,
         report: Callable[[set[str], str], None],
-        portion: Portion | None = None,
+        portion: SampleSubset | None = None,
     ) -> None:
         self._passes, self._graph, self._request = passes, depsgraph, request
         self._report = report

@@ -17,8 +17,8 @@ import numpy as np
 from xrds_core.errors import PictureError
 from xrds_core.files import check_folder
 from xrds_core.frames import frame_numbers, frame_path
-from xrds_core.sequence.kept import Origin, write_kept
 from xrds_core.sequence.reading import Reading, read_frame
+from xrds_core.sequence.sample_cache import Origin, write_cached_frame
 from xrds_core.temporal.frame import Frame, Stored
 
 from ..cycles.size import picture_size
@@ -56,7 +56,7 @@ class SampleCache:
         for view, frame in frames.items():
             # an opaque film's alpha says nothing, and would be another channel
             stored = frame if self.transparent else replace(frame, alpha=None)
-            write_kept(self._path(frame.number, view), stored, self.origin)
+            write_cached_frame(self._path(frame.number, view), stored, self.origin)
             self.rendered.add(frame.number)
 
     def read(self, number: int) -> Sampled | None:

@@ -81,7 +81,7 @@ class FullSize(Method):
     ) -> Picture:
         """The picture of a packed frame with the samples of its neighbours."""
         finished = finish_frame(own, neighbours, self._denoiser, self._movement, report)
-        gathered = finished.gathered
+        gathered = finished.accumulated
         return self._picture(
             finished.denoised,
             gathered.albedo,

@@ -10,7 +10,7 @@ import numpy as np
 
 from xrds_core.errors import Cancelled, SceneError
 from xrds_core.temporal.frame import Camera, Frame, store
-from xrds_core.temporal.samples import Portion, continued
+from xrds_core.temporal.sample_subsets import SampleSubset, consecutive_subset
 
 from ..cycles import session
 from ..cycles.halves import sample_halves, sample_motion
@@ -81,14 +81,14 @@ class Sampling:
         """A stage's name in the status bar, with the frame's number in a shot."""
         return stage if self.is_alone else f"{stage} of frame {self.number}"
 
-    def portion(self, count: int, other: int = 0) -> Portion | None:
+    def portion(self, count: int, other: int = 0) -> SampleSubset | None:
         """The frame's part, of `count` samples, of the sequence it continues.
 
         `other` sequences have other seeds. None where each frame begins its own.
         """
         if self.place is None:
             return None
-        return continued(self.place, count, self.radius, self.seed + other)
+        return consecutive_subset(self.place, count, self.radius, self.seed + other)
 
     @property
     def own_seed(self) -> int:
@@ -255,7 +255,9 @@ def _frames_of_halves(
     motion, seconds = {}, dict.fromkeys(("sync", "beauty"), 0.0)
     if how.needs_motion:
         motion, seconds = sample_motion(engine, depsgraph, how.own_seed)
-    portion = how.portion(how.count) or Portion(how.own_seed, how.count, 0, how.count)
+    portion = how.portion(how.count) or SampleSubset(
+        how.own_seed, how.count, 0, how.count
+    )
     found, more = sample_halves(engine, depsgraph, portion, how.geometry)
     frames = {}
     for view, half in found.items():

@@ -17,8 +17,8 @@ from xrds_core.arrays import Array
 from xrds_core.errors import Cancelled
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.frame import Camera, Frame, Stored, store
-from xrds_core.temporal.stand_in import stand_in
-from xrds_core.temporal.takes import same_take
+from xrds_core.temporal.placeholder import reprojected_placeholder
+from xrds_core.temporal.shot_cuts import same_shot
 from xrds_core.temporal.vectors import Movement
 
 from ..choosing.plan_facts import find_facts
@@ -488,7 +488,7 @@ def gathered_guides(own: View, others: Sequence[View], movement: Movement) -> Gu
     if target is None:
         number = own.light.number
         beside = sorted(neighbours, key=lambda each: abs(each.number - number))[:2]
-        target = stand_in(number, own.camera, beside)
+        target = reprojected_placeholder(number, own.camera, beside)
     found = accumulate(target, neighbours, movement)
     assert found.alpha is not None
     # their own number: where nothing is gathered there are no more
@@ -501,7 +501,7 @@ def lacks_guides(own: View, others: Sequence[View]) -> bool:
     if not isinstance(own, View) or own.guides is not None:
         return False
     rich = [each.light for each in others if each.guides is not None]
-    return not same_take(own.light, rich)
+    return not same_shot(own.light, rich)
 
 
 def _samples(view: View) -> float:

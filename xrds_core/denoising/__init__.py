@@ -6,6 +6,6 @@ The library is loaded when the first `Denoiser` is made.
 from __future__ import annotations
 
 from .denoiser import QUALITIES, Denoised, Denoiser, denoise
-from .library import DEVICES, devices
+from .oidn_device import DEVICES, devices
 
 __all__ = ["DEVICES", "QUALITIES", "Denoised", "Denoiser", "denoise", "devices"]

@@ -1,4 +1,4 @@
-"""A denoiser that is kept between pictures, as Cycles uses OIDN but quicker.
+"""A denoiser that is reused between pictures: OIDN as Cycles uses it, but faster.
 
 Arrays are float32 (height, width, channels), row 0 on top, scene-linear. Source of how
 guides are treated: Cycles' `intern/cycles/integrator/denoiser_oidn.cpp`.
@@ -16,8 +16,8 @@ from weakref import WeakSet
 import numpy as np
 
 from ..errors import UsageError
-from . import library
-from .pictures import check, sample
+from . import oidn_device
+from .input_images import check, sample
 from .stages import Stages
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from ..arrays import Array
     from ..progress import Callback
-    from .pictures import Pictures
+    from .input_images import Pictures
 
     Image = NDArray[np.floating[Any]]
 
@@ -39,15 +39,15 @@ QUALITIES = {
 """What we call a quality, and which of OIDN's makes the picture.
 
 `high` is the large network on guides that a smaller one has denoised first; `best`
-takes a large one for albedo, too, which keeps its texture, and the mean of two such
+uses a large one for albedo, too, which preserves its texture, and the mean of two such
 pictures, one made upside down, in 1.8 of the seconds;
 `medium` is a smaller network on such guides; `balanced` and `fast` are smaller ones
 on the guides as they are.
 """
 
-# Of OIDN's networks for guides those of High alone are others. They take twice the
-# seconds: finely textured albedo wins 0.1 to 0.5 dB by them, other albedo 0.03 on the
-# mean, normals nothing.
+# For guides OIDN has two kinds of networks: those of High and those of all others. High
+# takes twice the time: finely textured albedo gains 0.1 to 0.5 dB, other albedo 0.03 on
+# average, normals nothing.
 _SMALL, _LARGE = "Fast", "High"
 # A guide is clean where that would change it by no more than this, root mean square:
 # as it is, it then costs the picture less than 0.05 dB.
@@ -86,7 +86,7 @@ class Denoised:
 class Denoiser:
     """OIDN on a device, ready for any number of pictures of any size.
 
-    Keep it: filters and their memory serve the next picture, too. Calls of several
+    Reuse it: filters and their memory serve the next picture, too. Calls from several
     threads run one after the other.
 
     Args:
@@ -116,8 +116,8 @@ class Denoiser:
             if number is not None and number < 0:
                 raise UsageError(f"{name} is {number}; it must not be negative")
         self.quality = quality
-        self._oidn = library.load()
-        self._device = library.open_device(device, threads)
+        self._oidn = oidn_device.load()
+        self._device = oidn_device.open_device(device, threads)
         _open.add(self)
         self._memory_limit = memory_limit
         self._filters: dict[str, Any] = {}
@@ -152,9 +152,9 @@ class Denoiser:
             albedo: (H, W, 3); values above 1, as of lamps, count as 1, as in Blender.
             normal: (H, W, 3), means of unit vectors of any space, 0 where nothing is.
             hdr: False for values in [0, 1] that are shown as they are.
-            guides_are_clean: True if the picture may take over all that they show,
-                False if not, None to judge each by its own noise, as `best`, `high`
-                and `medium` do: the others then take them for noisy.
+            guides_are_clean: True if all that they show may appear in the picture,
+                False if not, None to decide for each by its own noise, as `best`,
+                `high` and `medium` do: the others then assume that they are noisy.
             progress: takes a fraction in [0, 1] that never falls; False as its result
                 cancels.
 
@@ -167,8 +167,8 @@ class Denoiser:
         result = np.zeros(np.shape(radiance), np.float32)
         result[..., 3:] = pictures.alpha
         prefiltered: tuple[str, ...] = ()
-        with self._lock, library.explained(self.device, result.shape):
-            stages.tell(0.0)
+        with self._lock, oidn_device.explained(self.device, result.shape):
+            stages.report(0.0)
             if pictures.radiance.any():
                 prefiltered = self._to_prefilter(pictures, guides_are_clean)
                 task = self._filter("picture", QUALITIES[self.quality])
@@ -177,7 +177,7 @@ class Denoiser:
                     bool(guides_are_clean) or self.quality in _WITH_PREFILTER
                 )
                 self._run(pictures, prefiltered, result[..., :3], stages)
-            stages.tell(1.0)
+            stages.report(1.0)
         return Denoised(result, pictures.bad_pixels, prefiltered)
 
     def guides(
@@ -197,15 +197,15 @@ class Denoiser:
             raise UsageError("this denoiser is closed; make another one")
         stages = Stages(progress)
         found = {"albedo": albedo, "normal": normal}
-        with self._lock, library.explained(self.device, albedo.shape):
-            stages.tell(0.0)
+        with self._lock, oidn_device.explained(self.device, albedo.shape):
+            stages.report(0.0)
             for name, guide in found.items():
                 stages.begin(1 / len(found))
                 if not self._is_clean(name, guide):
                     held = np.clip(guide, *_RANGE[name])
                     quiet = self._prefilter(name, held, name, stages)
                     found[name] = quiet.astype(np.float32)
-            stages.tell(1.0)
+            stages.report(1.0)
         return found["albedo"], found["normal"]
 
     def _to_prefilter(
@@ -221,9 +221,9 @@ class Denoiser:
         )
 
     def _is_clean(self, name: str, guide: Array) -> bool:
-        """Judge by a sample whether the prefilter would change a guide.
+        """Whether the prefilter would leave a sample of a guide almost unchanged.
 
-        A network tells noise from texture, which differences of pixels do not; and two
+        A network can distinguish noise from texture, pixel differences cannot; and two
         renders with different seeds would not show the noise of aliased edges.
         """
         blocks = sample(guide)
@@ -269,34 +269,34 @@ class Denoiser:
             _mix(output, other if turn else other[::-1])
 
     def _has_room(self, pictures: Pictures) -> bool:
-        """Tell whether there is memory for copies with the rows as Blender has them."""
+        """Whether there is memory for copies with the rows in Blender's order."""
         if self._memory_limit is None:
             return True
         copies = pictures.radiance.size * 4 * (1 + len(pictures.guides))
         return copies <= self._memory_limit // 2
 
     def _prefilter(
-        self, name: str, guide: Image, kept_as: str, stages: Stages | None = None
+        self, name: str, guide: Image, use: str, stages: Stages | None = None
     ) -> Image:
         result = np.empty(guide.shape, np.float16)  # exact enough, for half the memory
-        task = self._filter(kept_as, self._network(name))
+        task = self._filter(use, self._network(name))
         self._limit(task, guide.nbytes + 2 * result.nbytes)
         self._execute(task, {name: guide}, result, stages or Stages(None))
         return result
 
     def _network(self, name: str) -> str:
-        """Return OIDN's quality that denoises a guide."""
+        """Return OIDN's quality for prefiltering a guide."""
         return _LARGE if (self.quality, name) == ("best", "albedo") else _SMALL
 
-    def _filter(self, kept_as: str, quality: str) -> Any:
+    def _filter(self, use: str, quality: str) -> Any:
         """Return the filter of one use; a change of its sizes would cost time."""
-        if kept_as not in self._filters:
-            task = self._filters[kept_as] = self._device.new_filter("RT")
+        if use not in self._filters:
+            task = self._filters[use] = self._device.new_filter("RT")
             task.quality = getattr(self._oidn.Quality, quality)
-        return self._filters[kept_as]
+        return self._filters[use]
 
     def _limit(self, task: Any, held: int) -> None:
-        """Leave a filter the memory that the `held` bytes of guides do not take."""
+        """Limit a filter to the memory left beside the `held` bytes of guides."""
         if self._memory_limit is not None:
             left = max(0, self._memory_limit - held) // _MEBIBYTE
             task.max_memory_mb = min(left, _MOST_MEBIBYTES)
@@ -304,12 +304,12 @@ class Denoiser:
     def _execute(
         self, task: Any, images: dict[str, Image], output: Image, stages: Stages
     ) -> None:
-        """Run a filter; it keeps none of the arrays."""
+        """Run a filter; it holds no reference to the arrays afterwards."""
         task.set_progress_monitor(stages.monitor)
         try:
             for name, image in images.items():
-                self._lend(task, name, image)
-            buffer = self._lend(task, "output", output)
+                self._set_image(task, name, image)
+            buffer = self._set_image(task, "output", output)
             task.execute()
             if buffer is not None:
                 _read(buffer, output)
@@ -321,8 +321,8 @@ class Denoiser:
             for name in (*images, "output"):
                 task.unset_image(name)
 
-    def _lend(self, task: Any, name: str, image: Image) -> Any:
-        """Give an array to a filter; return the buffer, where its device needs one."""
+    def _set_image(self, task: Any, name: str, image: Image) -> Any:
+        """Pass an array to a filter; return the buffer, if its device needs one."""
         if self._device.can_share(image):
             task.set_image(name, image)
             return None

@@ -1,13 +1,13 @@
 """OpenEXR files in and out: passes as arrays, parts, headers.
 
-`pictures` names what a file holds, `library` reads and writes it, `limits` bounds what
-a hostile file may claim.
+`render_passes` finds passes by name, `openexr_io` reads and writes files, `limits`
+bounds what the header of a hostile file may claim.
 """
 
 from __future__ import annotations
 
-from .library import Part
-from .pictures import (
+from .openexr_io import Part
+from .render_passes import (
     CYCLES,
     Beauty,
     File,

@@ -1,4 +1,4 @@
-"""What an OpenEXR file's header may claim, judged before memory is taken for it."""
+"""Limits on what an OpenEXR header may claim, checked before memory is allocated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _ALWAYS_READ = 1 << 30  # bytes of pixels
 _USUAL_RATIO = 1000  # of pixels to file; ZIP, the default, packs no picture smaller
 _ALWAYS_PADDED = 4096 * 2304  # pixels, of a 4K picture
 _USUAL_PADDING = 16  # times the pixels that a crop holds
-_BYTES = 4  # of a number; the header as read does not tell them apart
+_BYTES = 4  # of a number; the header as read does not say half or float
 
 _allowed = 0
 
@@ -34,10 +34,10 @@ def limit_of(size: int) -> int:
 
 
 def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
-    """Raise PictureError for windows that cannot be, or whose pixels take too much.
+    """Raise PictureError for impossible windows, or ones with too many pixels.
 
-    Data lie in the display window, or both in one around them. Deep pixels have any
-    number of samples, which no header tells: they are refused.
+    The data window is inside the display window, or both inside one around them. Deep
+    pixels have any number of samples, which no header states: they are rejected.
     """
     claimed = 0
     for header in headers:

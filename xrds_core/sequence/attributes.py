@@ -1,6 +1,6 @@
-"""Values that headers and camera files tell: anything may stand there.
+"""Values from headers and camera files, which may hold anything.
 
-Each reader takes what the file holds and raises ValueError, with what was wanted, where
+Each reader takes what the file holds and raises ValueError, with what was expected, if
 that is something else.
 """
 
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
 
 MOST = 2**31 - 1  # the libraries count in 32 bits
 LARGEST = 1e15
-"""Of lengths, in any unit: float32 bears its square."""
+"""Of lengths, in any unit: its square fits into float32."""
 _LEAST_SPAN = 1e-6  # radians
 _ROUNDING = 1e-4  # of matrices in single precision
 
 
 def whole(value: Any, least: int = 0, most: int = MOST) -> int:
-    """A whole number, also in words: 64, 64.0 or "64"."""
+    """A whole number, also as text: 64, 64.0 or "64"."""
     text = str(value)[:40] if isinstance(value, int | float | str) else ""
     match = re.fullmatch(r"([0-9]{1,10})(\.0+)?", text)
     if match is None or not least <= int(match[1]) <= most:
@@ -34,7 +34,7 @@ def whole(value: Any, least: int = 0, most: int = MOST) -> int:
 
 
 def whole_or_none(value: Any, least: int = 0, most: int = MOST) -> int | None:
-    """The same, None for anything else: of what a file may recommend."""
+    """The same, but None for anything else: for optional values."""
     try:
         return whole(value, least, most)
     except ValueError:
@@ -52,7 +52,7 @@ def number(value: Any, least: float = -LARGEST, most: float = LARGEST) -> float:
 
 
 def positive(value: Any) -> float:
-    """A number above 0 by which can be divided."""
+    """A number above 0, large enough to divide by."""
     return number(value, 1 / LARGEST)
 
 
@@ -74,7 +74,7 @@ def matrix(rows: Any) -> Matrix:
 
 
 def placement(rows: Any) -> Matrix:
-    """A matrix that moves and turns points, and can be turned back; for columns."""
+    """An invertible affine transform, for column vectors."""
     result = matrix(rows)
     if np.abs(result[3] - [0, 0, 0, 1]).max() > _ROUNDING:
         raise ValueError("a matrix is no placement: it may lie on its side")
@@ -86,7 +86,7 @@ def placement(rows: Any) -> Matrix:
 
 
 def projection(rows: Any) -> Matrix:
-    """(4, 4) to OpenGL clip space, perspective or orthographic, not turned."""
+    """(4, 4) to OpenGL clip space, perspective or orthographic, without rotation."""
     result = matrix(rows)
     ends = [*result[3], result[0, 1], result[1, 0]]  # the rest is free
     kinds = ([0, 0, -1, 0, 0, 0], [0, 0, 0, 1, 0, 0])
@@ -98,7 +98,7 @@ def projection(rows: Any) -> Matrix:
 
 
 def sphere(text: Any) -> Sphere:
-    """What a panorama shows: west, east, south and north in radians, in words."""
+    """What a panorama shows: west, east, south and north in radians, as text."""
     words = text.split() if isinstance(text, str) else []
     try:
         west, east, south, north = (number(float(x), -100.0, 100.0) for x in words)
@@ -116,8 +116,8 @@ def _is_four(value: Any) -> bool:
 
 
 def _short(value: Any) -> str:
-    """What was told, as far as a line has room."""
+    """The value, if it is short enough for an error message."""
     if isinstance(value, int) and abs(value) > MOST:
         return "a number beyond 32 bits"
     text = repr(value) if isinstance(value, int | float | str) else ""
-    return text if 0 < len(text) <= 40 else "what is told"
+    return text if 0 < len(text) <= 40 else "this value"

@@ -1,4 +1,4 @@
-"""Denoising a sequence of files whose frames lend each other their samples."""
+"""Denoising a sequence of files whose frames share their samples."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from ..temporal.vectors import Movement
 from ..temporal.window import Shot, Window
 from ..time_left import Clock
 from .finishing import Finished, finish_frame
-from .lenders import Lenders
 from .loading import Loader
+from .neighbour_frames import NeighbourSelection
 from .reading import FrameFile, Reading
 
 if TYPE_CHECKING:
@@ -31,11 +31,11 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True)
 class Files:
-    """Where frames come from and go to; # stands for digits of the frame number.
+    """Inputs and outputs; # stands for digits of the frame number.
 
     `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
-    the input as well, as they are. `others` are files that are read beside the frames,
-    `halves` the pattern of their other halves.
+    the input as well, unchanged. `others` are files that are read besides the frames,
+    `halves` is the pattern of their second half buffers.
     """
 
     source: str
@@ -58,13 +58,14 @@ class Files:
         )
         return path
 
-    def is_done(self, number: int, lenders: Iterable[int] = ()) -> bool:
-        """Whether a whole output of the input's size is there, younger than its inputs.
+    def is_done(self, number: int, neighbours: Iterable[int] = ()) -> bool:
+        """Whether a complete output of the input's size exists, newer than all inputs.
 
-        So a frame counts as missing when the samples of one of its `lenders` came late.
+        So a frame counts as missing if the samples of one of its `neighbours` came
+        later.
         """
         source, output = (frame_path(x, number) for x in (self.source, self.output))
-        inputs = [source, *(frame_path(self.source, n) for n in lenders)]
+        inputs = [source, *(frame_path(self.source, n) for n in neighbours)]
         times = [path.stat().st_mtime_ns for path in inputs if path.is_file()]
         if not output.is_file() or output.stat().st_mtime_ns < max(times, default=0):
             return False
@@ -75,9 +76,9 @@ class Files:
             return False
 
     def check(self, numbers: Sequence[int], there: Sequence[int]) -> None:
-        """Refuse outputs that cannot be; make their folder.
+        """Reject impossible outputs; make their folder.
 
-        `there` are all frames that have a file: none may be written over.
+        `there` are all frames that have a file: none may be overwritten.
         """
         if Path(self.output).suffix.lower() != ".exr":
             raise UsageError(f"output {self.output!r} must end in .exr")
@@ -108,20 +109,20 @@ def denoise_sequence(
 
     Args:
         files: inputs and outputs.
-        frames: their numbers; all that are there by default. Others that are there,
-            between these or beside them, lend, too.
-        radius: how many frames before and after lend; by default what the files
-            recommend, or 4.
-        resume: leave outputs as they are that lie there whole, of their size, and
-            younger than all inputs that lend to them.
-        say: takes a line about a frame that is finished, left out, or does not lend.
+        frames: their numbers; by default all that exist. Samples of other existing
+            frames, between these or next to them, are reused, too.
+        radius: the temporal radius: how many frames before and after are neighbours; by
+            default what the files recommend, or 4.
+        resume: skip outputs that are complete, of the right size, and newer than all
+            inputs whose samples they reuse.
+        say: takes a line about a frame that is finished, left out, or not reusable.
 
     Returns:
         {output, temporal_radius, device, frames, kept, left_out}; `left_out` are the
-        frames asked for that could not be read, with the reason.
+        requested frames that could not be read, with the reason.
 
     Raises:
-        UsageError: there are no frames, or outputs that cannot be.
+        UsageError: there are no frames, or outputs are impossible.
         PictureError: no frame can be read, the first lacks passes, or an output cannot
             be written; outputs before it are complete.
     """
@@ -129,8 +130,8 @@ def denoise_sequence(
     there = _there(files.source, numbers)
     files.check(numbers, there)
     if "#" not in Path(files.source).name:
-        radius = radius or 0  # a frame alone
-    loader = Loader(files.source, reading or Reading(), lends=radius != 0, say=say)
+        radius = radius or 0  # a single frame
+    loader = Loader(files.source, reading or Reading(), reusable=radius != 0, say=say)
     loader.look(numbers, set(there))
     readable = [n for n in numbers if n not in loader.failed]
     first = loader.first(readable)
@@ -169,17 +170,17 @@ def _entries(
     resume: bool,
     say: Say,
 ) -> Iterator[dict[str, Any]]:
-    """Finish and write the frames of a shot; yields what is told of each.
+    """Finish and write the frames of a shot; yields the record of each.
 
-    A frame that cannot be written is left out; two of them in a row end the work.
+    A frame that cannot be written is left out; two of them in a row are an error.
     """
-    lenders, movement, fails = Lenders(say), Movement(), False
+    selection, movement, fails = NeighbourSelection(say), Movement(), False
     for found in Window(shot, loader.load):
         number, own = found.number, found.own
-        # another machine may have been quicker
+        # another machine may have finished it
         if resume and files.is_done(number, shot.neighbours(number)):
             continue
-        others = lenders.of(number, own, found.neighbours)
+        others = selection.select(number, own, found.neighbours)
         finished = finish_frame(
             own.stored, others, denoiser, movement, region=own.inner
         )
@@ -192,11 +193,11 @@ def _entries(
             fails = True
             loader.leave_out(number, error)
             continue
-        lenders.heed(others, finished.gathered)
+        selection.record(others, finished.accumulated)
         seconds = {"read": loader.seconds(), **finished.seconds}
         seconds["write"] = time.perf_counter() - started
         yield _entry(number, path, shot.radius, finished, seconds)
-    lenders.sum_up()
+    selection.report()
 
 
 def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
@@ -214,7 +215,7 @@ def _all_frames(pattern: str) -> list[int]:
 
 
 def _there(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
-    """The frames that have a file; one without # is that of every number."""
+    """The frames that have a file; without # there is one for every number."""
     if "#" in Path(pattern).name:
         return frame_numbers(pattern)
     return numbers if os.path.lexists(pattern) else []
@@ -223,16 +224,16 @@ def _there(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
 def _entry(
     number: int, path: Path, radius: int, finished: Finished, seconds: dict[str, float]
 ) -> dict[str, Any]:
-    gathered = finished.gathered
+    accumulated = finished.accumulated
     return {
         "frame": number,
         "output": str(path),
         "seconds": seconds | {"total": sum(seconds.values())},
         "temporal": {
             "radius": radius,
-            "frames": gathered.frames,
-            "mean_samples": float(gathered.samples.mean()),
-            "rejected": gathered.rejected,
+            "frames": accumulated.frames,
+            "mean_samples": float(accumulated.samples.mean()),
+            "rejected": accumulated.rejected,
         },
         "bad_pixels": finished.denoised.bad_pixels,
     }

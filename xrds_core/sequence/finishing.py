@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..temporal.accumulate import Accumulated, accumulate
-from ..temporal.neighbours import box
+from ..temporal.local_filters import box
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from ..temporal.vectors import Movement
 
 
-# Samples lent for each of the frame's own, from which on the shot's picture counts in
-# full, and how many must be lent in all: few samples tell little of what is right.
+# The accumulated picture has full weight from this many reused samples for each of the
+# frame's own, and this many in all: few samples say little.
 _ENOUGH, _IN_ALL = 1.0, 3.0
-# What is missing in the 3x3 pixels around one counts against it as often as half of the
-# frame's samples, but between these: the less noise there is, the more a few noisy
-# pixels are seen.
-_LEAST_OFTEN, _MOST_OFTEN = 1.0, 2.0
+# What is missing in the 3x3 pixels around a pixel counts against it, times half of the
+# frame's samples, clipped to this range: the less noise there is, the more visible a
+# few noisy pixels are.
+_LEAST_FACTOR, _MOST_FACTOR = 1.0, 2.0
 _SMOOTH = 3  # pixels across
 
 
@@ -34,12 +34,12 @@ _SMOOTH = 3  # pixels across
 class Finished:
     """A finished frame.
 
-    `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of `gathered`,
-    or the region of it that was asked for; `seconds`: accumulate, denoise.
+    `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of
+    `accumulated`, or the requested region of it; `seconds`: accumulate, denoise.
     """
 
     denoised: Denoised
-    gathered: Accumulated
+    accumulated: Accumulated
     seconds: dict[str, float]
 
     @property
@@ -50,63 +50,67 @@ class Finished:
 
 def finish_frame(
     own: Stored,
-    lenders: Sequence[Stored],
+    neighbours: Sequence[Stored],
     denoiser: Denoiser,
     movement: Movement,
     progress: Callable[[float], bool] | None = None,
     *,
     region: tuple[slice, slice] | None = None,
 ) -> Finished:
-    """Accumulate the samples of `lenders` onto a frame and denoise it.
+    """Accumulate the samples of `neighbours` on a frame and denoise it.
 
-    Where little is lent the picture is that of the frame alone, denoised as well:
-    beside pixels of many samples a denoiser takes the noise of a few for detail.
-    `region`, rows and columns, is what is denoised: black around a crop would tell the
-    denoiser a wrong exposure. Raises Cancelled where `progress` says so.
+    Where few samples are reused the picture is that of the frame alone, also denoised:
+    next to pixels of many samples a denoiser mistakes the noise of few for detail.
+    `region`, rows and columns, is the part to denoise: black around a crop would give
+    the denoiser a wrong exposure. Raises Cancelled if `progress` requests it.
     """
     started = time.perf_counter()
-    gathered = accumulate(own, lenders, movement)
-    alone = accumulate(own, []) if lenders else gathered
-    share = _share(gathered, alone, own.samples)
-    accumulated = time.perf_counter()
+    accumulated = accumulate(own, neighbours, movement)
+    alone = accumulate(own, []) if neighbours else accumulated
+    share = _share(accumulated, alone, own.samples)
+    denoise_started = time.perf_counter()
     region = region or (slice(None), slice(None))
     share = share[region]
     parts = 1 if _is_even(share) else 2
-    denoised = denoiser(*_passes(gathered, region), progress=_part(progress, 0, parts))
+    denoised = denoiser(
+        *_passes(accumulated, region), progress=_part(progress, 0, parts)
+    )
     if parts == 2:
-        passes = _passes(_filled(alone, gathered), region)
+        passes = _passes(_filled(alone, accumulated), region)
         single = denoiser(*passes, progress=_part(progress, 1, parts)).radiance
         mixed = single + (denoised.radiance - single) * share[..., None]
         denoised = replace(denoised, radiance=mixed)
     seconds = {
-        "accumulate": accumulated - started,
-        "denoise": time.perf_counter() - accumulated,
+        "accumulate": denoise_started - started,
+        "denoise": time.perf_counter() - denoise_started,
     }
-    return Finished(denoised, gathered, seconds)
+    return Finished(denoised, accumulated, seconds)
 
 
-def _share(gathered: Accumulated, alone: Accumulated, samples: float) -> Array:
-    """Return (H, W) in [0, 1]: how much the shot's picture counts, by what is lent.
+def _share(accumulated: Accumulated, alone: Accumulated, samples: float) -> Array:
+    """Return (H, W) in [0, 1]: the weight of the accumulated picture.
 
-    The frame has so many `samples` on the mean.
+    It depends on how many samples are reused. `samples` is the frame's own mean.
     """
     enough = max(_ENOUGH, _IN_ALL / samples)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the frame has none
-        lent = gathered.samples / alone.samples - np.float32(1.0)
-    lent = np.where(alone.samples > 0.0, np.clip(lent / enough, 0.0, 1.0), 1.0)
-    lent = lent.astype(np.float32)
-    often = np.float32(np.clip(samples / 2.0, _LEAST_OFTEN, _MOST_OFTEN))
-    around = 1.0 - often * (1.0 - box(lent, _SMOOTH))
-    return np.clip(box(np.clip(np.minimum(lent, around), 0.0, 1.0), _SMOOTH), 0.0, 1.0)
+        reused = accumulated.samples / alone.samples - np.float32(1.0)
+    reused = np.where(alone.samples > 0.0, np.clip(reused / enough, 0.0, 1.0), 1.0)
+    reused = reused.astype(np.float32)
+    factor = np.float32(np.clip(samples / 2.0, _LEAST_FACTOR, _MOST_FACTOR))
+    around = 1.0 - factor * (1.0 - box(reused, _SMOOTH))
+    return np.clip(
+        box(np.clip(np.minimum(reused, around), 0.0, 1.0), _SMOOTH), 0.0, 1.0
+    )
 
 
 def _is_even(share: Array) -> bool:
-    """Whether one picture is all that is asked for."""
+    """Whether one of the two pictures is all that is needed."""
     return bool((share == share.flat[0]).all()) and float(share.flat[0]) in (0.0, 1.0)
 
 
-def _filled(alone: Accumulated, gathered: Accumulated) -> Accumulated:
-    """Return the frame alone with what is lent to pixels that have no samples."""
+def _filled(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
+    """Return the frame alone, its pixels without samples filled by reused ones."""
     holes = alone.samples == 0.0
     if not holes.any():
         return alone
@@ -116,12 +120,12 @@ def _filled(alone: Accumulated, gathered: Accumulated) -> Accumulated:
             return None
         return np.where(holes if one.ndim == 2 else holes[..., None], two, one)
 
-    albedo = fill(alone.albedo, gathered.albedo)
-    normal = fill(alone.normal, gathered.normal)
+    albedo = fill(alone.albedo, accumulated.albedo)
+    normal = fill(alone.normal, accumulated.normal)
     assert albedo is not None
     assert normal is not None
-    radiance = fill(alone.radiance, gathered.radiance)
-    alpha = fill(alone.alpha, gathered.alpha)
+    radiance = fill(alone.radiance, accumulated.radiance)
+    alpha = fill(alone.alpha, accumulated.alpha)
     return replace(alone, radiance=radiance, albedo=albedo, normal=normal, alpha=alpha)
 
 
@@ -138,7 +142,7 @@ def _passes(frame: Accumulated, region: tuple[slice, slice]) -> list[Array]:
 def _part(
     progress: Callable[[float], bool] | None, number: int, parts: int
 ) -> Callable[[float], bool] | None:
-    """Return what tells the progress of one of equal parts as that of the whole."""
+    """Return a callback that reports the progress of one of equal parts."""
     if progress is None or parts == 1:
         return progress
     return lambda done: progress((number + done) / parts)

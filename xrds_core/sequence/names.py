@@ -1,4 +1,4 @@
-"""Which channels of a file hold what: names that renderers give to their passes."""
+"""Which channels of a file hold what, by the names that renderers give to passes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 from ..exr.channels import COMPONENTS
-from .errors import Unfit
+from .file_errors import Unfit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
 NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
 CAMERA_NORMAL = "Denoising Normal"
-NOISE = "XRDS Noise"  # of the samples, as was known when XRDS kept them
-# Of passes in the order in which they are looked for, in any case of letters.
+NOISE = "XRDS Noise"  # of the samples, as XRDS estimated it before storing them
+# Names of passes in the order in which they are tried, case-insensitive.
 _USUAL = {
     "beauty": (NOISY, COMBINED, "beauty", "RGBA", "rgb", "C", "Ci"),
     "albedo": ("Denoising Albedo", "albedo", "denoise_albedo", "diffuse_albedo"),
@@ -31,9 +31,9 @@ _MOTION = ("XYZW", "RGBA", "xyzw", "XY", "RG", "xy", "rg", "UV", "uv")
 
 @dataclass(frozen=True)
 class PassNames:
-    """What the passes are called; None for the usual names.
+    """The names of the passes; None for the usual ones.
 
-    A layer before them may be left out. `beauty` is the noisy radiance.
+    Their layer may be left out. `beauty` is the noisy radiance.
     """
 
     beauty: str | None = None
@@ -49,10 +49,10 @@ PASSES = tuple(field.name for field in fields(PassNames))
 
 @dataclass(frozen=True)
 class Found:
-    """The full names of channels of one file, of those passes that it has.
+    """The full names of the channels of the passes that a file has.
 
-    `picture` are the channels that the finished picture takes, R, G, B, and `alpha` is
-    the one that holds alpha now.
+    `picture` are the channels that the finished picture is written to, R, G, B, and
+    `alpha` is the one that holds alpha in the input.
     """
 
     beauty: list[str]
@@ -70,8 +70,8 @@ class Found:
 def find(channels: Channels, names: PassNames) -> Found:
     """Find the passes of a file.
 
-    Raises Unfit where beauty, albedo or normal is missing, or one that was asked for by
-    name; PictureError where several layers hold one.
+    Raises Unfit where beauty, albedo or normal is missing, or a pass requested by name;
+    PictureError where several layers hold one.
     """
     beauty = _pass(channels, names, "beauty")
     prefix = "" if beauty is None else beauty
@@ -101,7 +101,7 @@ def _noise(channels: Channels) -> list[str]:
 
 
 def _target(channels: Channels, prefix: str) -> str:
-    """The pass that the picture of a noisy pass becomes: Cycles has two of them."""
+    """The pass that the denoised picture is written to: Cycles has two of them."""
     layer, _, name = prefix.rpartition(".")
     if name != NOISY:
         return prefix
@@ -116,11 +116,11 @@ def _pass(
     letters: Sequence[str] = COMPONENTS,
 ) -> str | None:
     """The full name of a pass; None where there is none of the usual names."""
-    asked = getattr(names, kind)
-    if asked is not None:
-        found = channels.find(asked, letters)
+    requested = getattr(names, kind)
+    if requested is not None:
+        found = channels.find(requested, letters)
         if found is None:
-            raise _missing(channels, kind, asked)
+            raise _missing(channels, kind, requested)
         return found
     if kind == "beauty" and channels.of("") and not channels.find(NOISY):
         return None  # plain R, G, B

@@ -1,4 +1,4 @@
-"""One frame out of an OpenEXR file, ready to lend its samples to others."""
+"""Reads one frame from an OpenEXR file, with all that reprojection needs."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from ..temporal.halves import Halves
 from ..temporal.motion import centres, pixels_of
 from ..temporal.noise import Noise
 from . import attributes
-from .cameras import from_header, told_camera
-from .errors import NotLending, Unfit
+from .cameras import camera_of_frame, from_header
+from .file_errors import NotReusable, Unfit
 from .names import Found, PassNames, find
 
 if TYPE_CHECKING:
@@ -25,29 +25,29 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from ..arrays import Array
-    from ..exr.library import Part, Window
+    from ..exr.openexr_io import Part, Window
 
 SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
 NAME = "cameraLabel"
-"""Attributes: samples per pixel; what the frame was rendered from, in letters; the
-radius that its samples were laid out for; 1 where nothing at all moves in the shot; the
-camera's name."""
-_UNTOLD_SAMPLES = 16
-_FITS = 2.0  # pixels by which a Position pass may lie beside its own pixel
-_NEAREST = 1e-30  # depth of a hit, in any unit: float32 bears what is divided by it
-_SPOTS = 4096  # pixels that are asked whether it does
-_CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # stands in where none is needed
+"""Attributes: samples per pixel; a key of what the frame was rendered from; the
+temporal radius that its sample subsets are for; 1 where nothing at all moves in the
+shot; the camera's name."""
+_DEFAULT_SAMPLES = 16
+_FITS = 2.0  # pixels by which a reprojected Position pass may be off
+_NEAREST = 1e-30  # depth of a hit, in any unit: dividing by it stays within float32
+_SPOTS = 4096  # pixels for which this is checked
+_CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # placeholder where none is needed
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How files are read that do not say it themselves.
+    """Options for reading files, for what they do not say themselves.
 
     `cameras` are those of `cameras.read_cameras`; `samples` per pixel; `normal_space`
     and `position_space` are `world` or `camera`, None for what the passes' names say;
-    `motion_scale` are the factors that make a motion pass of two channels pixels to the
-    next frame, x to the right and y upwards. `halves` is a pattern of files with as
-    many other samples of each frame.
+    `motion_scale` are the factors that convert a motion pass of two channels to pixels
+    to the next frame, x to the right and y upwards. `halves` is a pattern of files with
+    the second half buffers: as many other samples of each frame.
     """
 
     names: PassNames = field(default_factory=PassNames)
@@ -61,14 +61,15 @@ class Reading:
 
 @dataclass(frozen=True)
 class FrameFile:
-    """A frame as it lies in a file.
+    """A frame of a file.
 
     `stored` covers the display window and all that the picture's data window has
-    beyond it, or, as of a frame that need not lend, the data window alone; `inner` cuts
-    the latter out of its arrays. `part` is where the picture lies and `channels` are
-    those that it takes, R, G, B and, where the file has alpha, A. `key`: of equal ones
-    the render settings are the same; "" if untold. `radius`: what the file recommends,
-    or None. `lends` is False where nobody can tell where its pixels were.
+    beyond it, or, of a frame that is not to be reused, the data window alone; `inner`
+    crops its arrays to the latter. `part` is the file's part with the picture and
+    `channels` are those of the picture, R, G, B and, where the file has alpha, A.
+    Frames with the same `key` have the same render settings; "" if unknown. `radius`
+    is the one that the file recommends, or None. `reusable` is False where the frame
+    cannot be reprojected.
     """
 
     stored: Stored
@@ -77,23 +78,23 @@ class FrameFile:
     channels: list[str]
     key: str
     radius: int | None
-    lends: bool
+    reusable: bool
 
 
 def read_frame(
-    path: Path, number: int, reading: Reading, *, lends: bool = True
+    path: Path, number: int, reading: Reading, *, reusable: bool = True
 ) -> FrameFile:
-    """Read a frame; without `lends`, no camera and no depth is needed.
+    """Read a frame; one that need not be `reusable` needs no camera and no depth.
 
-    Raises Unfit, NotLending among them, with the path and the remedy, and PictureError
-    for a file that is not whole.
+    Raises Unfit, also NotReusable, with the path and the remedy, and PictureError for
+    an incomplete file.
     """
     file = File(path)
     found = find(file.names, reading.names)
     number_of_part, channels = _target(file, found)
     part = file.parts[number_of_part]
-    file.window = _window(path, part) if lends else part.data_window
-    camera, depth = _geometry(file, part, found, number, reading, lends)
+    file.window = _window(path, part) if reusable else part.data_window
+    camera, depth = _geometry(file, part, found, number, reading, reusable)
     beauty = _stack(file, found.beauty)
     frame = Frame(
         number=number,
@@ -104,7 +105,7 @@ def read_frame(
         depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
         samples=_samples(part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
-        vector=_vector(file, found, reading) if lends else None,
+        vector=_vector(file, found, reading) if reusable else None,
         still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
     )
     if reading.halves is not None:
@@ -119,14 +120,14 @@ def read_frame(
         channels=channels,
         key=str(part.attributes.get(KEY, "")),
         radius=attributes.whole_or_none(part.attributes.get(RADIUS), 0, MOST_RADIUS),
-        lends=camera is not None and depth is not None,
+        reusable=camera is not None and depth is not None,
     )
 
 
 def _with_other_half(
     frame: Frame, file: File, camera: Camera | None, reading: Reading
 ) -> Frame:
-    """The mean of a frame and of the file with as many other samples of it."""
+    """Return the mean of a frame and of its second half buffer."""
     assert reading.halves is not None
     path = frame_path(reading.halves, frame.number)
     if not path.is_file():
@@ -161,47 +162,47 @@ _REMEDY = {
 
 
 def _geometry(
-    file: File, part: Part, found: Found, number: int, reading: Reading, lends: bool
+    file: File, part: Part, found: Found, number: int, reading: Reading, reusable: bool
 ) -> tuple[Camera | None, Array | None]:
-    """Camera and depth; without `lends` what of a camera can be used, and no depth.
+    """Camera and depth; if not `reusable`, a camera if there is one, and no depth.
 
-    Raises NotLending, with `lends`, for what is missing or unusable.
+    Raises NotReusable, if `reusable`, for what is missing or unusable.
     """
     try:
         camera = _camera(file, part, number, reading)
-    except NotLending:
-        if lends:
+    except NotReusable:
+        if reusable:
             raise
         camera = None
-    if not lends:
+    if not reusable:
         return camera, None
     depth = None if camera is None else _depth(file, found, camera, reading)
     if camera is None or depth is None:
         lacking = "camera" if camera is None else "depth"
-        raise NotLending(f"{file.path} has no {lacking}", _REMEDY[lacking])
+        raise NotReusable(f"{file.path} has no {lacking}", _REMEDY[lacking])
     return camera, depth
 
 
 def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | None:
-    """The camera that the options tell, or else the header."""
+    """The camera from the options, or else from the header."""
     (left, top), (right, bottom) = part.display_window
     size = (right - left + 1, bottom - top + 1)
-    told = part.attributes
+    header = part.attributes
     try:
         if reading.cameras is not None:
-            aspect = attributes.number(told.get("pixelAspectRatio", 1.0), 1e-3, 1e3)
-            camera = told_camera(reading.cameras, number, size, aspect)
+            aspect = attributes.number(header.get("pixelAspectRatio", 1.0), 1e-3, 1e3)
+            camera = camera_of_frame(reading.cameras, number, size, aspect)
         else:
-            camera = from_header(told, size)
+            camera = from_header(header, size)
     except ValueError as error:
-        raise NotLending(
+        raise NotReusable(
             f"{file.path}: its camera cannot be used ({error})", _REMEDY["camera"]
         ) from error
     if camera is None or file.window is None:
         return None
     (x, y), _ = file.window
     # Blender writes `Camera`
-    name = camera.name or str(told.get(NAME) or told.get("Camera", ""))
+    name = camera.name or str(header.get(NAME) or header.get("Camera", ""))
     return replace(camera, window=(x - left, y - top), name=name)
 
 
@@ -209,14 +210,14 @@ def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array 
     """Depth (H, W) along the camera's axis, infinite without a hit."""
     position, depth = found.position, found.depth
     if depth and position and _is_half(file, position):
-        position = []  # half floats tell a place in the world by centimetres
+        position = []  # half floats give positions only to centimetres
     if not position:
         return _from_depth(file.plane(depth[0])) if depth else None
     points = _stack(file, position)
     points[~np.isfinite(points).all(axis=-1)] = 0.0
     if reading.position_space == "camera":
         return _from_depth(points[..., 2])
-    with np.errstate(over="ignore", invalid="ignore"):  # places beyond all worlds
+    with np.errstate(over="ignore", invalid="ignore"):  # huge positions
         result = camera.depth(points)
     result[np.abs(result) < _NEAREST] = 0.0
     if camera.sphere is None:
@@ -225,7 +226,7 @@ def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array 
 
 
 def _from_depth(depth: Array) -> Array:
-    """Renderers write 0, infinity or a huge number where there is no hit."""
+    """Depth; renderers write 0, infinity or a huge number where there is no hit."""
     depth = np.abs(depth)
     with np.errstate(invalid="ignore"):
         hit = (depth > _NEAREST) & (depth < SKY_DEPTH)
@@ -233,7 +234,7 @@ def _from_depth(depth: Array) -> Array:
 
 
 def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
-    """Raise NotLending where the camera does not show positions at their pixels."""
+    """Raise NotReusable if the camera does not project positions to their pixels."""
     seen = np.flatnonzero(np.isfinite(depth.ravel()) & (depth.ravel() > 0.0))
     if not seen.size:
         return
@@ -241,11 +242,11 @@ def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
     world = points.reshape(-1, 3)[spots].astype(np.float64)
     there = pixels_of(camera) @ np.column_stack((world, np.ones(len(world)))).T
     x, y = centres(spots, depth.shape[1])
-    with np.errstate(all="ignore"):  # a wrong camera may lie in a point, or far off
+    with np.errstate(all="ignore"):  # a wrong camera may be at a point, or far off
         apart = np.hypot(there[0] / there[2] - x, there[1] / there[2] - y)
         off = float(np.median(apart))
     if not off < _FITS:
-        raise NotLending(
+        raise NotReusable(
             f"{file.path}: its camera shows the Position pass {off:.0f} pixels beside "
             "its pixels",
             "give another --camera, --position-space camera, or --temporal-radius 0",
@@ -261,12 +262,12 @@ def _normal(file: File, found: Found, camera: Camera | None, reading: Reading) -
     if space == "camera" or camera is None:
         return normal
     turn = np.diag([1.0, 1.0, -1.0]) @ camera.view[:3, :3]
-    with np.errstate(over="ignore", invalid="ignore"):  # of no length that normals have
+    with np.errstate(over="ignore", invalid="ignore"):  # of vectors that are no normals
         return normal @ turn.T.astype(np.float32)
 
 
 def _vector(file: File, found: Found, reading: Reading) -> Array | None:
-    """Cycles' Vector pass, or one of it: motion is taken to be even around a frame."""
+    """Cycles' Vector pass, or one of one direction: motion is assumed to be uniform."""
     if not found.vector:
         return None
     motion = _stack(file, found.vector)
@@ -277,20 +278,20 @@ def _vector(file: File, found: Found, reading: Reading) -> Array | None:
 
 
 def _noise(file: File, found: Found) -> Noise:
-    """What was known of the noise of a frame that XRDS kept."""
+    """The noise of a frame as XRDS stored it."""
     planes = (np.nan_to_num(file.plane(name).ravel()) for name in found.noise)
     cut = (np.clip(plane, -LARGEST_HALF, LARGEST_HALF) for plane in planes)
     return Noise(*(plane.astype(np.float16) for plane in cut))
 
 
 def _samples(part: Part, reading: Reading) -> int:
-    """Samples per pixel: as asked for, or as XRDS or Blender wrote them."""
+    """Samples per pixel: from the options, or as XRDS or Blender wrote them."""
     if reading.samples:
         return reading.samples
-    told = [part.attributes.get(SAMPLES)]
-    told += [v for k, v in part.attributes.items() if _is_cycles_samples(k)]
-    counts = [attributes.whole_or_none(x, 1) for x in told]
-    return next((x for x in counts if x is not None), _UNTOLD_SAMPLES)
+    values = [part.attributes.get(SAMPLES)]
+    values += [v for k, v in part.attributes.items() if _is_cycles_samples(k)]
+    counts = [attributes.whole_or_none(x, 1) for x in values]
+    return next((x for x in counts if x is not None), _DEFAULT_SAMPLES)
 
 
 def _is_cycles_samples(name: str) -> bool:
@@ -298,7 +299,7 @@ def _is_cycles_samples(name: str) -> bool:
 
 
 def _target(file: File, found: Found) -> tuple[int, list[str]]:
-    """Return the part that takes the picture, and its channels' names there."""
+    """Return the part that the picture is written to, and its channels' names there."""
     prefix = found.picture[0].rpartition(".")[0]
     alpha = f"{prefix}.A" if prefix else "A"
     wanted = [*found.picture, alpha] if found.alpha is not None else found.picture
@@ -319,7 +320,7 @@ def _in_layer(layer: str, letter: str) -> str:
 
 
 def _guide(x: Array) -> Array:
-    """Guides without NaN: a sky may have no normal, and has good light all the same."""
+    """Guides without NaN: a sky may have no normal, and its light is valid anyway."""
     known = np.isfinite(x).all(axis=-1, keepdims=True)
     return x if known.all() else np.where(known, x, np.float32(0.0))
 
@@ -333,11 +334,11 @@ def _is_half(file: File, names: list[str]) -> bool:
 
 
 def _window(path: Path, part: Part) -> Window:
-    """What the arrays of a frame cover.
+    """The window that the arrays of a frame cover.
 
-    Renderers may crop each frame to what it shows, and then the display window is what
-    frames have in common. Ours are all cropped alike. Raises NotLending where that
-    would fill the memory with nothing.
+    Renderers may crop each frame to its content, so that the display window is what
+    frames have in common. Our own files all have the same crop. Raises NotReusable if
+    the window would be mostly empty and fill the memory.
     """
     if KEY in part.attributes:
         return part.data_window
@@ -346,7 +347,7 @@ def _window(path: Path, part: Part) -> Window:
     whole = (min(a, e), min(b, f)), (max(c, g), max(d, h))
     if is_mostly_empty(_area(part.data_window), _area(whole)):
         (left, top), (right, bottom) = whole
-        raise NotLending(
+        raise NotReusable(
             f"{path} holds few of the {right - left + 1}x{bottom - top + 1} pixels of "
             "its windows",
             "if it is sound give --read-limit, or else --temporal-radius 0",
@@ -360,7 +361,7 @@ def _area(window: Window) -> int:
 
 
 def _inner(whole: Window, part: Window) -> tuple[slice, slice]:
-    """Where a data window lies in the arrays of a larger one: rows, columns."""
+    """Rows and columns of a data window in the arrays of a larger one."""
     (left, top), _ = whole
     (x, y), (right, bottom) = part
     return slice(y - top, bottom - top + 1), slice(x - left, right - left + 1)

@@ -26,13 +26,13 @@ def finish(picture: Array, low: Array, guide_alpha: Array | None, scale: int) ->
         # one more row at each end: as far as interpolation and bounds look
         first, last = max(top - 1, 0), min(top + _BAND + 1, height)
         rows = slice(first * scale, last * scale)
-        kept = slice((top - first) * scale, (top - first + _BAND) * scale)
+        inner = slice((top - first) * scale, (top - first + _BAND) * scale)
         band, target = low[first:last], picture[rows]
         guide = None if guide_alpha is None else guide_alpha[rows]
         alpha = _alpha(band[..., 3], guide, target.shape[:2], scale)
         bounded = _bounded(target[..., :3], alpha, band, scale)
-        target[kept, :, :3] = bounded[kept]
-        target[kept, :, 3] = alpha[kept]
+        target[inner, :, :3] = bounded[inner]
+        target[inner, :, 3] = alpha[inner]
 
 
 def _alpha(
@@ -45,7 +45,7 @@ def _alpha(
 
 
 def _bounded(radiance: Array, alpha: Array, low: Array, scale: int) -> Array:
-    """Keep the colour behind `alpha` among those of the 3x3 pixels of `low`.
+    """Clamp the colour behind `alpha` to the range of the 3x3 pixels of `low`.
 
     Only near edges: where all nine are opaque, radiance may be anything. Light that
     covers nothing (alpha 0), as of fire, sets no upper bound.

@@ -68,9 +68,9 @@ def leaves(network: nn.Module) -> list[nn.Module]:
 def measure(network: XRDS) -> Cost:
     """Run `network` in float32 on two by two windows and return its cost.
 
-    Everything it computes grows with the number of pixels, so that a tiny picture
-    tells of a large one: but for the areas of a `KernelTail`, of which there are many
-    in a large picture. So bytes are those of a pass over many small areas.
+    All costs grow with the number of pixels, so a tiny picture represents a large one:
+    except the areas of a `KernelTail`, of which there are many in a large picture. So
+    bytes are those of a pass over many small areas.
     """
     config = network.config
     device = next(network.parameters()).device

@@ -79,7 +79,7 @@ def upscale_file(
     )
     planes = zip("RGBA", np.moveaxis(result.radiance, 2, 0), strict=False)
     seconds = time.perf_counter() - start
-    told = {
+    record = {
         "version": package_version(),
         "way": "super-resolution",
         "scale": scale,
@@ -87,7 +87,7 @@ def upscale_file(
         "device": upscaler.device,
         "seconds": f"{seconds:.1f}",
     }
-    metadata = {f"xrds.{name}": str(value) for name, value in told.items()}
+    metadata = {f"xrds.{name}": str(value) for name, value in record.items()}
     write_picture(output, dict(planes), encoding, metadata)
     return {
         "output": str(output),

@@ -1,4 +1,4 @@
-"""Radiance to network space and back, and what keeps every value bounded.
+"""Radiance to network space and back, with every value bounded.
 
 NumPy pictures are float32 (height, width, channels), row 0 on top, scene-linear
 Rec.709, radiance premultiplied by alpha. Torch tensors are (batch, channels,
@@ -95,9 +95,9 @@ def auto_exposure(radiance: Array) -> float:
 
 
 def choose_exposure(exposure: float | None, radiance: Array) -> float:
-    """Return the exposure e that was asked for, or else the one of `radiance`.
+    """Return the requested exposure e, or else the one of `radiance`.
 
-    Raises UsageError for an exposure that float32 arithmetic cannot bear.
+    Raises UsageError for an exposure beyond the range of float32 arithmetic.
     """
     if exposure is None:
         return auto_exposure(radiance)
@@ -217,5 +217,5 @@ def upsample_alpha(low_alpha: Array, guide_alpha: Array, scale: int) -> Array:
     missing = upsample_bilinear(low - area_mean(guide, scale), scale)
     alpha = (guide + missing).clamp(0.0, 1.0)
     block = functional.interpolate(low, scale_factor=float(scale), mode="nearest")
-    agreed = (block == guide) & ((guide == 0.0) | (guide == 1.0))
-    return to_picture(torch.where(agreed, guide, alpha))[:height, :width, 0]
+    equal = (block == guide) & ((guide == 0.0) | (guide == 1.0))
+    return to_picture(torch.where(equal, guide, alpha))[:height, :width, 0]

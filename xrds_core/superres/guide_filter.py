@@ -1,4 +1,4 @@
-"""Noise of few samples taken out of albedo and normal, before a network sees them.
+"""Prefilter for albedo and normal of few samples, before a network sees them.
 
 Guides of more samples are denoised by Open Image Denoise (`guide_noise`). Not from the
 paper. A small network predicts for every pixel two kernels over its neighbours, one for
@@ -15,7 +15,7 @@ from torch.nn import functional as F
 
 FILE_NAME = "guide_filter.safetensors"
 FEW_SAMPLES = 4
-"""Guides of fewer samples per pixel are filtered; of more, it takes fine texture away
+"""Guides of fewer samples per pixel are filtered; of more, it removes fine texture
 that is worth as much as the noise."""
 
 KERNEL = 3  # pixels along one side
@@ -27,8 +27,8 @@ LAYERS = 2
 # Logit of the kernels' centres, untrained: three quarters of the weight.
 CENTRE = 3.0
 ALBEDO_FLOOR = 0.02  # added to albedo before its logarithm
-# How far a pixel goes from what was rendered to its mean; the rest keeps some of the
-# texture that was taken for noise.
+# Blend from the rendered to the filtered value; the rest preserves some of the texture
+# that was mistaken for noise.
 STRENGTH = 0.75
 BAND = 128  # rows that are filtered at once
 # As far as a pixel looks, rounded up to whole strides.

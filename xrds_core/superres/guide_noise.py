@@ -1,8 +1,8 @@
-"""Noise of some samples taken out of albedo and normal by Open Image Denoise.
+"""Prefiltering: Open Image Denoise removes the noise of albedo and normal.
 
-The picture keeps what noise its guides have, on metal and glass above all. Guides of
-very few samples go through a small network instead (`guide_filter`): it takes a quarter
-of the seconds, and they are few where seconds are.
+Noise of the guides shows in the picture, on metal and glass above all. Guides of very
+few samples go through a small network instead (`guide_filter`): it takes a quarter of
+the time, which is short where samples are few.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ NOISY_SAMPLES = 16
 """Guides of fewer samples per pixel are denoised: at 4 the picture gains 0.05 to 0.8
 dB, at 8 still 0.06 on the mean, and no scene loses more than 0.02."""
 
-KEPT_BYTES = 512 << 20
-"""Of denoised guides, kept for the next picture of the same ones."""
+CACHE_BYTES = 512 << 20
+"""Limit of the cache of denoised guides for the next picture with the same ones."""
 
 Quiet = Callable[[Array, Array], tuple[Array, Array]]
 
 
 @dataclass
-class _Kept:
+class _Cache:
     """The guides denoised last, known by a checksum of what they were made of.
 
     A view that is rendered again has the same guides, and they take longer than the
@@ -45,20 +45,20 @@ class _Kept:
     guides: tuple[Array, Array] | None = None
 
     def of(self, checksum: bytes) -> tuple[Array, Array] | None:
-        """Those of a checksum, if they are kept."""
+        """The guides of a checksum, if they are in the cache."""
         return self.guides if self.checksum == checksum else None
 
-    def keep(self, checksum: bytes, guides: tuple[Array, Array]) -> None:
-        """Keep guides in place of others, but not too large ones."""
-        small = sum(guide.nbytes for guide in guides) <= KEPT_BYTES
+    def store(self, checksum: bytes, guides: tuple[Array, Array]) -> None:
+        """Replace the cached guides, unless these are too large."""
+        small = sum(guide.nbytes for guide in guides) <= CACHE_BYTES
         self.checksum, self.guides = (checksum, guides) if small else (b"", None)
 
 
-_KEPT = _Kept()
+_CACHE = _Cache()
 
 
 def is_noisy(samples: int | None) -> bool:
-    """Whether guides of so many samples are denoised; None are as many as is wished."""
+    """Whether guides of so many samples are denoised; None stands for many."""
     return samples is not None and FEW_SAMPLES <= samples < NOISY_SAMPLES
 
 
@@ -68,10 +68,10 @@ def remover(
     memory_limit: int | None = None,
     progress: Callback | None = None,
 ) -> Quiet | None:
-    """What takes the noise out of albedo and normal (H, W, 3) of so many samples.
+    """Return a function that denoises albedo and normal (H, W, 3) of so many samples.
 
-    None where there is none to take out so, or the library is missing. `progress` is
-    called with 0 as long as it works; False cancels.
+    None where they need not be denoised, or the library is missing. `progress` is
+    called with 0 while it works; False cancels.
     """
     if not is_noisy(samples):
         return None
@@ -83,10 +83,10 @@ def remover(
 
     def quiet(albedo: Array, normal: Array) -> tuple[Array, Array]:
         checksum = _checksum(albedo, normal, device)
-        found = _KEPT.of(checksum)
+        found = _CACHE.of(checksum)
         if found is None:
             found = denoiser.guides(albedo, normal, progress=alive)
-            _KEPT.keep(checksum, found)
+            _CACHE.store(checksum, found)
         return found
 
     return quiet

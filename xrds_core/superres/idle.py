@@ -30,8 +30,8 @@ def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
 
     Blocks of `block` low-resolution pixels are idle where nothing but background is
     seen (normal 0, albedo that holds its radiance), or where every input is even. The
-    rectangle lies on blocks and keeps at least `margin` pixels around what is busy.
-    None where nothing is busy; the whole picture where too little is idle.
+    rectangle is aligned to blocks and has a margin of at least `margin` pixels around
+    what is busy. None if nothing is busy; the whole picture if too little is idle.
     """
     height, width = inputs.low.shape[:2]
     whole = slice(0, height), slice(0, width)
@@ -43,8 +43,8 @@ def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
         slice(start, min(stop, size))
         for (start, stop), size in zip(spans, (height, width), strict=True)
     )
-    kept = (rows.stop - rows.start) * (columns.stop - columns.start)
-    return (rows, columns) if kept < (1 - _WORTH) * height * width else whole
+    remaining = (rows.stop - rows.start) * (columns.stop - columns.start)
+    return (rows, columns) if remaining < (1 - _WORTH) * height * width else whole
 
 
 def write_base(picture: Array, inputs: Inputs) -> None:

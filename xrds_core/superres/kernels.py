@@ -49,7 +49,7 @@ FACTS = FEATURES + 1
 def find_sources(
     radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int
 ) -> tuple[Sources, Tensor]:
-    """The radiance as it is and demodulated in two ways, and facts (B, 5, h, w).
+    """The radiance as it is and its demodulated variants, and facts (B, 5, h, w).
 
     By albedo, and last by what albedo and normal explain of it around every pixel; see
     `regression.explain`, which also restores what denoising took away. The facts are
@@ -178,8 +178,8 @@ class KernelTail(nn.Module):
     `GAIN_LIMIT`, scales the result. So nothing turns negative or becomes coloured by
     itself. At last the picture's area means are brought near the low-resolution
     radiance. Kernels start from bilinear weights and fall with the distance between
-    guides, as a joint bilateral filter's, as fast as the network asks; untrained, the
-    result is all but bicubic interpolation of the last source.
+    guides, as a joint bilateral filter's, as fast as the network predicts; untrained,
+    the result is almost bicubic interpolation of the last source.
 
     The kernels of a whole frame are dozens of planes of its size. They are made, used
     and forgotten area by area, small enough for the processor's caches.
@@ -301,12 +301,12 @@ class KernelTail(nn.Module):
         out = torch.zeros_like(sharp[0])
         for m, source in enumerate(sources):
             kernel = kernels[:, m]  # (B, 9, s*s, h, w)
-            gathered = kernel.sum(1, keepdim=True) * sharp[m]
+            filtered = kernel.sum(1, keepdim=True) * sharp[m]
             low = area.of(rims[m], self.cell // self.scale, rim=1)
             for k, neighbour in enumerate(neighbours(low)):
-                gathered = torch.addcmul(gathered, kernel[:, k, None], neighbour)
+                filtered = torch.addcmul(filtered, kernel[:, k, None], neighbour)
             modulator = self.fold(area.of(source.modulator, self.cell))
-            out = torch.addcmul(out, gathered, modulator)
+            out = torch.addcmul(out, filtered, modulator)
         return out.clamp(min=0)
 
     def match(self, picture: Tensor, trust: Tensor, low: Tensor) -> Tensor:

@@ -121,8 +121,8 @@ def restore(
 ) -> Tensor:
     """The radiance (B, 3, h, w) with what the guides explain of its grain.
 
-    A denoiser at low resolution takes fine texture for noise; in the grain the texture
-    still is. The mean around every pixel stays.
+    A denoiser at low resolution mistakes fine texture for noise; the grain still has
+    that texture. The mean around every pixel stays.
     """
     slopes = blur(fit(grain, features, NOISE * scale)).split(1, dim=1)
     terms = (

@@ -118,12 +118,12 @@ class Upscaler:
             radiance: (h, w, 3), or (h, w, 4) premultiplied; scene-linear.
             albedo: (H, W, 3), where h = ceil(H / scale) and w = ceil(W / scale).
             normal: (H, W, 3), in camera space.
-            noisy: (h, w, 3), the radiance before it was denoised: tells how much of
-                the guides' texture is in the light. None where it never was, or lost.
+            noisy: (h, w, 3), the radiance before it was denoised: shows how much of
+                the guides' texture is in the light. None where there is none.
             guide_alpha: (H, W), the alpha of the guides' render; in place of the
                 picture's own, too, where `radiance` has none.
             guide_samples: per pixel of albedo and normal; the noise of few of them
-                is taken out first. None where they are many, or not known.
+                is filtered first. None where they are many, or not known.
             exposure: of a picture this is a part of; None finds it in `radiance`.
             memory_limit: bytes to aim at, beside the arrays given and returned. The
                 smallest tiles are taken where it is too small even for them.

@@ -1,7 +1,7 @@
 """What weights files say they are for, read from their headers alone.
 
-Neither torch nor safetensors is needed: a panel may ask. A safetensors file begins with
-the length of its header (8 bytes, little-endian) and the header, JSON.
+Neither torch nor safetensors is needed, so a panel can use it. A safetensors file
+begins with the length of its header (8 bytes, little-endian) and the header, JSON.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _LARGEST_HEADER = 1 << 20  # far above any real one; bounds hostile files
 class WeightsHeader:
     """A network's preset, enlargement and the Blender series of its training.
 
-    `blender_series` as 4.5; empty where the file does not tell.
+    `blender_series` as 4.5; empty where the file does not say.
     """
 
     preset: str

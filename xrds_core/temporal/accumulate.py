@@ -1,9 +1,11 @@
-"""The noisy samples of other frames on the pixels of one: gathered, never interpolated.
+"""Accumulates the noisy samples of neighbour frames on the pixels of one frame.
 
-Each pixel takes the other frame's nearest pixel as it is. Interpolation would correlate
-the noise of neighbouring pixels, and denoisers take correlated noise for texture. The
-mean is weighted by sample counts, by how near the pixel taken lies to the true place,
-which keeps fine texture sharp, and by whether both frames show the same light.
+Samples are gathered, never interpolated: each pixel takes the nearest pixel of the
+neighbour frame as it is. Interpolation would correlate the noise of adjacent pixels,
+and denoisers mistake correlated noise for texture. The mean is weighted by sample
+counts, by the distance between the reprojected position and the pixel taken, which
+keeps fine texture sharp, and by a similarity weight: do both frames show the same
+light?
 """
 
 from __future__ import annotations
@@ -16,11 +18,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import PictureError
-from .judge import MARGIN, GuideJudge, Judge, light_for_albedo
-from .motion import grid, pair, places, surroundings
-from .neighbours import extreme
-from .survey import spread, survey
-from .takes import same_take
+from .coarse_rejection import pixel_weights, tile_weights
+from .local_filters import extreme
+from .motion import grid, inverse_depth_range, pair, places
+from .shot_cuts import same_shot
+from .similarity import MARGIN, GuideSimilarity, Similarity, light_for_albedo
 from .vectors import Movement
 
 if TYPE_CHECKING:
@@ -35,10 +37,10 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 # Standard deviation, in pixels, of the weight by distance where frames have one sample
-# per pixel; it falls with their cube root. Noise asks for a wide one, texture for a
+# per pixel; it falls with their cube root. Noise calls for a wide one, texture for a
 # narrow one: 0.7 and 0.6 were best at 1 and 2 samples, 0.2 to 0.3 at 16.
 _SOFTNESS = 0.7
-_ROWS = 128  # at a time, with the margin of the judge
+_ROWS = 128  # at a time, plus the margin of the similarity weight
 _TINY = np.float32(1e-9)
 # Every half float, by its bits.
 _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
@@ -46,14 +48,15 @@ _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32
 
 @dataclass(frozen=True)
 class Accumulated:
-    """A frame with the samples of its neighbours; float32, (H, W, 3) or (H, W).
+    """A frame with the samples of its neighbour frames; float32, (H, W, 3) or (H, W).
 
     `radiance` (None of guides alone), `albedo`, `normal` (in this frame's axes) and
     `alpha` (or None) are means over `samples` (H, W) samples per pixel, NaN where no
     frame has any.
-    `rejected` is the share of the neighbours' samples that were left out: pixels that
-    no neighbour shows, or that show other light. `frames` are the numbers of those
-    that were asked, the frame's own too: the frames of its take, between two cuts.
+    `rejected` is the share of the neighbours' samples that were left out: of pixels
+    that a neighbour does not show, or shows in other light. `frames` are the numbers of
+    the frames that were considered, the frame itself included: those of its shot,
+    between two shot cuts.
     """
 
     radiance: Array | None
@@ -73,13 +76,13 @@ def accumulate(
 ) -> Accumulated:
     """Return `target` with the samples of `others`.
 
-    `movement` knows what moved by itself in this shot; without it each call finds it
-    anew. Nothing is lent across a cut. Without others the result is the target's own
-    picture to the bit. `threads`: all processors by default; the result does not depend
-    on it. Raises PictureError where the frames hold different passes.
+    `movement` caches the object motion of this shot; without it each call computes it
+    again. No samples are reused across a shot cut. Without others the result is
+    bit-identical to the target. `threads`: all processors by default; the result does
+    not depend on it. Raises PictureError where the frames hold different passes.
     """
-    others = same_take(target, others)
-    near, far = _lenders(target, others, movement or Movement())
+    others = same_shot(target, others)
+    near, far = _neighbours(target, others, movement or Movement())
     usual = light_for_albedo(target) if others and target.has_light else 0.0
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
@@ -87,33 +90,40 @@ def accumulate(
 
     def work(first: int) -> float:
         block = _Block(target, slice(first, min(first + _ROWS, height)), usual)
-        groups = [_gathered(block, group) for group in (near, far) if group]
+        groups = [_block_sums(block, group) for group in (near, far) if group]
         for group in groups:
             group.finish()
         means[block.pixels], samples[block.pixels] = _means(target, block, groups)
-        return float(sum(group.lent.sum(dtype=np.float64) for group in groups))
+        return float(sum(group.reused.sum(dtype=np.float64) for group in groups))
 
-    taken = sum(_in_threads(work, range(0, height, _ROWS), threads))
-    asked = sum(x.samples for x in others) * height * width
-    rejected = 1.0 - taken / asked if asked else 0.0
+    reused = sum(_in_threads(work, range(0, height, _ROWS), threads))
+    requested = sum(x.samples for x in others) * height * width
+    rejected = 1.0 - reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(x.number for x in others)}))
     return _unpacked(target, means, samples, rejected, frames)
 
 
-def _lenders(
+def _neighbours(
     target: Stored, others: Sequence[Stored], movement: Movement
-) -> tuple[list[_Same | _Lender], list[_Same | _Lender]]:
-    """Return what asks each neighbour: the nearest ones, and those farther away."""
+) -> tuple[list[_Aligned | _Reprojected], list[_Aligned | _Reprojected]]:
+    """Return the neighbours in two groups: the nearest ones, and those farther away."""
     rest = [x for x in others if not target.shows_same(x)]
-    detours = dict(zip(map(id, rest), movement.detours(target, rest), strict=True))
-    around = surroundings(target) if rest else None
+    motions = dict(
+        zip(map(id, rest), movement.object_motions(target, rest), strict=True)
+    )
+    depth_range = inverse_depth_range(target) if rest else None
     near = _nearest(target, others)
-    groups: tuple[list[_Same | _Lender], list[_Same | _Lender]] = ([], [])
+    groups: tuple[list[_Aligned | _Reprojected], list[_Aligned | _Reprojected]] = (
+        [],
+        [],
+    )
     for other in others:
-        lender: _Same | _Lender = _Same(other)
-        if id(other) in detours:
-            lender = _Lender(pair(target, other, detours[id(other)], around))
-        groups[other.number not in near].append(lender)
+        neighbour: _Aligned | _Reprojected = _Aligned(other)
+        if id(other) in motions:
+            neighbour = _Reprojected(
+                pair(target, other, motions[id(other)], depth_range)
+            )
+        groups[other.number not in near].append(neighbour)
     return groups
 
 
@@ -125,11 +135,11 @@ def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
 
 
 class _Block:
-    """Some rows of the target, with a margin that the judge looks at.
+    """Some rows of the target, with the margin that the similarity weight needs.
 
-    `usual` is as in `Judge`. `void` (n,) says
-    where a frame with alpha has none, in a pixel or beside it: there is no noise to
-    take away, and a rim that several frames draw is wider than that of one.
+    `usual` is as in `Similarity`. `void` (n,) marks where a frame with alpha is
+    transparent, in a pixel or next to it: there is no noise to remove, and an outline
+    accumulated from several frames is wider than that of one.
     """
 
     def __init__(self, target: Stored, rows: slice, usual: float) -> None:
@@ -143,9 +153,9 @@ class _Block:
         self.own = _floats(target.picture[self.wide.pixels])
         self.void = self._void()
         self.known = np.ones(len(self.own), bool)
-        if target.spoilt is not None:
-            self.known = ~target.spoilt[self.wide.pixels]
-        self.judge = _judge(target, self, usual) if target.has_light else None
+        if target.invalid is not None:
+            self.known = ~target.invalid[self.wide.pixels]
+        self.similarity = _similarity(target, self, usual) if target.has_light else None
 
     def _void(self) -> Mask | None:
         if not self.own.shape[1] % 3:
@@ -158,12 +168,12 @@ class _Block:
         return x.reshape(self.rows.stop - self.rows.start, -1, *x.shape[1:])
 
 
-def _judge(target: Stored, block: _Block, usual: float) -> Judge:
+def _similarity(target: Stored, block: _Block, usual: float) -> Similarity:
     noise, pixels = target.noise, block.wide.pixels
     assert noise is not None
     parts = (noise.brightness, noise.difference, noise.guides)
     brightness, difference, guides = (block.shaped(_floats(x[pixels])) for x in parts)
-    return Judge(
+    return Similarity(
         block.shaped(block.own),
         brightness,
         difference,
@@ -175,93 +185,93 @@ def _judge(target: Stored, block: _Block, usual: float) -> Judge:
 
 
 class _Sums:
-    """What some neighbours lend to the wide rows of a block.
+    """The samples of some neighbours, summed over the rows of a block and its margin.
 
-    `values` (n, C) and `brightness` (n,) are sums by weight, `weights` (n,) the
-    weights, `lent` (n,) the samples.
+    `values` (n, C) and `brightness` (n,) are weighted sums, `weights` (n,) the sums of
+    weights, `reused` (n,) the numbers of samples.
     """
 
     def __init__(self, block: _Block) -> None:
         self.block = block
         self.values = np.zeros_like(block.own)
-        self.weights, self.lent, self.brightness = np.zeros(
+        self.weights, self.reused, self.brightness = np.zeros(
             (3, len(block.own)), np.float32
         )
 
     def add(
-        self, values: Array, weight: Array, lent: Array, noise: tuple[Array, ...]
+        self, values: Array, weight: Array, reused: Array, noise: tuple[Array, ...]
     ) -> None:
-        """Add a neighbour's; of `noise` see `_noise`."""
-        if self.block.judge is not None:
+        """Add those of one neighbour; `noise` is as `_noise` returns it."""
+        if self.block.similarity is not None:
             self.brightness += noise[0] * weight
-            self.block.judge.see(*map(self.block.shaped, (values, *noise, weight)))
+            self.block.similarity.add(*map(self.block.shaped, (values, *noise, weight)))
         values *= weight[:, None]
         self.values += values
         self.weights += weight
-        self.lent += lent
+        self.reused += reused
 
     def finish(self) -> None:
-        """Let all count as far as they are right, on the block's own rows alone."""
+        """Apply the similarity weight and crop to the block's own rows."""
         block = self.block
         weights = np.maximum(self.weights, _TINY)
         means = block.shaped(self.values / weights[:, None])
         seen = block.shaped(self.weights > 0.0)
-        if block.judge is not None:
+        if block.similarity is not None:
             root = block.shaped(self.brightness / weights)
-            trust = block.judge.trust(means[..., 3:], root, seen)
+            similarity = block.similarity.weights(means[..., 3:], root, seen)
         else:
             own, known = block.shaped(block.own), block.shaped(block.known)
-            trust = GuideJudge(own, known).trust(means, seen)
-        self._scale(trust.ravel())
+            similarity = GuideSimilarity(own, known).weights(means, seen)
+        self._scale(similarity.ravel())
         if block.void is not None:
             self._scale((~block.void).astype(np.float32))
         inner = block.inner
         self.values, self.weights = self.values[inner], self.weights[inner]
-        self.lent = self.lent[inner]
+        self.reused = self.reused[inner]
 
-    def _scale(self, trust: Array) -> None:
-        self.values *= trust[:, None]
-        self.weights *= trust
-        self.lent *= trust
+    def _scale(self, factor: Array) -> None:
+        self.values *= factor[:, None]
+        self.weights *= factor
+        self.reused *= factor
 
 
-def _gathered(block: _Block, lenders: Sequence[_Same | _Lender]) -> _Sums:
-    """Return what a group of neighbours would lend to a block."""
+def _block_sums(block: _Block, neighbours: Sequence[_Aligned | _Reprojected]) -> _Sums:
+    """Return the sums of a group of neighbours over a block."""
     sums = _Sums(block)
-    for lender in lenders:
-        lender.add(block, sums)
+    for neighbour in neighbours:
+        neighbour.add(block, sums)
     return sums
 
 
 def _noise(
     other: Stored, pixels: slice | NDArray[np.integer], block: _Block
 ) -> tuple[Array, ...]:
-    """Return brightness and difference (n,) of flat pixels; nothing unasked."""
-    if block.judge is None or other.noise is None:
+    """Return brightness and difference (n,) of flat pixels; () where not needed."""
+    if block.similarity is None or other.noise is None:
         return ()
     noise = other.noise
     return tuple(_floats(x[pixels]) for x in (noise.brightness, noise.difference))
 
 
-class _Same:
-    """A neighbour that shows the same in every pixel: there is nothing to look for."""
+class _Aligned:
+    """A neighbour that shows the same in every pixel: no reprojection is needed."""
 
     def __init__(self, other: Stored) -> None:
         self._other = other
 
     def add(self, block: _Block, sums: _Sums) -> None:
-        """As `_Lender.add`."""
+        """As `_Reprojected.add`."""
         other, pixels = self._other, block.wide.pixels
         weight = _samples(other, pixels, len(block.own))
-        if other.spoilt is not None:
-            weight[other.spoilt[pixels]] = 0.0
+        if other.invalid is not None:
+            weight[other.invalid[pixels]] = 0.0
         # a copy: NumPy's own float32 pictures are not to be changed
-        picked = _floats(other.picture[pixels]).copy()
-        sums.add(picked, weight, weight, _noise(other, pixels, block))
+        values = _floats(other.picture[pixels]).copy()
+        sums.add(values, weight, weight, _noise(other, pixels, block))
 
 
-class _Lender:
-    """A neighbour whose pixels are looked for, and asked whether they agree."""
+class _Reprojected:
+    """A neighbour whose pixels are found by reprojection and weighted."""
 
     def __init__(self, pair: Pair) -> None:
         target, other = pair.here, pair.there
@@ -271,34 +281,34 @@ class _Lender:
                 " give radiance and alpha for all frames of a shot or for none"
             )
         self._pair = pair
-        self._tiles = survey(pair)
+        self._tiles = tile_weights(pair)
         self._turn = _turn(target.camera, other.camera)
         self._fall = np.float32(-0.5 * target.samples ** (2 / 3) / _SOFTNESS**2)
 
     def add(self, block: _Block, sums: _Sums) -> None:
-        """Add the samples it lends to the pixels of a block."""
+        """Add its samples that the pixels of a block reuse."""
         other = self._pair.there
         if not self._tiles.any():
             return
         found = places(self._pair, block.wide)
-        if other.spoilt is not None:
-            found.seen[...] &= ~other.spoilt.take(found.pixel)
-        picked = _floats(other.picture.take(found.pixel, axis=0))
+        if other.invalid is not None:
+            found.seen[...] &= ~other.invalid.take(found.pixel)
+        values = _floats(other.picture.take(found.pixel, axis=0))
         if self._turn is not None:
             normal = slice(6, 9) if other.has_light else slice(3, 6)
-            picked[:, normal] = picked[:, normal] @ self._turn.T
+            values[:, normal] = values[:, normal] @ self._turn.T
         weight = found.seen.astype(np.float32)
-        weight *= spread(self._tiles, self._pair.here.shape, block.rows).ravel()
+        weight *= pixel_weights(self._tiles, self._pair.here.shape, block.rows).ravel()
         weight *= _samples(other, found.pixel, len(weight))
-        lent = weight.copy()
+        reused = weight.copy()
         weight *= np.exp(found.apart * self._fall)
-        sums.add(picked, weight, lent, _noise(other, found.pixel, block))
+        sums.add(values, weight, reused, _noise(other, found.pixel, block))
 
 
 def _samples(
     frame: Stored, pixels: slice | NDArray[np.integer], count: int
 ) -> NDArray[np.float32]:
-    """Return how many samples flat pixels (n,) of a frame have."""
+    """Return the sample counts of flat pixels (n,) of a frame."""
     if frame.counts is None:
         return np.full(count, frame.samples, np.float32)
     return _floats(frame.counts[pixels]).copy()
@@ -307,20 +317,20 @@ def _samples(
 def _means(
     target: Stored, block: _Block, groups: Sequence[_Sums]
 ) -> tuple[Array, Array]:
-    """Return the means of the target's own samples and those lent, and their number."""
+    """Return the means of the target's own and the reused samples, and their number."""
     own = block.own[block.inner]
     samples = _samples(target, block.pixels, len(own))
-    if target.spoilt is not None:
-        samples[target.spoilt[block.pixels]] = 0.0
+    if target.invalid is not None:
+        samples[target.invalid[block.pixels]] = 0.0
     if not groups:
         return np.where(samples[:, None] > 0.0, own, np.float32(np.nan)), samples
     sums = np.sum([group.values for group in groups], axis=0)
     weights = np.sum([group.weights for group in groups], axis=0)
     total = samples + weights
     sums -= own * weights[:, None]
-    with np.errstate(invalid="ignore"):  # NaN where nobody has samples
+    with np.errstate(invalid="ignore"):  # NaN where no frame has samples
         sums /= total[:, None]
-    # in this form nothing is rounded where nothing is lent
+    # in this form nothing is rounded where nothing is reused
     return own + sums, total
 
 
@@ -349,7 +359,7 @@ def _unpacked(
 
 
 def _turn(here: Camera, there: Camera) -> Array | None:
-    """Return (3, 3) that takes normals of `there` to `here`; None if they agree."""
+    """Return (3, 3): normals of `there` in the axes of `here`; None if identical."""
     turn = here.view[:3, :3] @ np.linalg.inv(there.view[:3, :3])
     turn = _axes(here) @ turn @ _axes(there).T
     return None if np.allclose(turn, np.eye(3), atol=1e-7) else turn.astype(np.float32)
@@ -358,7 +368,7 @@ def _turn(here: Camera, there: Camera) -> Array | None:
 def _axes(camera: Camera) -> Matrix:
     """Return (3, 3): from the axes of view matrices to those of Cycles' normals.
 
-    There Z points away from the viewer; in panoramas X does, and Z upwards.
+    In the latter Z points away from the viewer; in panoramas X does, and Z upwards.
     """
     if camera.sphere is None:
         return np.diag([1.0, 1.0, -1.0])
@@ -375,7 +385,7 @@ def _floats(x: NDArray[Any]) -> Array:
 def _in_threads(
     work: Callable[[int], float], items: Sequence[int], threads: int | None
 ) -> list[float]:
-    """Do every item; NumPy lets threads run at once in all that takes long here."""
+    """Run `work` on every item; NumPy releases the GIL in all that takes long here."""
     count = min(threads or os.cpu_count() or 1, len(items))
     with ThreadPoolExecutor(max(count, 1)) as pool:
         return list(pool.map(work, items))

@@ -1,8 +1,8 @@
-"""Light that changes from frame to frame, found by neighbours that do not agree.
+"""Light that changes from frame to frame, detected where neighbours differ.
 
-One frame's noise hides that a shadow has moved on. All neighbours together have many
-times its samples. Where what they show varies by more than their noise does, the frame
-itself is as far from their mean.
+The noise of one frame hides that a shadow has moved. All its neighbours together have
+many times its samples. Where they vary by more than their noise, the frame itself is as
+far from their mean.
 """
 
 from __future__ import annotations
@@ -17,18 +17,18 @@ if TYPE_CHECKING:
     from ..arrays import Array
 
 TILE = 2  # pixels across: light is compared tile by tile
-REACH = 11  # pixels to each side of one that have a say in it
+REACH = 11  # pixels on each side of one that influence its result
 _AREAS = (1, 2, 4, 8)  # tiles across: light is averaged before it is compared
 _NEAR = 3  # tiles across, over which variances are averaged
-# How often chance is counted against what varies beyond it. The variance of nine frames
-# is off by a third, and that must not cost what they add; what does change is many
-# times the noise of an area.
+# Weight of noise against the variance beyond it. The variance of nine frames is off by
+# a third, which must not cost the samples they add; real changes are many times the
+# noise of an area.
 _CHANCE = 10.0
 _TINY = np.float32(1e-9)
 
 
 class Changes:
-    """Adds up what the neighbours of one frame show, and how much it varies.
+    """Accumulates the light of a frame's neighbours and its variance.
 
     All arrays are (H, W).
     """
@@ -39,7 +39,7 @@ class Changes:
         self._sums = {size: _Sums(tiles) for size in _AREAS}
 
     def add(self, light: Array, noise: Array, weight: Array) -> None:
-        """Take a neighbour's light, the noise of it and how much each pixel counts.
+        """Add a neighbour's light, its noise and the weight of each pixel.
 
         `noise` is the square root of an estimate of the light's variance.
         """
@@ -48,9 +48,9 @@ class Changes:
             sums.add(*(_pooled(x, size) for x in parts))
 
     def error(self) -> Array:
-        """Return the squared error that it makes, added up over areas of all sizes.
+        """Return the squared error due to changes, summed over areas of all sizes.
 
-        Less where it could be chance.
+        It is reduced where it could be noise.
         """
         error = np.sum([sums.variance() for sums in self._sums.values()], axis=0)
         wide = error.repeat(TILE, axis=0).repeat(TILE, axis=1)
@@ -67,7 +67,7 @@ class _Sums:
         self._chance, self._chance2 = np.zeros((2, *tiles), np.float32)
 
     def add(self, weight: Array, light: Array, chance: Array) -> None:
-        """`light` is weighed, `chance` its variance, weighed twice."""
+        """`light` is weighted, `chance` its variance, weighted twice."""
         share = np.float32(1.0) / np.maximum(weight, _TINY)
         self._weight += weight
         self._weight2 += np.square(weight)
@@ -77,7 +77,7 @@ class _Sums:
         self._chance2 += chance * share
 
     def variance(self) -> Array:
-        """Return the variance of what neighbours show, without that of their noise."""
+        """Return the variance between neighbours beyond that of their noise."""
         share = np.float32(1.0) / np.maximum(self._weight, _TINY)
         varies = self._light2 - np.square(self._light) * share
         chance = self._chance2 - self._chance * share
@@ -90,7 +90,7 @@ class _Sums:
 
 
 def _tiles(x: Array) -> Array:
-    """Return the sums over tiles of (H, W), rounded up to whole ones."""
+    """Return the sums over tiles of (H, W), padded to whole tiles."""
     height, width = x.shape
     if height % TILE or width % TILE:
         x = np.pad(x, ((0, -height % TILE), (0, -width % TILE)))

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import PictureError
 from .halves import Halves
-from .neighbours import extreme
+from .local_filters import extreme
 from .noise import Noise, noise_of
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 # Blender writes 1e10 where no ray hits anything.
 SKY_DEPTH = 1e9
 LARGEST_HALF = 65504.0
-# Share of itself by which nearness differs between neighbours on one surface.
+# Relative difference in inverse depth between adjacent pixels of one surface.
 _SURFACE = 0.02
 _PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
 _OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "counts": ()}
@@ -37,7 +37,7 @@ _OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "counts": ()}
 
 @dataclass(frozen=True)
 class Sphere:
-    """What part of the directions around a camera its frame holds, in radians.
+    """The part of the sphere of directions that a panorama's frame covers, in radians.
 
     Longitude grows to the right and is 0 straight ahead (-Z), latitude grows upwards.
     Cycles: the camera's `longitude_min` and so on.
@@ -52,12 +52,12 @@ class Camera:
     """A camera and the part of its frame that arrays hold.
 
     Perspective, orthographic, or with a `sphere` an equirectangular panorama, whose
-    `project` is of no use; frames of other panoramas cannot lend to each other. `view`
-    (4, 4) takes world points to the camera's axes, `project` (4, 4) those to OpenGL
+    `project` is not used; other panoramas cannot be reprojected. `view` (4, 4) is the
+    transform from world to camera space, `project` (4, 4) the one from there to OpenGL
     clip space (in Blender: `Object.calc_matrix_camera`). `size` is (width, height) of
     the whole frame in pixels, `window` the (x, y) of the arrays' top-left pixel in it:
-    (0, 0) where no border crops the frame. Frames of cameras of different names lend
-    nothing to each other.
+    (0, 0) where no border crops the frame. No samples are reused between cameras of
+    different names.
     """
 
     view: Matrix
@@ -68,7 +68,7 @@ class Camera:
     sphere: Sphere | None = None
 
     def same(self, other: Camera) -> bool:
-        """Whether both show the same on the same pixels."""
+        """Whether both see the same scene point in every pixel."""
         kind, others = (
             (each.size, each.window, each.name, each.sphere) for each in (self, other)
         )
@@ -85,7 +85,7 @@ class Camera:
     def depth(self, position: Array) -> Array:
         """Return the depth (H, W) of points in world space (H, W, 3).
 
-        Points of exactly 0 are no hits, as in Cycles' Position pass: infinitely far.
+        Points of exactly 0 are no hits, as in Cycles' Position pass: depth is infinite.
         """
         origin = np.linalg.inv(self.view)[:3, 3]
         away = position - origin.astype(np.float32)
@@ -99,26 +99,26 @@ class Camera:
 
 @dataclass(frozen=True)
 class Frame:
-    """What the renderer gives of one frame; arrays are not changed.
+    """One frame as the renderer returns it; its arrays are never changed.
 
-    `radiance` is None in a frame of guides alone: their albedo then tells whether two
-    frames show the same. `number` is the frame's number: `vector` leads to number - 1
+    `radiance` is None in a frame of guides alone: the guides then decide whether two
+    frames show the same. `number` is the frame's number: `vector` points to number - 1
     and number + 1, and frames of one number show one moment (the views of a stereo
-    pair). `samples` per pixel weigh the frame against others. `normal` is in the
-    camera's axes, but with Z pointing away from the viewer, as in Cycles' `Denoising
-    Normal`. `depth` (H, W) is the distance of the first hit from the camera, along the
-    camera's axis (of a panorama along the ray), at each pixel's centre; infinite, or
-    above 1e9, without a hit.
+    pair). `samples` per pixel weight the frame against others. `normal` is in camera
+    space, but with Z pointing away from the viewer, as in Cycles' `Denoising Normal`.
+    `depth` (H, W) is the distance of the first hit from the camera, along the camera's
+    axis (of a panorama along the ray), at each pixel's centre; infinite, or above 1e9,
+    without a hit.
 
-    `still` says that nothing at all moves or changes from frame to frame, no light
-    either: frames of equal cameras differ in their noise alone.
+    `still` says that nothing at all moves or changes from frame to frame, not even
+    light: frames of equal cameras differ in their noise alone.
 
-    Optional: `alpha` (H, W); `vector` (H, W, 4), Cycles' Vector pass: where the
-    surface was one frame before minus where it is, then where it is minus where it will
-    be one frame later, in pixels, y upwards; without it, whatever is hit is taken to
+    Optional: `alpha` (H, W); `vector` (H, W, 4), Cycles' Vector pass: the surface's
+    position one frame before minus its position now, then its position now minus the
+    one a frame later, in pixels, y upwards; without it all surfaces are assumed to
     stand still. `counts` (H, W): samples of each pixel, where they differ; `samples` is
-    their mean. `halves` of the samples tell what is noise better than the pixels around
-    a pixel can.
+    their mean. `halves` are the half buffers, from which noise is estimated better than
+    from the surrounding pixels.
     """
 
     number: int
@@ -140,7 +140,7 @@ class Frame:
             if array is not None and array.shape != self.shape + channels:
                 raise PictureError(
                     f"{name} of frame {self.number} has shape {array.shape} where its "
-                    f"normal asks for {self.shape + channels}: give passes of one "
+                    f"normal requires {self.shape + channels}: give passes of one "
                     "render"
                 )
         if not self.samples > 0:
@@ -157,14 +157,15 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Stored:
-    """A frame as the window keeps it: flat, packed, and free of NaN.
+    """A frame as the window stores it: flat, packed, and free of NaN.
 
-    `picture` (H W, 6 to 10) holds radiance (not of guides alone), albedo, normal and
-    alpha (or not), in half floats where memory counts. `nearness` (H W) is 1 / depth, 0
-    without a hit; the depth itself for an orthographic camera; NaN where it is not
-    known. `spoilt` (H W) says which pixels held NaN or infinities and are 0 now; None
-    if none did. `counts` (H W): samples of each pixel where they differ. `noise` is
-    what `noise_in` says, None of guides alone.
+    `picture` (H W, 6 to 10) holds radiance (not in a frame of guides alone), albedo,
+    normal and alpha (if any), in half floats to save memory. `inverse_depth` (H W) is
+    1 / depth, 0 without a hit; the depth itself for an orthographic camera; NaN where
+    unknown. `invalid` (H W) is the validity mask, negated: pixels that held NaN or
+    infinities and are 0 now; None if there were none. `counts` (H W): samples of each
+    pixel where they differ. `noise` is that of `noise_in`, None in a frame of guides
+    alone.
     """
 
     number: int
@@ -172,8 +173,8 @@ class Stored:
     shape: tuple[int, int]
     samples: float
     picture: NDArray[Any]
-    nearness: Array
-    spoilt: NDArray[np.bool_] | None = None
+    inverse_depth: Array
+    invalid: NDArray[np.bool_] | None = None
     vector: NDArray[Any] | None = None
     still: bool = False
     counts: NDArray[Any] | None = None
@@ -186,21 +187,21 @@ class Stored:
 
     @property
     def nearer(self) -> np.ufunc:
-        """Which of two values of `nearness` is that of the nearer surface."""
+        """Which of two values of `inverse_depth` is that of the nearer surface."""
         return np.fmin if self.camera.orthographic else np.fmax
 
     @cached_property
     def rims(self) -> NDArray[np.bool_]:
-        """(H W): pixels beside something nearer, whose light they hold, too."""
-        nearest = extreme(self.nearness.reshape(self.shape), self.nearer).ravel()
+        """(H W): pixels next to a nearer surface, some of whose light they contain."""
+        nearest = extreme(self.inverse_depth.reshape(self.shape), self.nearer).ravel()
         with np.errstate(invalid="ignore"):  # infinite where a depth is denormal
-            apart = np.abs(nearest - self.nearness)
-        return apart > _SURFACE * np.abs(self.nearness)
+            apart = np.abs(nearest - self.inverse_depth)
+        return apart > _SURFACE * np.abs(self.inverse_depth)
 
     @property
     def is_empty(self) -> bool:
-        """Whether no pixel has a sample, as of a stand-in."""
-        return self.spoilt is not None and bool(self.spoilt.all())
+        """Whether no pixel has a sample, as in a reprojected placeholder."""
+        return self.invalid is not None and bool(self.invalid.all())
 
     def shows_same(self, other: Stored) -> bool:
         """Whether two frames differ in their noise alone."""
@@ -208,9 +209,9 @@ class Stored:
 
 
 def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
-    """Pack a frame; pixels with NaN or infinities in any pass lend nothing.
+    """Pack a frame; pixels with NaN or infinities in any pass are invalid.
 
-    `dtype` float16 halves the memory; values beyond +-65504 are cut to it.
+    `dtype` float16 halves the memory; values beyond +-65504 are clipped.
     """
     parts = [frame.albedo, frame.normal]
     if frame.radiance is not None:
@@ -219,8 +220,8 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         parts.append(frame.alpha[..., None])
     picture = np.concatenate(parts, axis=-1, dtype=np.float32)
     picture = picture.reshape(-1, picture.shape[-1])
-    spoilt = ~np.isfinite(picture).all(axis=-1)
-    picture[spoilt] = 0.0
+    invalid = ~np.isfinite(picture).all(axis=-1)
+    picture[invalid] = 0.0
     if np.dtype(dtype) == np.float16:
         np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
     noise = None if frame.radiance is None else noise_in(frame, dtype)
@@ -230,12 +231,12 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         shape=frame.shape,
         samples=frame.samples,
         picture=picture.astype(dtype, copy=False),
-        nearness=_nearness(frame),
-        spoilt=spoilt if spoilt.any() else None,
+        inverse_depth=_inverse_depth(frame),
+        invalid=invalid if invalid.any() else None,
         vector=_half(frame.vector),
         still=frame.still,
         counts=None if frame.counts is None else _counts(frame.counts),
-        noise=None if noise is None else noise.without(spoilt),
+        noise=None if noise is None else noise.without(invalid),
     )
 
 
@@ -250,26 +251,28 @@ def noise_in(frame: Frame, dtype: DTypeLike) -> Noise:
 
 
 def _counts(counts: Array) -> NDArray[Any]:
-    """Flat, in half floats; what is no count lends nothing."""
+    """Flat, in half floats; what is no count becomes 0."""
     counts = np.nan_to_num(counts.ravel(), posinf=0.0, neginf=0.0)
     return np.clip(counts, 0.0, LARGEST_HALF).astype(np.float16)
 
 
-def _nearness(frame: Frame) -> Array:
-    """Return `Stored.nearness`; a depth of NaN or below 0 stays out of use."""
+def _inverse_depth(frame: Frame) -> Array:
+    """Return `Stored.inverse_depth`; NaN for a depth of NaN or below 0."""
     depth = frame.depth.ravel().astype(np.float32)
     sky = depth > SKY_DEPTH
     if frame.camera.orthographic:
-        # all of an orthographic camera's sky lies in one direction: nothing to track
+        # an orthographic camera sees the sky in one direction only: nothing to track
         return np.where(sky, np.float32(np.nan), depth)
     with np.errstate(divide="ignore", invalid="ignore"):
-        nearness = np.where(depth > 0.0, np.float32(1.0) / depth, np.float32(np.nan))
-    nearness[sky] = 0.0
-    return nearness
+        inverse_depth = np.where(
+            depth > 0.0, np.float32(1.0) / depth, np.float32(np.nan)
+        )
+    inverse_depth[sky] = 0.0
+    return inverse_depth
 
 
 def _half(vector: Array | None) -> NDArray[Any] | None:
     if vector is None:
         return None
-    with np.errstate(over="ignore"):  # what leads out of half's range is no use
+    with np.errstate(over="ignore"):  # vectors beyond half's range are useless
         return vector.reshape(-1, 4).astype(np.float16)

@@ -1,8 +1,9 @@
-"""Two halves of a frame's samples.
+"""Half buffers: two halves of a frame's samples, rendered apart.
 
-The mean of a frame lies off the truth by noise that the frame alone cannot tell from
-texture. Two halves of its samples can: what they share is the picture, what they differ
-in is noise, pixel by pixel.
+The mean of a frame is off the truth by noise that the frame alone cannot distinguish
+from texture. Two halves of its samples can: what they have in common is the picture,
+what they differ in is noise, pixel by pixel. (Rousselle et al. 2012 call them dual
+buffers.)
 """
 
 from __future__ import annotations
@@ -20,12 +21,12 @@ _TINY = np.float32(1e-9)
 
 @dataclass(frozen=True)
 class Halves:
-    """What each half of a frame's samples shows; float32, the two halves first.
+    """The two half buffers of a frame; float32, the first axis is the half.
 
     `radiance`, `albedo`, `normal` (2, H, W, 3) and `alpha` (2, H, W), or None, are as
-    in `Frame`, which holds the means of both. The halves are two parts of one sample
-    sequence, or of two seeds. Each has its share of the samples, or by `counts`
-    (2, H, W) as many in each pixel.
+    in `Frame`, which holds the means of both. The halves are two subsets of one sample
+    sequence, or have two seeds. `shares` are their shares of the samples; `counts`
+    (2, H, W) their samples in each pixel, where they differ.
     """
 
     radiance: Array
@@ -36,7 +37,7 @@ class Halves:
     counts: Array | None = None
 
     def share(self) -> Array:
-        """Return how much of the samples the first half has: (H, W), or one number."""
+        """Return the first half's share of the samples: (H, W), or one number."""
         if self.counts is None:
             return np.asarray(self.shares[0], np.float32)
         one, two = self.counts

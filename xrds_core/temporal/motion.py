@@ -1,16 +1,16 @@
-"""Where every pixel of one frame was in another one, by geometry without noise.
+"""Reprojection: where every pixel of one frame was in another one.
 
-A pixel's centre, with the depth seen there, is a point of the world; the other frame's
-camera shows it elsewhere. That is linear in (x, y, 1, nearness), so one 4x4 matrix for
-each pair of frames tells it, and another one for each object that moved. Nearness is
-1 / depth for a perspective camera, 0 for the sky; for an orthographic one the depth.
+A pixel's centre and depth give a point in the world, which the other frame's camera
+shows elsewhere. That is linear in (x, y, 1, inverse depth), so one 4x4 matrix for each
+pair of frames describes it. Inverse depth is 1 / depth for a perspective camera, 0 for
+the sky; for an orthographic camera the depth takes its place.
 
-A place counts where going there and back agrees: what the other frame shows there must
-come from this pixel, to within a pixel of motion, and be as near as something in
-the 9x9 pixels around it. This throws out whatever covers or uncovers the surface, and
-leaves edges their mixed samples as long as both sides of the edge move alike. Choosing
-samples by what shows at the pixel's own centre would choose by their content: edges
-would lose what smooths them.
+A reprojected position is valid if it survives the way back: what the other frame shows
+there must come from this pixel, to within a pixel of motion, and be as near as
+something in the 9x9 pixels around it. This rejects occlusions and disocclusions, and
+leaves edges their mixed samples as long as both sides of the edge move alike. Selecting
+samples by what is at the pixel's own centre would select by content: edges would lose
+their antialiasing.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .neighbours import extreme, extreme_at
-from .panorama import Around, around
+from .local_filters import extreme, extreme_at
+from .panorama import PanoramaReprojection, panorama_reprojection
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -29,24 +29,23 @@ if TYPE_CHECKING:
     from ..arrays import Array
     from .frame import Camera, Matrix, Stored
 
-    Passage = Array | Around
+    Reprojection = Array | PanoramaReprojection
 
-# Pixels by which motion there and motion back may differ; for things that move by
-# themselves, whose edges are known less well, half as much.
-_AGREEMENT = 1.0
-AGREEMENT_OF_MOVING = 0.5
-# What they differ by is as bad as this much distance from the true place (squared).
+# Pixels by which forward and backward motion may differ; half as much for moving
+# objects, whose edges are known less well.
+_TOLERANCE = 1.0
+MOVING_TOLERANCE = 0.5
+# Their difference counts as this much distance from the true position (squared).
 _AS_DISTANCE = 2.0
-# Share of itself by which nearness may lie beyond what is around.
-_NEARNESS_SLACK = 0.02
-# What the nearer side of an edge moves apart from the other is as bad as this much
-# distance (squared), up to a pixel. Where all is fine edges, 0.5 cost 0.2 dB and
-# leaving such samples out a decibel.
+# Relative excess of inverse depth over the range around a pixel that is allowed.
+_INVERSE_DEPTH_SLACK = 0.02
+# Parallax between both sides of an edge counts as this much distance (squared), up to a
+# pixel. Where all is fine edges, 0.5 cost 0.2 dB, and leaving such samples out 1 dB.
 _AS_DISTANCE_AT_RIMS, _MOST_AT_RIMS = 0.3, 1.0
 # Cycles' first sample lies at the pixel's centre. Frames of a sample or two that move
 # by whole pixels would all show the same points, and lines thinner than a pixel would
-# break up. So there the pixel taken is off by chance, by up to this much. Moves count
-# as whole where a pixel lands nearer to a centre than this, for each frame between.
+# break up. So there the pixel taken is jittered by up to this much. Motion counts as
+# whole pixels where a position is nearer to a centre than this, per frame between.
 _FEW_SAMPLES = 2.0
 _OFF, _WHOLE = 0.6, 0.02
 # Multiples of these spread evenly over a unit square (M. Roberts, R3 and R2 sequences).
@@ -68,8 +67,8 @@ class Places:
     """Where pixels were in another frame.
 
     `pixel`: flat index of the other frame's nearest pixel, 0 where not seen;
-    `apart`: squared distance in pixels from the true place to that pixel's centre,
-    what motion there and back leave over, and what moves otherwise beside it;
+    `apart`: squared distance in pixels from the true position to that pixel's centre,
+    plus the differences of forward and backward motion and of both sides of an edge;
     `seen`: where the other frame shows the same. All (n,), in the order of the grid.
     """
 
@@ -79,14 +78,14 @@ class Places:
 
 
 @dataclass(frozen=True)
-class Detour:
-    """What a pair of frames knows of things that moved by themselves.
+class ObjectMotion:
+    """Where the moving objects of one frame were in another one.
 
-    `pixels`: flat, ascending, those of this frame that show such things; `x` and
-    `y`: where they were in the other frame, NaN where motion there and back does not
-    agree. All (m,). `moving` (H W): which pixels of the other frame show such things,
-    `beside` (H W), or None: which of this frame show something else, but may hold some
-    of their light.
+    `pixels`: flat, ascending, those of this frame that show moving objects; `x` and
+    `y`: where they were in the other frame, NaN where forward and backward motion are
+    inconsistent. All (m,). `moving` (H W): which pixels of the other frame show moving
+    objects, `beside` (H W), or None: which of this frame show something else, but may
+    contain some of their light.
     """
 
     pixels: NDArray[np.intp]
@@ -98,20 +97,21 @@ class Detour:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two frames, and how pixels pass from the one to the other and back."""
+    """Two frames, and the reprojection of pixels from one to the other and back."""
 
     here: Stored
     there: Stored
-    forth: Passage
-    back: Passage
+    forth: Reprojection
+    back: Reprojection
     extent: tuple[Array, Array]
-    detour: Detour | None = None
+    object_motion: ObjectMotion | None = None
 
 
 def world_of(camera: Camera) -> Matrix:
-    """Return (4, 4): (x, y, 1, nearness) -> world point times w, in pixels of arrays.
+    """Return (4, 4): (x, y, 1, inverse depth) -> world point times w.
 
-    Nearness is 1 / depth for a perspective camera, the depth for an orthographic one.
+    x and y are pixels of arrays. For an orthographic camera the depth takes the place
+    of its inverse.
     """
     (width, height), (left, top), p = camera.size, camera.window, camera.project
     screen = np.array(
@@ -134,7 +134,7 @@ def world_of(camera: Camera) -> Matrix:
 
 
 def pixels_of(camera: Camera) -> Matrix:
-    """Return (4, 4): world point -> (x w, y w, w, nearness w) in pixels of arrays."""
+    """Return (4, 4): world point -> (x w, y w, w, inverse depth w), as `world_of`."""
     (width, height), (left, top) = camera.size, camera.window
     screen = np.array(
         [
@@ -147,64 +147,69 @@ def pixels_of(camera: Camera) -> Matrix:
     return np.vstack([screen @ camera.project @ camera.view, near])
 
 
-def passage(here: Camera, there: Camera) -> Passage:
-    """Return (4, 4): (x, y, 1, nearness) here -> (x w, y w, w, nearness w) there.
+def reprojection(here: Camera, there: Camera) -> Reprojection:
+    """Return the reprojection of pixels from one camera to another.
 
-    Panoramas have a passage of their own.
+    (4, 4): (x, y, 1, inverse depth) here -> (x w, y w, w, inverse depth w) there; of
+    panoramas `PanoramaReprojection`.
     """
     if here.sphere is not None and there.sphere is not None:
-        return around(here, there)
+        return panorama_reprojection(here, there)
     return (pixels_of(there) @ world_of(here)).astype(np.float32)
 
 
 def pair(
     here: Stored,
     there: Stored,
-    detour: Detour | None = None,
+    object_motion: ObjectMotion | None = None,
     extent: tuple[Array, Array] | None = None,
 ) -> Pair:
     """Return what `places` needs to know of two frames.
 
     `extent` is `surroundings` of `here`, for callers with many pairs.
     """
-    forth = passage(here.camera, there.camera)
-    back = passage(there.camera, here.camera)
-    if detour is not None:
-        detour = _with_rims(detour, here, there)
-    return Pair(here, there, forth, back, extent or surroundings(here), detour)
+    forth = reprojection(here.camera, there.camera)
+    back = reprojection(there.camera, here.camera)
+    if object_motion is not None:
+        object_motion = _with_rims(object_motion, here, there)
+    return Pair(
+        here, there, forth, back, extent or inverse_depth_range(here), object_motion
+    )
 
 
-def _with_rims(detour: Detour, here: Stored, there: Stored) -> Detour:
-    """Return a detour that knows what lies beside things that moved by themselves.
+def _with_rims(
+    object_motion: ObjectMotion, here: Stored, there: Stored
+) -> ObjectMotion:
+    """Return object motion that includes the edges of moving objects.
 
-    Edges are pixels of both sides. What stands still takes no part in such a pixel: the
-    share of the thing that moves in it is another one in every frame.
+    Pixels on an edge belong to both sides. They are not reused for the side that stands
+    still: the moving object's share of such a pixel is different in every frame.
     """
-    own = np.zeros(here.nearness.shape, bool)
-    own[detour.pixels] = True
+    own = np.zeros(here.inverse_depth.shape, bool)
+    own[object_motion.pixels] = True
     beside = _beside(own, here)
-    moving = detour.moving | _beside(detour.moving, there)
-    return replace(detour, moving=moving, beside=beside)
+    moving = object_motion.moving | _beside(object_motion.moving, there)
+    return replace(object_motion, moving=moving, beside=beside)
 
 
 def _beside(mask: NDArray[np.bool_], frame: Stored) -> NDArray[np.bool_]:
-    """Return the rims (H W) that are not in a mask (H W), but next to it."""
+    """Return the rims (H W) that are adjacent to a mask (H W), but not in it."""
     wide = extreme(mask.reshape(frame.shape), np.logical_or).ravel()
     return np.asarray(wide & ~mask & frame.rims)
 
 
-def surroundings(frame: Stored) -> tuple[Array, Array]:
-    """Return the least and largest nearness in the 9x9 pixels around, with some slack.
+def inverse_depth_range(frame: Stored) -> tuple[Array, Array]:
+    """Return the range of inverse depth in the 9x9 pixels around, with some slack.
 
-    Less than 9x9 cost 1.4 dB on a house with fine rails: hits and misses of what is
-    thinner than a pixel must not choose its samples.
+    Less than 9x9 cost 1.4 dB on a house with fine rails: for objects thinner than a
+    pixel, hits and misses must not decide which samples are reused.
     """
-    nearness = frame.nearness.reshape(frame.shape)
+    inverse_depth = frame.inverse_depth.reshape(frame.shape)
     least, most = (
-        extreme(extreme(nearness, smaller), smaller, step=3).ravel()
+        extreme(extreme(inverse_depth, smaller), smaller, step=3).ravel()
         for smaller in (np.fmin, np.fmax)
     )
-    slack = np.float32(_NEARNESS_SLACK)
+    slack = np.float32(_INVERSE_DEPTH_SLACK)
     return least * (1 - slack), most * (1 + slack)
 
 
@@ -218,14 +223,15 @@ def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Gri
     return Grid(pixels, np.tile(x, last - first), np.repeat(y, width))
 
 
-def carry(
-    passage: Passage, x: Array, y: Array, nearness: Array
+def reproject(
+    reprojection: Reprojection, x: Array, y: Array, inverse_depth: Array
 ) -> tuple[Array, Array, Array]:
-    """Return (x, y, nearness) there of pixels (n,) here; NaN behind the camera."""
-    if isinstance(passage, Around):
-        return passage.carry(x, y, nearness)
+    """Return (x, y, inverse depth) there of pixels (n,) here; NaN behind the camera."""
+    if isinstance(reprojection, PanoramaReprojection):
+        return reprojection.reproject(x, y, inverse_depth)
     across, down, w, near = (
-        row[0] * x + row[1] * y + row[3] * nearness + row[2] for row in passage
+        row[0] * x + row[1] * y + row[3] * inverse_depth + row[2]
+        for row in reprojection
     )
     w[~(w > 0.0)] = np.nan
     return across / w, down / w, near / w
@@ -234,36 +240,38 @@ def carry(
 def places(pair: Pair, grid: Grid) -> Places:
     """Find where rows of pixels of `pair.here` were in `pair.there`."""
     found, _ = still_places(pair, grid)
-    _doubt_rims(found, pair, grid)
-    return found if pair.detour is None else _detoured(found, pair, grid)
+    _penalise_rims(found, pair, grid)
+    return (
+        found if pair.object_motion is None else _with_object_motion(found, pair, grid)
+    )
 
 
 def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
-    """Find places as if nothing but the camera moved, and which lie in the frame."""
-    near = pair.here.nearness[grid.pixels]
-    x, y, _ = carry(pair.forth, grid.x, grid.y, near)
+    """Find places as if only the camera moved, and which of them are in the frame."""
+    near = pair.here.inverse_depth[grid.pixels]
+    x, y, _ = reproject(pair.forth, grid.x, grid.y, near)
     found = nearest(x, y, pair.there.shape)
-    _loosen(found, pair, grid, x, y)
+    _jitter(found, pair, grid, x, y)
     centre_x, centre_y = centres(found.pixel, pair.there.shape[1])
-    near = pair.there.nearness.take(found.pixel)
-    back_x, back_y, near = carry(pair.back, centre_x, centre_y, near)
-    # what the way there and the way back leave over
+    near = pair.there.inverse_depth.take(found.pixel)
+    back_x, back_y, near = reproject(pair.back, centre_x, centre_y, near)
+    # the difference of forward and backward motion
     back_x += x - grid.x - centre_x
     back_y += y - grid.y - centre_y
     left = back_x**2 + back_y**2
     least, most = (part[grid.pixels] for part in pair.extent)
-    seen = found.seen & (left < _AGREEMENT**2) & (near >= least) & (near <= most)
+    seen = found.seen & (left < _TOLERANCE**2) & (near >= least) & (near <= most)
     left[~seen] = 0.0
     apart = found.apart + np.float32(_AS_DISTANCE) * left
     return Places(found.pixel, apart, seen), found.seen
 
 
-def _loosen(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
-    """Take another pixel by chance where places (n,) lie at the centres of theirs."""
+def _jitter(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
+    """Jitter the pixel taken where places (n,) lie at pixel centres."""
     here, there = pair.here, pair.there
     frames = abs(there.number - here.number)
-    stands = here.camera.same(replace(there.camera, window=here.camera.window))
-    if here.samples > _FEW_SAMPLES or stands or not frames:
+    is_static = here.camera.same(replace(there.camera, window=here.camera.window))
+    if here.samples > _FEW_SAMPLES or is_static or not frames:
         return
     at = np.flatnonzero(found.seen & (found.apart < (_WHOLE * frames) ** 2))
     pixel = np.stack([grid.x[at], grid.y[at], np.full(len(at), there.number)])
@@ -275,43 +283,47 @@ def _loosen(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
     found.pixel[at[other.seen]] = other.pixel[other.seen]
 
 
-def _doubt_rims(found: Places, pair: Pair, grid: Grid) -> None:
-    """Put farther apart what holds light of something nearer that moves otherwise.
+def _penalise_rims(found: Places, pair: Pair, grid: Grid) -> None:
+    """Add distance to pixels with light of a nearer surface that moves differently.
 
-    Pixels beside an edge hold some samples of the nearer side. What is nearer beside
-    the pixel taken does not belong here, what is nearer here is missing there.
+    Pixels at an edge contain some samples of the nearer side. A nearer surface next to
+    the pixel taken does not belong here; one next to this pixel is missing there.
     """
     assert isinstance(grid.pixels, slice)
     here, there = pair.here, pair.there
     apart = np.zeros(len(found.apart), np.float32)
     at = np.flatnonzero(found.seen & here.rims[grid.pixels])
-    apart[at] = _drift(pair.forth, here, at + grid.pixels.start)
+    apart[at] = _parallax(pair.forth, here, at + grid.pixels.start)
     at = np.flatnonzero(found.seen & there.rims.take(found.pixel))
-    apart[at] = np.fmax(apart[at], _drift(pair.back, there, found.pixel[at]))
+    apart[at] = np.fmax(apart[at], _parallax(pair.back, there, found.pixel[at]))
     np.fmin(apart, np.float32(_MOST_AT_RIMS), out=apart)  # NaN behind the camera
     found.apart[...] += np.float32(_AS_DISTANCE_AT_RIMS) * apart
 
 
-def _drift(way: Passage, frame: Stored, pixels: NDArray[np.integer]) -> Array:
-    """Return the square of what the nearest surface beside flat pixels moves apart."""
+def _parallax(
+    transform: Reprojection, frame: Stored, pixels: NDArray[np.integer]
+) -> Array:
+    """Return the squared parallax of flat pixels to the nearest surface around them."""
     x, y = centres(pixels, frame.shape[1])
-    own_x, own_y, _ = carry(way, x, y, frame.nearness.take(pixels))
-    nearest = extreme_at(frame.nearness, pixels, frame.shape, frame.nearer)
-    near_x, near_y, _ = carry(way, x, y, nearest)
+    own_x, own_y, _ = reproject(transform, x, y, frame.inverse_depth.take(pixels))
+    nearest = extreme_at(frame.inverse_depth, pixels, frame.shape, frame.nearer)
+    near_x, near_y, _ = reproject(transform, x, y, nearest)
     return (near_x - own_x) ** 2 + (near_y - own_y) ** 2
 
 
-def _detoured(found: Places, pair: Pair, grid: Grid) -> Places:
-    """Return places with those of moving things in theirs."""
-    detour = pair.detour
-    assert detour is not None
+def _with_object_motion(found: Places, pair: Pair, grid: Grid) -> Places:
+    """Return places with those of moving objects replaced by their own."""
+    object_motion = pair.object_motion
+    assert object_motion is not None
     assert isinstance(grid.pixels, slice)
-    found.seen[...] &= ~detour.moving.take(found.pixel)
-    if detour.beside is not None:
-        found.seen[...] &= ~detour.beside[grid.pixels]
-    part = slice(*detour.pixels.searchsorted((grid.pixels.start, grid.pixels.stop)))
-    moved = nearest(detour.x[part], detour.y[part], pair.there.shape)
-    inside = detour.pixels[part] - grid.pixels.start
+    found.seen[...] &= ~object_motion.moving.take(found.pixel)
+    if object_motion.beside is not None:
+        found.seen[...] &= ~object_motion.beside[grid.pixels]
+    part = slice(
+        *object_motion.pixels.searchsorted((grid.pixels.start, grid.pixels.stop))
+    )
+    moved = nearest(object_motion.x[part], object_motion.y[part], pair.there.shape)
+    inside = object_motion.pixels[part] - grid.pixels.start
     found.pixel[inside] = moved.pixel
     found.apart[inside] = moved.apart
     found.seen[inside] = moved.seen
@@ -319,7 +331,7 @@ def _detoured(found: Places, pair: Pair, grid: Grid) -> Places:
 
 
 def nearest(x: Array, y: Array, shape: tuple[int, int]) -> Places:
-    """Return the pixels that hold places (n,); not seen where outside of the frame."""
+    """Return the pixels that positions (n,) fall into; not seen outside the frame."""
     height, width = shape
     seen = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
     x, y = np.where(seen, x, np.float32(0.5)), np.where(seen, y, np.float32(0.5))
@@ -335,6 +347,6 @@ def centres(pixels: NDArray[np.integer], width: int) -> tuple[Array, Array]:
 
 
 def known(x: Array, y: Array, mask: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Return places with NaN outside of `mask`."""
+    """Return positions, NaN outside `mask`."""
     nan = np.float32(np.nan)
     return np.where(mask, x, nan), np.where(mask, y, nan)

@@ -1,7 +1,7 @@
 """Equirectangular panoramas: pixels are directions, and depth is distance.
 
-A panorama's passage to another frame is not linear in its pixels as that of other
-cameras is, but in their directions: unit vectors in the camera's own axes.
+The reprojection of a panorama is not linear in its pixels, as that of other cameras
+is, but in their directions: unit vectors in camera space.
 """
 
 from __future__ import annotations
@@ -17,34 +17,36 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Around:
-    """How pixels pass from one panorama to another.
+class PanoramaReprojection:
+    """The reprojection of pixels from one panorama to another.
 
-    `turn` (4, 4) takes points in the axes of the one to those of the other.
+    `turn` (4, 4) is the transform from the camera space of `here` to that of `there`.
     """
 
     here: Camera
     there: Camera
     turn: Matrix
 
-    def carry(self, x: Array, y: Array, nearness: Array) -> tuple[Array, Array, Array]:
-        """Return (x, y, nearness) there of pixels (n,) here."""
+    def reproject(
+        self, x: Array, y: Array, inverse_depth: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return (x, y, inverse depth) there of pixels (n,) here."""
         ray = _directions(self.here, x, y)
         turn = self.turn.astype(np.float32)
-        seen = turn[:3, :3] @ ray + turn[:3, 3:] * nearness
+        seen = turn[:3, :3] @ ray + turn[:3, 3:] * inverse_depth
         length = np.sqrt(np.square(seen).sum(0))
         with np.errstate(divide="ignore", invalid="ignore"):
             across, down = _pixels(self.there, seen / length)
-            return across, down, nearness / length
+            return across, down, inverse_depth / length
 
 
-def around(here: Camera, there: Camera) -> Around:
-    """Return the passage between two panoramas."""
-    return Around(here, there, there.view @ np.linalg.inv(here.view))
+def panorama_reprojection(here: Camera, there: Camera) -> PanoramaReprojection:
+    """Return the reprojection between two panoramas."""
+    return PanoramaReprojection(here, there, there.view @ np.linalg.inv(here.view))
 
 
 def _directions(camera: Camera, x: Array, y: Array) -> Array:
-    """Return unit vectors (3, n) in the camera's axes."""
+    """Return unit vectors (3, n) in camera space."""
     sphere, (width, height) = camera.sphere, camera.size
     assert sphere is not None
     (left, right), (low, high) = sphere.longitude, sphere.latitude
@@ -61,7 +63,7 @@ def _pixels(camera: Camera, ray: Array) -> tuple[Array, Array]:
     assert sphere is not None
     (left, right), (low, high) = sphere.longitude, sphere.latitude
     longitude = np.arctan2(ray[0], -ray[2])
-    # the same direction, counted from the frame's left edge
+    # the same direction, measured from the frame's left edge
     turned = np.mod(longitude - np.float32(left), np.float32(2 * np.pi))
     latitude = np.arcsin(np.clip(ray[1], -1.0, 1.0))
     x = turned * np.float32(width / (right - left)) - camera.window[0]

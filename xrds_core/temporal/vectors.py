@@ -1,8 +1,8 @@
-"""The places of things that moved by themselves, by Cycles' Vector passes.
+"""Object motion vectors: where moving objects were in other frames, by Vector passes.
 
-They hold for everything, deforming meshes too, and are followed from each frame to the
-next, there and back. A place is given up at the first frame where the way back leads
-elsewhere: something came before it.
+They cover everything, deforming meshes included, and are chained from frame to frame,
+forwards and backwards. A pixel is lost at the first frame where the backward vector
+leads elsewhere: it was occluded there.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from .local_filters import extreme
 from .motion import (
-    AGREEMENT_OF_MOVING,
-    Detour,
-    carry,
+    MOVING_TOLERANCE,
+    ObjectMotion,
     centres,
     grid,
     known,
     nearest,
-    passage,
+    reproject,
+    reprojection,
 )
-from .neighbours import extreme
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -33,61 +33,65 @@ if TYPE_CHECKING:
     from .frame import Camera, Stored
 
     Mask = NDArray[np.bool_]
-    Trail = tuple[Array, Array]  # x and y, NaN where lost
+    VectorChain = tuple[Array, Array]  # x and y, NaN where lost
 
-# Share of itself by which the nearness of a thing may change from frame to frame.
+# Relative change of an object's inverse depth that is allowed from frame to frame.
 _NEARER = 0.1
 
 
 class Movement:
-    """Finds what moved by itself between the frames of a shot, by their Vector passes.
+    """Finds the object motion between the frames of a shot, from their Vector passes.
 
-    One object serves a whole shot: what is known of a frame is kept while the frame is.
-    Without Vector passes nothing is taken to move but the camera.
+    One instance serves a whole shot: results for a frame are cached while the frame
+    exists. Without Vector passes nothing but the camera is assumed to move.
     """
 
     def __init__(self) -> None:
         self._moving: WeakKeyDictionary[Stored, dict[int, Mask]]
         self._moving = WeakKeyDictionary()
 
-    def detours(self, here: Stored, others: Sequence[Stored]) -> list[Detour | None]:
-        """Return for each of `others` the places of what moved by itself.
+    def object_motions(
+        self, here: Stored, others: Sequence[Stored]
+    ) -> list[ObjectMotion | None]:
+        """Return for each of `others` where the moving objects of `here` were.
 
-        Frames of one number as `here` show the same moment and need none. The way leads
-        from each frame to the nearest that is there.
+        Frames with the number of `here` show the same moment and need none. Vectors are
+        chained from each frame to the nearest one available.
         """
         frames = {x.number: x for x in (*others, here) if x.vector is not None}
-        trails: dict[int, Trail] = {}
+        chains: dict[int, VectorChain] = {}
         if here.vector is not None:
             for step in (-1, 1):
-                trails |= self._trail(here, frames, step)
+                chains |= self._chain(here, frames, step)
         return [
-            None if x.number == here.number else self._detour(here, x, frames, trails)
+            None
+            if x.number == here.number
+            else self._object_motion(here, x, frames, chains)
             for x in others
         ]
 
-    def _detour(
+    def _object_motion(
         self,
         here: Stored,
         there: Stored,
         frames: Mapping[int, Stored],
-        trails: Mapping[int, Trail],
-    ) -> Detour:
+        chains: Mapping[int, VectorChain],
+    ) -> ObjectMotion:
         pixels = np.flatnonzero(self.moving(here, frames))
         nowhere = np.full((2, len(pixels)), np.nan, np.float32)
-        x, y = trails.get(there.number, nowhere)
-        return Detour(pixels, x, y, self.moving(there, frames))
+        x, y = chains.get(there.number, nowhere)
+        return ObjectMotion(pixels, x, y, self.moving(there, frames))
 
-    def _trail(
+    def _chain(
         self, here: Stored, frames: Mapping[int, Stored], step: int
-    ) -> dict[int, Trail]:
-        """Follow the moving pixels of `here` frame by frame; number -> places."""
+    ) -> dict[int, VectorChain]:
+        """Follow the moving pixels of `here` frame by frame; number -> positions."""
         x, y = centres(np.flatnonzero(self.moving(here, frames)), here.shape[1])
-        trail, frame = {}, here
+        chain, frame = {}, here
         while (after := _beside(frame, frames, step)) is not None:
             x, y = self._step(frame, after, frames, x, y)
-            trail[after.number], frame = (x, y), after
-        return trail
+            chain[after.number], frame = (x, y), after
+        return chain
 
     def _step(
         self,
@@ -97,25 +101,25 @@ class Movement:
         x: Array,
         y: Array,
     ) -> tuple[Array, Array]:
-        """Carry places (NaN: lost) into the frame before or after."""
+        """Move positions (NaN: lost) to the frame before or after."""
         steps = there.number - here.number
         start = nearest(x, y, here.shape)
         flow_x, flow_y = _flow(here, start.pixel, steps)
         found = nearest(x + flow_x, y + flow_y, there.shape)
         back_x, back_y = _flow(there, found.pixel, -steps)
-        with np.errstate(invalid="ignore"):  # infinite motion agrees with none
+        with np.errstate(invalid="ignore"):  # infinite motion is never consistent
             left = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2
-        was, near = here.nearness[start.pixel], there.nearness[found.pixel]
-        agreed = (left < AGREEMENT_OF_MOVING**2) & (np.abs(near - was) < _NEARER * was)
-        agreed &= self.moving(there, frames)[found.pixel] & found.seen & start.seen
-        return known(x + flow_x, y + flow_y, agreed)
+        was, near = here.inverse_depth[start.pixel], there.inverse_depth[found.pixel]
+        consistent = (left < MOVING_TOLERANCE**2) & (np.abs(near - was) < _NEARER * was)
+        consistent &= self.moving(there, frames)[found.pixel] & found.seen & start.seen
+        return known(x + flow_x, y + flow_y, consistent)
 
     def moving(self, frame: Stored, frames: Mapping[int, Stored]) -> Mask:
-        """Return (H W): where the Vector pass is not what the cameras alone explain.
+        """Return (H W): where the Vector pass is not explained by camera motion alone.
 
-        The camera after the frame is asked, or the one before it where `frames` end;
-        nothing that was asked earlier, so that a shot's parts agree with the whole. All
-        is taken to move where no camera beside the frame is known.
+        That is the motion to the next camera, or to the previous one where `frames`
+        end; never anything found earlier, so that parts of a shot give the same result
+        as the whole. Without an adjacent camera everything is assumed to move.
         """
         known = self._moving.setdefault(frame, {})
         for step in (1, -1):
@@ -125,7 +129,7 @@ class Movement:
                 if steps not in known:
                     known[steps] = _unexplained(frame, beside.camera, steps)
                 return known[steps]
-        return np.full(frame.nearness.shape, frame.vector is not None)
+        return np.full(frame.inverse_depth.shape, frame.vector is not None)
 
 
 def _beside(frame: Stored, frames: Mapping[int, Stored], step: int) -> Stored | None:
@@ -137,20 +141,22 @@ def _beside(frame: Stored, frames: Mapping[int, Stored], step: int) -> Stored | 
 def _unexplained(frame: Stored, beside: Camera, steps: int) -> Mask:
     """Return (H W): where the Vector pass differs from the camera's own motion.
 
-    It is a mean over the pixel's samples, so it may lie anywhere between what the
-    camera explains for the pixels around it.
+    The pass is a mean over the pixel's samples, so it may have any value between the
+    camera's motion vectors of the surrounding pixels.
     """
     own = grid(frame.shape)
-    forth = passage(frame.camera, beside)
-    x, y, _ = carry(forth, own.x, own.y, frame.nearness)
+    forth = reprojection(frame.camera, beside)
+    x, y, _ = reproject(forth, own.x, own.y, frame.inverse_depth)
     flows = _flow(frame, slice(None), steps)
     apart = np.zeros(frame.shape, np.float32)
     for still, flow in ((x - own.x, flows[0]), (y - own.y, flows[1])):
         explained, given = still.reshape(frame.shape), flow.reshape(frame.shape)
         np.fmax(apart, extreme(explained, np.fmin) - given, out=apart)
         np.fmax(apart, given - extreme(explained, np.fmax), out=apart)
-    hit = (frame.nearness > 0.0) | (frame.nearness < 0.0)  # neither sky nor NaN
-    return np.asarray((apart.ravel() > AGREEMENT_OF_MOVING / 2) & hit)
+    hit = (frame.inverse_depth > 0.0) | (
+        frame.inverse_depth < 0.0
+    )  # neither sky nor NaN
+    return np.asarray((apart.ravel() > MOVING_TOLERANCE / 2) & hit)
 
 
 def _flow(
@@ -158,8 +164,12 @@ def _flow(
 ) -> tuple[Array, Array]:
     """Return (x, y downwards) in pixels to the frame `steps` later, or before.
 
-    The pass leads one frame on; in a shot in steps, motion is taken to be even.
+    The pass covers one frame; over several, motion is assumed to be uniform.
     """
     assert frame.vector is not None
-    picked = frame.vector[pixels].astype(np.float32) * np.float32(abs(steps))
-    return (-picked[:, 2], picked[:, 3]) if steps > 0 else (picked[:, 0], -picked[:, 1])
+    vectors = frame.vector[pixels].astype(np.float32) * np.float32(abs(steps))
+    return (
+        (-vectors[:, 2], vectors[:, 3])
+        if steps > 0
+        else (vectors[:, 0], -vectors[:, 1])
+    )

@@ -1,9 +1,9 @@
-"""Which frames are neighbours, in what order they are needed, and what they cost.
+"""Which frames are neighbours, in what order they are loaded, and what they cost.
 
-A frame takes samples from those up to `radius` frames before and after it, between two
-cuts of the shot; at the ends it takes what there is. Frames go by in order: each is
-loaded once, kept while a frame to come needs it, and finished when its last neighbour
-is there.
+A frame reuses samples of those up to `radius` frames before and after it, between two
+shot cuts; at the ends there are fewer. Frames are processed in order: each is loaded
+once, stays in memory while a later frame needs it, and is finished when its last
+neighbour is loaded.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
 
 Loaded = TypeVar("Loaded")
 
-# Of albedo and normal, in half floats, and nearness; then of radiance and its noise, a
-# Vector pass and an alpha, in half floats.
+# Per pixel: albedo and normal, in half floats, and inverse depth; then radiance and its
+# noise, a Vector pass and an alpha, in half floats.
 _BYTES = 2 * 3 * 2 + 4
 _LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES = 12, 8, 2
 
 
 @dataclass(frozen=True)
 class Shot:
-    """The frames of a shot in order of time, and how far neighbours reach.
+    """The frames of a shot in order of time, and its temporal radius.
 
-    `frames` are frame numbers, those that are to be finished; `radius` counts in
-    them, so that a shot rendered in steps reaches as far. `cuts` are the frames that
-    begin something new: no frame has neighbours across. `others` are neighbours alone,
-    as those that another machine finishes. Raises UsageError for what cannot be.
+    `frames` are the numbers of the frames to finish; `radius` counts in them, so that a
+    shot rendered in steps has as many neighbours. `cuts` are the first frames after a
+    cut: no frame has neighbours across it. `others` are neighbours only, such as frames
+    that another machine finishes. Raises UsageError for a negative radius.
     """
 
     frames: tuple[int, ...]
@@ -49,34 +49,34 @@ class Shot:
         object.__setattr__(self, "order", order)
 
     def neighbours(self, frame: int) -> tuple[int, ...]:
-        """Return the neighbour frames of `frame`, the nearest ones first."""
+        """Return the neighbour frames of `frame`, nearest first."""
         place = bisect_left(self.order, frame)
         around = self.order[max(0, place - self.radius) : place + self.radius + 1]
-        take = self._take(frame)
+        part = self._part(frame)
         return tuple(
             sorted(
-                (x for x in around if x != frame and self._take(x) == take),
+                (x for x in around if x != frame and self._part(x) == part),
                 key=lambda x: (abs(x - frame), x),
             )
         )
 
     def is_between(self, frame: int) -> bool:
-        """Return whether it lies between two neighbours that themselves do not."""
+        """Whether its index is odd and both adjacent frames are its neighbours."""
         place = bisect_left(self.order, frame)
         beside = {*self.order[place - 1 : place], *self.order[place + 1 : place + 2]}
         found = {*self.neighbours(frame)}
         return place % 2 == 1 and len(beside) == 2 and beside <= found
 
-    def _take(self, frame: int) -> int:
-        """Return between which cuts a frame lies."""
+    def _part(self, frame: int) -> int:
+        """Return the number of cuts up to a frame."""
         return sum(cut <= frame for cut in self.cuts)
 
 
 def place_of(frame: int, frames: Sequence[int]) -> int:
-    """Return a frame's place in its shot, of which `frames` may be any part.
+    """Return a frame's index in its shot, of which `frames` may be any part.
 
-    Frames in even steps are counted from frame 0, so that parts of a shot that are
-    rendered apart agree. Others are counted from the first one.
+    Frames in even steps are counted from frame 0, so that parts of a shot rendered
+    separately agree. Others are counted from the first one.
     """
     order = sorted(set(frames))
     steps = {after - before for before, after in pairwise(order)}
@@ -85,7 +85,7 @@ def place_of(frame: int, frames: Sequence[int]) -> int:
 
 @dataclass(frozen=True)
 class Neighbourhood(Generic[Loaded]):
-    """A frame of a shot and the neighbour frames whose samples it takes, by number."""
+    """A frame of a shot and the neighbour frames whose samples it reuses, by number."""
 
     number: int
     own: Loaded
@@ -93,11 +93,11 @@ class Neighbourhood(Generic[Loaded]):
 
 
 class Window(Generic[Loaded]):
-    """The part of a shot that is in memory, moved along from frame to frame.
+    """The part of a shot that is in memory, a sliding window over its frames.
 
-    `load` gives one frame and is called once for each, in order, and not before it is
-    needed; None where a frame is missing or damaged: it is left out, and is nobody's
-    neighbour. Of the frames at most one and its neighbours are kept.
+    `load` returns one frame and is called once for each, in order, and not before it is
+    needed. None means that a frame is missing or damaged: it is left out, and is no
+    neighbour of others. At most one frame and its neighbours are in memory.
     """
 
     def __init__(self, shot: Shot, load: Callable[[int], Loaded | None]) -> None:
@@ -107,11 +107,11 @@ class Window(Generic[Loaded]):
 
     @property
     def newest(self) -> int | None:
-        """The last frame that is in memory."""
+        """The last frame in memory."""
         return max(self._loaded, default=None)
 
     def missing(self, number: int) -> list[int]:
-        """Return what is to be loaded for the neighbourhood of a frame, in order."""
+        """Return the frames to load for the neighbourhood of a frame, in order."""
         needed = (number, *self.shot.neighbours(number))
         return sorted(x for x in needed if x not in self._loaded)
 
@@ -135,13 +135,13 @@ class Window(Generic[Loaded]):
         return self._loaded.get(number)
 
     def replace(self, number: int, frame: Loaded) -> None:
-        """Keep another in the place of a frame."""
+        """Store another frame in place of one in memory."""
         self._loaded[number] = frame
 
     def __iter__(self) -> Iterator[Neighbourhood[Loaded]]:
-        """Yield the neighbourhood of each frame of the shot that is there, in order.
+        """Yield the neighbourhood of each frame of the shot that exists, in order.
 
-        What is yielded is dropped when the next one is asked for.
+        Each is released when the next one is requested.
         """
         for number in sorted(set(self.shot.frames)):
             found = self.neighbourhood(number)

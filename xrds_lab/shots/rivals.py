@@ -16,7 +16,7 @@ from xrds_blender.planning.settings import (
     Denoising,
 )
 from xrds_core.temporal.frame import store
-from xrds_core.temporal.motion import carry, grid, passage
+from xrds_core.temporal.motion import grid, reproject, reprojection
 
 if TYPE_CHECKING:
     from xrds_core.arrays import Array
@@ -63,7 +63,7 @@ def _run(quality: str, clean: bool, **images: Array) -> Array:
 
 @lru_cache(maxsize=1)
 def _device() -> Any:
-    from xrds_core.denoising.library import open_device
+    from xrds_core.denoising.oidn_device import open_device
 
     return open_device("cpu", 0)
 
@@ -93,8 +93,8 @@ def _displaced(here: Frame, there: Frame) -> tuple[Array, Array]:
     rows, columns = np.mgrid[: here.shape[0], : here.shape[1]].astype(np.float32)
     if here.vector is None:
         own = grid(here.shape)
-        forth = passage(here.camera, there.camera)
-        x, y, _ = carry(forth, own.x, own.y, store(here).nearness)
+        forth = reprojection(here.camera, there.camera)
+        x, y, _ = reproject(forth, own.x, own.y, store(here).inverse_depth)
         return x.reshape(here.shape) - 0.5, y.reshape(here.shape) - 0.5
     if there.number < here.number:
         return columns + here.vector[..., 0], rows - here.vector[..., 1]

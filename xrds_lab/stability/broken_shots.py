@@ -10,7 +10,7 @@ import numpy as np
 from xrds_core.errors import PictureError
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Stored
-from xrds_core.temporal.judge import MARGIN
+from xrds_core.temporal.similarity import MARGIN
 from xrds_core.temporal.window import Shot, Window
 
 from .accumulation import RADIUS, SAMPLES, film, finished
@@ -74,7 +74,7 @@ def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
     )
     radiance[bad] = value
     with np.errstate(divide="ignore"):
-        depth = (1.0 / frame.nearness).reshape(shape)
+        depth = (1.0 / frame.inverse_depth).reshape(shape)
     vector = None if frame.vector is None else frame.vector.astype(np.float32)
     spoilt = store(
         Frame(
@@ -114,7 +114,7 @@ def crashes(frames: Frames) -> int:
     others: Sequence[Stored] = (
         replace(own, number=6, picture=own.picture[:, :9]),  # no alpha
         replace(own, number=6, vector=None),
-        replace(own, number=6, nearness=np.full_like(own.nearness, np.nan)),
+        replace(own, number=6, inverse_depth=np.full_like(own.inverse_depth, np.nan)),
         replace(own, number=6, samples=64.0),
         replace(own, number=6, picture=own.picture.astype(np.float32)),
     )

@@ -93,7 +93,7 @@ def run_case(number: int, case: Case) -> Outcome:
 def _load() -> None:
     """Load what every case needs, but no denoiser: it has threads of its own."""
     from xrds_blender.command import main  # noqa: F401
-    from xrds_core.denoising import denoiser, library  # noqa: F401
+    from xrds_core.denoising import denoiser, oidn_device  # noqa: F401
     from xrds_core.sequence import denoise  # noqa: F401
 
     with contextlib.suppress(PictureError):

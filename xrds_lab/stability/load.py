@@ -31,7 +31,7 @@ _GUIDE_MEMORY = 1 << 20  # bytes
 
 
 @dataclass(frozen=True)
-class Frame:
+class FrameLoad:
     """What the process holds after a frame, and what it took."""
 
     memory: int
@@ -40,7 +40,7 @@ class Frame:
     cpu_seconds: float
 
 
-def drive(scene: Any, count: int, **choices: Any) -> list[Frame]:
+def drive(scene: Any, count: int, **choices: Any) -> list[FrameLoad]:
     """Render frames 1 to `count` and write them as PNG and EXR in turn.
 
     `choices` are those of `xrds_blender.render`.
@@ -57,7 +57,7 @@ def drive(scene: Any, count: int, **choices: Any) -> list[Frame]:
             target = Path(folder) / f"frame.{('exr', 'png')[number % 2]}"
             picture_file.save(target, picture.radiance, picture.alpha, scene)
             seconds = time.process_time() - start
-            frames.append(Frame(resident(), _data_blocks(), seconds))
+            frames.append(FrameLoad(resident(), _data_blocks(), seconds))
     return frames
 
 
@@ -68,7 +68,7 @@ def growth(values: Sequence[float]) -> float:
     return float(np.median((y[late] - y[early]) / (late - early)))
 
 
-def settled(frames: list[Frame]) -> list[Frame]:
+def settled(frames: list[FrameLoad]) -> list[FrameLoad]:
     """Leave out the first third: caches fill and allocators settle there."""
     return frames[len(frames) // 3 :]
 

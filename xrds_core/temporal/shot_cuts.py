@@ -1,8 +1,9 @@
-"""Where a shot cuts to something else, told by its cameras alone.
+"""Shot cuts, detected from the cameras alone.
 
-Across a cut nothing is lent, whatever the pictures look like. A camera that another one
-replaces, another kind of camera or size of frame, a lens that jumps and a view that
-swings away within one frame are cuts; a zoom, a fast pan and another border are not.
+No samples are reused across a shot cut, whatever the pictures look like. A change to
+another camera, camera type or frame size, a jump of the focal length and a view that
+swings away within one frame are cuts; a zoom, a fast pan and a change of the render
+border are not.
 """
 
 from __future__ import annotations
@@ -18,15 +19,15 @@ if TYPE_CHECKING:
 
 # Factor by which the focal length may change from one frame to the next.
 _ZOOM = 1.25
-# Share of the angle of view by which a camera may turn from one frame to the next.
+# Share of the field of view by which a camera may turn from one frame to the next.
 _TURN = 0.5
 
 
-def is_cut(before: Camera, after: Camera) -> bool:
-    """Return whether something new begins between two frames beside each other."""
+def is_shot_cut(before: Camera, after: Camera) -> bool:
+    """Whether there is a shot cut between two consecutive frames."""
     if _kind(before) != _kind(after):
         return True
-    if before.sphere is not None:  # it sees all around
+    if before.sphere is not None:  # a panorama sees everything
         return False
     old, new = (np.abs(np.diag(c.project)[:2]) for c in (before, after))
     if (np.maximum(old / new, new / old) > _ZOOM).any():
@@ -37,22 +38,22 @@ def is_cut(before: Camera, after: Camera) -> bool:
     return bool(angle > _TURN * seen)
 
 
-def same_take(target: Stored, others: Sequence[Stored]) -> list[Stored]:
-    """Return those of `others`, in their order, that no cut parts from `target`.
+def same_shot(target: Stored, others: Sequence[Stored]) -> list[Stored]:
+    """Return those of `others`, in their order, with no cut between them and `target`.
 
-    Views of one moment, as of a stereo pair, belong together.
+    The views of one moment, as of a stereo pair, belong to the same shot.
     """
     cameras = {frame.number: frame.camera for frame in (*others, target)}
-    taken = {target.number}
+    numbers = {target.number}
     for step in (1, -1):
         number = target.number
         beyond = [n for n in cameras if (n - number) * step > 0]
         for after in sorted(beyond, key=lambda n: n * step):
-            if is_cut(cameras[number], cameras[after]):
+            if is_shot_cut(cameras[number], cameras[after]):
                 break
-            taken.add(after)
+            numbers.add(after)
             number = after
-    return [frame for frame in others if frame.number in taken]
+    return [frame for frame in others if frame.number in numbers]
 
 
 def _kind(camera: Camera) -> tuple[object, ...]:

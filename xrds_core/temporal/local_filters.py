@@ -1,4 +1,4 @@
-"""The least and the largest of the pixels around a pixel; NaN is passed over."""
+"""Minimum, maximum and mean over the pixels around each pixel."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 def extreme(x: NDArray[Any], smaller: np.ufunc, step: int = 1) -> NDArray[Any]:
     """Return the least (`np.fmin`) or largest (`np.fmax`) value of 3x3 pixels.
 
-    Of masks `np.logical_or` says whether any pixel is in it. They lie `step` pixels
-    apart, the middle one at the pixel itself.
+    NaN is ignored. On masks `np.logical_or` is a dilation. The pixels lie `step` apart,
+    the middle one at the pixel itself.
     """
     wide = np.pad(x, step, "edge")
     end = slice(2 * step, None)
@@ -34,7 +34,7 @@ def extreme_at(
     shape: tuple[int, int],
     smaller: np.ufunc,
 ) -> Array:
-    """Return `extreme` (n,) of `x` (H W) at some flat pixels (n,) alone."""
+    """Return `extreme` (n,) of `x` (H W) at some flat pixels (n,) only."""
     height, width = shape
     row, column = np.divmod(pixels, width)
     rows = [np.clip(row + i, 0, height - 1) * width for i in (-1, 0, 1)]
@@ -43,9 +43,9 @@ def extreme_at(
 
 
 def box(x: Array, size: int) -> Array:
-    """Return the mean over `size` x `size` pixels, an odd number, of those inside.
+    """Return the mean over `size` x `size` pixels, as far as they are in the picture.
 
-    (H, W) -> (H, W).
+    `size` is odd. (H, W) -> (H, W).
     """
     wide = np.pad(x, size // 2)
     rows = _sums(wide, x.shape[0], size)
@@ -56,14 +56,14 @@ def box(x: Array, size: int) -> Array:
 
 
 def _shares(side: int, size: int) -> Array:
-    """Return 1 / how many of `size` pixels around each of a side are inside."""
+    """Return 1 / how many of the `size` pixels around each one are in the picture."""
     inside = np.arange(side)
     first, last = np.maximum(inside - size // 2, 0), inside + size // 2
     return (1.0 / (np.minimum(last, side - 1) - first + 1)).astype(np.float32)
 
 
 def _sums(x: Array, count: int, size: int) -> Array:
-    """Return the sums of `size` rows that follow each other, by thirds where it can."""
+    """Return the sums of `size` consecutive rows, in thirds where possible."""
     if size > 3 and size % 3 == 0:
         third = size // 3
         part = _sums(x, count + 2 * third, third)

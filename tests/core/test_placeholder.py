@@ -10,7 +10,7 @@ from shots import HEIGHT, WIDTH, World, camera, view
 
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import store
-from xrds_core.temporal.stand_in import stand_in
+from xrds_core.temporal.placeholder import reprojected_placeholder
 from xrds_core.temporal.window import Shot
 
 CARD = World(card=(0.3, 0.1))
@@ -20,10 +20,10 @@ CARD = World(card=(0.3, 0.1))
 def test_it_knows_where_its_pixels_lie(orthographic: bool) -> None:
     eyes = [camera(x=0.3 * k, orthographic=orthographic) for k in range(3)]
     frames = [store(view(k, eye, CARD).frame) for k, eye in enumerate(eyes)]
-    found = stand_in(1, eyes[1], [frames[0], frames[2]])
+    found = reprojected_placeholder(1, eyes[1], [frames[0], frames[2]])
     assert found.is_empty
-    assert np.isfinite(found.nearness).mean() > 0.99
-    close = np.isclose(found.nearness, frames[1].nearness, rtol=1e-3)
+    assert np.isfinite(found.inverse_depth).mean() > 0.99
+    close = np.isclose(found.inverse_depth, frames[1].inverse_depth, rtol=1e-3)
     assert close.mean() > 0.97  # all but the card's edges
 
 
@@ -32,7 +32,7 @@ def test_it_takes_what_the_others_show(lit: bool) -> None:
     eyes = [camera(x=0.2 * k) for k in range(3)]
     frames = [view(k, eye, CARD).frame for k, eye in enumerate(eyes)]
     guides = [store(x if lit else replace(x, radiance=None)) for x in frames]
-    empty = stand_in(1, eyes[1], [guides[0], guides[2]])
+    empty = reprojected_placeholder(1, eyes[1], [guides[0], guides[2]])
     found = accumulate(empty, [guides[0], guides[2]])
     assert found.samples.mean() > 1.3
     assert np.isfinite(found.albedo).mean() > 0.99

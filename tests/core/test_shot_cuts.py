@@ -10,7 +10,7 @@ from shots import FOCUS, HEIGHT, WIDTH, World, camera, view
 
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Camera, store
-from xrds_core.temporal.takes import is_cut, same_take
+from xrds_core.temporal.shot_cuts import is_shot_cut, same_shot
 
 
 def zoomed(factor: float) -> Camera:
@@ -30,8 +30,8 @@ def zoomed(factor: float) -> Camera:
     ],
 )
 def test_what_is_a_cut(after: Camera) -> None:
-    assert is_cut(camera(), after)
-    assert is_cut(after, camera())
+    assert is_shot_cut(camera(), after)
+    assert is_shot_cut(after, camera())
 
 
 @pytest.mark.parametrize(
@@ -45,7 +45,7 @@ def test_what_is_a_cut(after: Camera) -> None:
     ],
 )
 def test_what_is_none(after: Camera) -> None:
-    assert not is_cut(camera(), after)
+    assert not is_shot_cut(camera(), after)
 
 
 def test_a_take_ends_at_the_first_cut_on_either_side() -> None:
@@ -55,7 +55,7 @@ def test_a_take_ends_at_the_first_cut_on_either_side() -> None:
 
     def numbers(target: int) -> list[int]:
         others = [frame for n, frame in frames.items() if n != target]
-        return [frame.number for frame in same_take(frames[target], others)]
+        return [frame.number for frame in same_shot(frames[target], others)]
 
     assert numbers(4) == [3, 5]
     assert numbers(1) == [2]  # and not 6 and 7, of the same camera

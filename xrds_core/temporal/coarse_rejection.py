@@ -1,9 +1,9 @@
-"""A first look at a neighbour, at some of its pixels: is it the same shot and light?
+"""Coarse rejection: weights of tiles, from some pixels of a neighbour frame.
 
-Two things need more pixels than the judge of each pixel has around it. A
-frame from before a cut fits nearly nowhere, and where its geometry fits by chance it
-must lend nothing either. And light that changes a little over a large part of the
-picture, as a lamp that flickers or a fade, drowns in the noise of a few pixels.
+Two things need more pixels than the similarity weight of each pixel looks at. A frame
+beyond a shot cut matches almost nowhere, and must not contribute where its geometry
+matches by coincidence. And light that changes a little over a large part of the
+picture, as a flickering lamp or a fade, is hidden by the noise of a few pixels.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-TILE = 64  # pixels across, of what gets one weight
-# Between the pixels looked at, along each axis, in small and in large pictures.
+TILE = 64  # pixels across
+# Distance between the pixels compared, along each axis, in small and large pictures.
 _STRIDES, _LARGE = (2, 4), 1_000_000
-# Of the hits that lie within the other frame: fewer that agree are a cut.
+# Of the hits that reproject into the other frame: if fewer match, it is a shot cut.
 _LEAST_SHARE = 1 / 3
-# Tested are tiles, 3x3 tiles, and the whole picture.
+# Radii in tiles: tests single tiles, 3x3 tiles, and the whole picture.
 _REACHES = (0, 1, None)
-_NOISE, _FALL = 4.0, 2.0  # z squared is 1 on the mean where frames agree
-# Of the brightness: a difference that no one sees, however sure it is.
+_NOISE, _FALL = 4.0, 2.0  # z squared is 1 on average where frames match
+# Relative to brightness: a difference that no one sees, however significant.
 _HARMLESS = 0.01
 
 
-def survey(pair: Pair) -> Array:
-    """Return the weights (rows, columns) of tiles of `pair.here`, 0 after a cut."""
+def tile_weights(pair: Pair) -> Array:
+    """Return the weights (rows, columns) of `pair.here`'s tiles, 0 across a cut."""
     height, width = pair.here.shape
     tiles = -(-height // TILE), -(-width // TILE)
     if pair.here.is_empty:  # there is nothing to compare
@@ -47,10 +47,10 @@ def survey(pair: Pair) -> Array:
     spots = (y * width + x).ravel()
     half = np.float32(0.5)
     grid = Grid(spots, x.ravel().astype(np.float32) + half, y.ravel() + half)
-    found, landed = still_places(pair, grid)
+    found, in_frame = still_places(pair, grid)
     still = _still(pair, spots, found.pixel)
     seen = found.seen & still
-    if _is_cut(pair, step, spots, seen, landed & still):
+    if _is_shot_cut(pair, step, spots, seen, in_frame & still):
         return np.zeros(tiles, np.float32)
     alike = pair.here.samples == pair.there.samples
     own = _brightness(pair.here, spots, alike)
@@ -66,67 +66,70 @@ def survey(pair: Pair) -> Array:
     return _weights(sums)
 
 
-def spread(tiles: Array, shape: tuple[int, int], rows: slice) -> Array:
-    """Return the weights (h, W) of some rows: linear between the middles of tiles."""
+def pixel_weights(tiles: Array, shape: tuple[int, int], rows: slice) -> Array:
+    """Return the weights (h, W) of some rows: linear between the tiles' centres."""
     down = _hats(tiles.shape[0], np.arange(rows.start, rows.stop))
     across = _hats(tiles.shape[1], np.arange(shape[1]))
     return np.asarray(down.T @ tiles @ across)
 
 
 def _hats(tiles: int, pixels: NDArray[np.integer]) -> Array:
-    """Return (tiles, n): what share each tile has in each pixel, along one axis."""
+    """Return (tiles, n): the share of each tile in each pixel, along one axis."""
     place = np.clip((pixels + 0.5) / TILE - 0.5, 0, tiles - 1)
     hats = 1 - np.abs(place - np.arange(tiles)[:, None])
     return np.maximum(hats, 0.0).astype(np.float32)
 
 
-def _is_cut(
-    pair: Pair, step: int, spots: NDArray[np.intp], seen: Mask, landed: Mask
+def _is_shot_cut(
+    pair: Pair, step: int, spots: NDArray[np.intp], seen: Mask, in_frame: Mask
 ) -> bool:
-    """Tell whether too few of the spots that landed show the same.
+    """Whether too few of the pixels that are in both frames match.
 
-    The sky is left out, if there is anything else: every view has the same.
+    The sky is left out if there is anything else: it looks the same in every view.
     """
-    near = pair.here.nearness[spots]
+    near = pair.here.inverse_depth[spots]
     hit = (near > 0.0) | (near < 0.0)
     if hit.any():
-        seen, landed = seen & hit, landed & hit
+        seen, in_frame = seen & hit, in_frame & hit
     moved, followed = _moving(pair, step)
-    asked = landed.sum() + moved
-    return bool(asked == 0 or seen.sum() + followed < _LEAST_SHARE * asked)
+    compared = in_frame.sum() + moved
+    return bool(compared == 0 or seen.sum() + followed < _LEAST_SHARE * compared)
 
 
 def _still(pair: Pair, here: NDArray[np.intp], there: NDArray[np.int32]) -> Mask:
-    """Return where neither frame shows what moves by itself, or is spoilt."""
+    """Return where neither frame shows a moving object or an invalid pixel."""
     result = np.ones(len(here), bool)
     for frame, pixels in ((pair.here, here), (pair.there, there)):
-        if frame.spoilt is not None:
-            result &= ~frame.spoilt[pixels]
-    if pair.detour is not None:
-        result &= ~np.isin(here, pair.detour.pixels) & ~pair.detour.moving[there]
+        if frame.invalid is not None:
+            result &= ~frame.invalid[pixels]
+    if pair.object_motion is not None:
+        result &= (
+            ~np.isin(here, pair.object_motion.pixels)
+            & ~pair.object_motion.moving[there]
+        )
     return result
 
 
 def _moving(pair: Pair, step: int) -> tuple[float, float]:
-    """Return how many spots show what moves by itself, and how many are followed."""
-    if pair.detour is None:
+    """Return how many pixels show moving objects, and how many could be followed."""
+    if pair.object_motion is None:
         return 0.0, 0.0
-    followed = np.count_nonzero(np.isfinite(pair.detour.x))
-    return len(pair.detour.pixels) / step**2, followed / step**2
+    followed = np.count_nonzero(np.isfinite(pair.object_motion.x))
+    return len(pair.object_motion.pixels) / step**2, followed / step**2
 
 
 def _brightness(frame: Stored, pixels: NDArray[np.integer], alike: bool) -> Array:
-    """Return the root of luminance (n,), or itself where frames are not `alike`.
+    """Return the square root of luminance (n,), or luminance if not `alike`.
 
-    Between frames of other sample counts the root would lie: less noise has a larger
-    mean root.
+    Between frames of different sample counts the root would be biased: less noise has
+    a larger mean root.
     """
     light = frame.picture[pixels, :3].astype(np.float32)
     return brightness(light) if alike else luminance(light)
 
 
 def _weights(sums: list[NDArray[np.float64]]) -> Array:
-    """Return weights from count, sum, sum of squares of differences, and brightness."""
+    """Return weights from sums: count, differences, their squares, and brightness."""
     weights = np.ones(sums[0].shape)
     for reach in _REACHES:
         count, total, squares, bright = (_around(x, reach) for x in sums)

@@ -1,4 +1,4 @@
-"""Which neighbours of a frame may lend to it."""
+"""Selects the neighbour frames whose samples a frame may reuse."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from .reading import FrameFile
 
 
-class Lenders:
+class NeighbourSelection:
     """Leaves out neighbours of another size, with other passes, or of another render.
 
     `say` takes a line about each frame that does not fit its neighbours, once.
@@ -20,43 +20,43 @@ class Lenders:
     def __init__(self, say: Callable[[str], object]) -> None:
         self._say = say
         self._odd: set[int] = set()
-        self._asked = self._lent = False
+        self._had_neighbours = self._reused = False
 
-    def of(
+    def select(
         self, number: int, own: FrameFile, beside: Mapping[int, FrameFile]
     ) -> list[Stored]:
-        """Return the neighbours that lend to frame `number`, in their order."""
-        if not own.lends:
+        """Return the neighbours whose samples frame `number` reuses, in their order."""
+        if not own.reusable:
             return []
         return [
             other.stored
             for n, other in beside.items()
-            if other.lends and self._fits(number, own, n, other)
+            if other.reusable and self._fits(number, own, n, other)
         ]
 
-    def heed(self, others: Sequence[Stored], gathered: Accumulated) -> None:
-        """Notice whether anything is ever lent in this shot."""
-        self._asked |= bool(others)
-        self._lent |= len(gathered.frames) > 1 and gathered.rejected < 1.0
+    def record(self, others: Sequence[Stored], accumulated: Accumulated) -> None:
+        """Note whether any samples are reused in this shot."""
+        self._had_neighbours |= bool(others)
+        self._reused |= len(accumulated.frames) > 1 and accumulated.rejected < 1.0
 
-    def sum_up(self) -> None:
-        """Tell of a shot in which nothing was lent: its cameras may be wrong."""
-        if self._asked and not self._lent:
+    def report(self) -> None:
+        """Report a shot in which no samples were reused: its cameras may be wrong."""
+        if self._had_neighbours and not self._reused:
             self._say(
-                "no frame took samples of another: what they show lies elsewhere by "
-                "their cameras and depths; check these if it is one shot"
+                "no frame reused samples of another: by their cameras and depths they "
+                "show different places; check these if it is one shot"
             )
 
     def _fits(self, number: int, own: FrameFile, n: int, other: FrameFile) -> bool:
         why = _difference(own, other)
         if why and not {number, n} & self._odd:
             self._odd.add(n)
-            self._say(f"frames {number} and {n} lend nothing to each other: {why}")
+            self._say(f"frames {number} and {n} share no samples: {why}")
         return not why
 
 
 def _difference(one: FrameFile, two: FrameFile) -> str:
-    """Say in what frames differ so that they cannot lend; "" if in nothing."""
+    """Return why two frames cannot share samples; "" if they can."""
     if one.stored.shape != two.stored.shape:
         old, new = (f"{w}x{h}" for h, w in (one.stored.shape, two.stored.shape))
         return f"their sizes are {old} and {new} pixels"

@@ -1,4 +1,4 @@
-"""What is wrong with a file's content rather than with the file."""
+"""Errors about the content of a file that is itself intact."""
 
 from __future__ import annotations
 
@@ -6,11 +6,11 @@ from ..errors import PictureError
 
 
 class Unfit(PictureError):
-    """A whole file that lacks what is needed, or holds what cannot be used."""
+    """A complete file that lacks something needed, or holds something unusable."""
 
 
-class NotLending(Unfit):
-    """A frame can be denoised by itself, but nobody can tell where its pixels were.
+class NotReusable(Unfit):
+    """A frame that can be denoised by itself, but whose pixels cannot be reprojected.
 
     `reason` is the message without the remedy.
     """

@@ -6,12 +6,12 @@ from itertools import combinations
 
 import pytest
 
-from xrds_core.temporal.samples import Portion, continued
+from xrds_core.temporal.sample_subsets import SampleSubset, consecutive_subset
 
 FRAMES = range(12)
 
 
-def taken(portion: Portion) -> set[tuple[int, int]]:
+def taken(portion: SampleSubset) -> set[tuple[int, int]]:
     first = portion.offset
     return {(portion.seed, x) for x in range(first, first + portion.length)}
 
@@ -19,7 +19,7 @@ def taken(portion: Portion) -> set[tuple[int, int]]:
 @pytest.mark.parametrize("radius", [0, 1, 4])
 @pytest.mark.parametrize("seed", [0, 7, 2**31 - 1])
 def test_no_two_frames_that_meet_take_the_same(radius: int, seed: int) -> None:
-    parts = [continued(place, 2, radius, seed) for place in FRAMES]
+    parts = [consecutive_subset(place, 2, radius, seed) for place in FRAMES]
     for one, two in combinations(FRAMES, 2):
         if two - one <= 2 * radius:  # both lend to a frame between them
             assert not taken(parts[one]) & taken(parts[two])
@@ -30,6 +30,6 @@ def test_no_two_frames_that_meet_take_the_same(radius: int, seed: int) -> None:
 
 
 def test_a_still_camera_continues_one_sequence() -> None:
-    parts = [continued(place, 4, 1, seed=3) for place in FRAMES]
+    parts = [consecutive_subset(place, 4, 1, seed=3) for place in FRAMES]
     assert [x.offset for x in parts[:4]] == [0, 4, 8, 0]
     assert {(x.seed, x.whole) for x in parts} == {(3, 12)}

@@ -60,7 +60,7 @@ def check(radiance: Any, albedo: Any, normal: Any) -> Pictures:
 def sample(guide: Array) -> Array | None:
     """Return blocks of a guide, side by side, that show whether it is noisy.
 
-    Half of them are the busiest, the others stand for the rest of the picture. None
+    Half of them are the busiest, the others represent the rest of the picture. None
     where the picture is so small that a sample would save no time.
     """
     rows, columns = (size // _BLOCK for size in guide.shape[:2])
@@ -82,7 +82,7 @@ def _split(x: Array, rows: int, columns: int) -> Array:
 
 
 def _busy(blocks: Array) -> Array:
-    """Return how much neighbours differ in each block; one channel tells enough."""
+    """Return how much adjacent pixels differ in each block; one channel is enough."""
     return np.abs(np.diff(blocks[..., 1], axis=2)).mean(axis=(1, 2))
 
 

@@ -12,7 +12,7 @@ from shots import camera
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Frame, Stored, noise_in, store
 from xrds_core.temporal.halves import Halves
-from xrds_core.temporal.neighbours import box
+from xrds_core.temporal.local_filters import box
 
 Array = NDArray[np.float32]
 SHAPE = (48, 64)

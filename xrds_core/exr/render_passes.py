@@ -17,10 +17,10 @@ import numpy as np
 from ..arrays import Array
 from ..atomic import replacing
 from ..errors import PictureError
-from . import library
+from . import openexr_io
 from .channels import Channels
 from .encoding import FLOAT_ZIP, Encoding
-from .library import Part, Window
+from .openexr_io import Part, Window
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def write_picture(
     planes = {name: encoding.plane(pixels) for name, pixels in channels.items()}
     with _whole(path) as unfinished:
         attributes = dict(metadata or {})
-        library.write(unfinished, planes, encoding.codec, attributes)
+        openexr_io.write(unfinished, planes, encoding.codec, attributes)
 
 
 def copy_picture(
@@ -118,13 +118,13 @@ def copy_picture(
     """
     planes = {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}
     with _whole(path) as unfinished:
-        library.copy(source, unfinished, planes, part=part, alone=alone)
+        openexr_io.copy(source, unfinished, planes, part=part, alone=alone)
 
 
 def write_part(path: str | Path, part: Part) -> None:
     """Write a file of one part; raises PictureError as `write_picture`."""
     with _whole(path) as unfinished:
-        library.write_part(unfinished, part)
+        openexr_io.write_part(unfinished, part)
 
 
 @contextmanager
@@ -141,7 +141,7 @@ def display_size(path: str | Path, *, whole: bool = False) -> tuple[int, int]:
 
     Raises PictureError where it cannot be read; for `whole`, also where pixels cannot.
     """
-    read = library.read if whole else library.read_headers
+    read = openexr_io.read if whole else openexr_io.read_headers
     (left, top), (right, bottom) = read(path)[0].display_window
     return right - left + 1, bottom - top + 1
 
@@ -155,7 +155,7 @@ class File:
 
     def __init__(self, path: str | Path) -> None:
         self.path = path
-        self.parts = library.read(path)
+        self.parts = openexr_io.read(path)
         self._places = _places(path, self.parts)
         self.names = Channels(path, self._places)
         self.window: Window | None = None

@@ -1,4 +1,4 @@
-"""The OpenEXR library, kept apart from one that the program itself brings.
+"""The OpenEXR library, isolated from one that the program itself brings.
 
 On Linux the OpenEXR of a program, Blender for one, lies among its global symbols, and
 the dynamic linker gives the Python module those functions in place of its own. With
@@ -58,7 +58,7 @@ def read(path: str | Path) -> list[Part]:
     """Read all parts of a file.
 
     Raises PictureError if it is not whole, or its header claims more than
-    `exr_limits.limit_of` allows: then before memory is taken.
+    `limits.limit_of` allows: then before memory is allocated.
     """
     limit = limit_of(check_input(Path(path)))
     return _read(path, limit) if not _is_shadowed() else _read_apart(path, limit)
@@ -111,8 +111,8 @@ def copy(
     """Write `source` to `path` with some channels of one part replaced or added.
 
     All others, the windows and attributes stay as they are; a plane that replaces
-    another takes its number format. `alone`: nothing but `planes` is written, beside
-    the part's windows and attributes. Raises PictureError.
+    another gets its number format. `alone`: only `planes` are written, with the part's
+    windows and attributes. Raises PictureError.
     """
     limit = limit_of(check_input(Path(source)))
     if not _is_shadowed():
@@ -121,8 +121,8 @@ def copy(
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         window = ((0, 0), (0, 0))  # not read: the source has them
-        told = {"source": os.fspath(source), "part": part, "alone": alone}
-        _pack(archive, [Part("", window, window, dict(planes), told)])
+        options = {"source": os.fspath(source), "part": part, "alone": alone}
+        _pack(archive, [Part("", window, window, dict(planes), options)])
         _apart("copy", path, archive, str(limit))
 
 
@@ -206,7 +206,7 @@ def _silent_library() -> Iterator[None]:
     """Drop what the library's C code prints on stderr; its exceptions say the same."""
     with _stderr:
         try:
-            kept = os.dup(2)
+            stderr = os.dup(2)
         except OSError:  # closed
             yield
             return
@@ -216,8 +216,8 @@ def _silent_library() -> Iterator[None]:
         try:
             yield
         finally:
-            os.dup2(kept, 2)
-            os.close(kept)
+            os.dup2(stderr, 2)
+            os.close(stderr)
 
 
 def _write(path: str | Path, part: Part, codec: str) -> None:
@@ -371,8 +371,8 @@ def _main(task: str, path: str, archive: str, how: str) -> int:
         if task == "write":
             _write(path, part, how)
         else:
-            told = part.attributes
-            source, number, alone = told["source"], told["part"], told["alone"]
+            options = part.attributes
+            source, number, alone = options["source"], options["part"], options["alone"]
             _copy(source, path, part.channels, number, alone, int(how))
     except PictureError as error:
         print(error, file=sys.stderr)

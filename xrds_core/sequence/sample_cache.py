@@ -1,8 +1,8 @@
-"""Frames as a render keeps them, in the form that `reading` reads.
+"""Frames stored on disk before denoising, in the format that `reading` reads.
 
-One OpenEXR file of Cycles' pass names holds what accumulation works on: light, guides
-and motion in half floats, as a window keeps them in memory, and depth in full. So a
-frame that was read lends and is finished as if it had just been rendered.
+One OpenEXR file with Cycles' pass names holds what accumulation needs: light, guides
+and motion in half floats, as a window stores them in memory, and depth in full. So a
+frame that was read is reused and finished as if it had just been rendered.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import exr
-from ..exr.library import Part
+from ..exr.openexr_io import Part
 from ..temporal.frame import LARGEST_HALF, noise_in
 from .cameras import to_header
 from .names import CAMERA_NORMAL, NOISE, NOISY
@@ -33,7 +33,7 @@ class Origin:
     """What a frame was rendered from and how.
 
     `key` is the same for frames of one file and one set of settings; `layer` is the
-    view layer; `radius` what the samples were laid out for.
+    view layer; `radius` is the temporal radius that the sample subsets are for.
     """
 
     key: str
@@ -41,8 +41,8 @@ class Origin:
     radius: int = 0
 
 
-def write_kept(path: Path, frame: Frame, origin: Origin) -> None:
-    """Write a frame, whole or not at all; raises PictureError where it cannot."""
+def write_cached_frame(path: Path, frame: Frame, origin: Origin) -> None:
+    """Write a frame, completely or not at all; raises PictureError if it cannot."""
     height, width = frame.shape
     x, y = frame.camera.window
     right, bottom = (side - 1 for side in frame.camera.size)
@@ -70,7 +70,7 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
         (NOISY, "RGB", frame.radiance),
         ("Denoising Albedo", "RGB", frame.albedo),
         (CAMERA_NORMAL, "XYZ", frame.normal),
-        # always: half floats of the rest would tell another noise when read
+        # always: noise computed from the half floats of the rest would differ
         (NOISE, "XYZ", _noise(frame)),
     ]
     if frame.alpha is not None:
@@ -93,6 +93,6 @@ def _noise(frame: Frame) -> Array:
 
 
 def _half(x: Array) -> NDArray[np.float16]:
-    """As `frame.store` packs it: cut to the largest half; infinities stay."""
+    """As `frame.store` packs it: clipped to the largest half; infinities stay."""
     cut = np.clip(x, -LARGEST_HALF, LARGEST_HALF)
     return np.where(np.isfinite(x), cut, x).astype(np.float16)
