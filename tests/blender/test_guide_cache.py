@@ -84,8 +84,8 @@ def test_samples_add_up_to_the_limit(network: Any) -> None:
     pictures = [shot(scene, seed=1, guide_limit=6) for _ in range(4)]
     assert [cache_use(p) for p in pictures] == [
         "cached 2 samples",
-        "gathered 4 samples",
-        "gathered 6 samples",
+        "accumulated 4 samples",
+        "accumulated 6 samples",
         "used 6 samples",
     ]
     # those of the cache decide whether their noise is filtered

@@ -130,23 +130,23 @@ def test_under_a_still_camera_frames_continue_one_sequence(
         pytest.skip("this Blender continues no sequence")
     scene.camera.animation_data_clear()
     scene.cycles.use_adaptive_sampling = False
-    gathered = []
+    accumulated = []
     accumulate = finishing.accumulate
 
     def keep(own: Any, others: Any, *more: Any) -> Any:
         found = accumulate(own, others, *more)
-        gathered.extend([found] if others else [])
+        accumulated.extend([found] if others else [])
         return found
 
     monkeypatch.setattr(finishing, "accumulate", keep)
     job = request(scale=1, temporal_radius=2, seed=4)
     assert len(list(shot.render_shot(scene, job, FRAMES))) == 5
     whole = run_job(scene, lambda p: p.beauty(1, 5, denoise=False, seed=4))
-    middle = gathered[2]
+    middle = accumulated[2]
     assert middle.samples.mean() > 3.8  # one sample without halves is doubted at edges
     difference = np.abs(middle.radiance - whole.radiance)
     assert np.median(difference) < 1e-3  # half floats
-    own = np.abs(gathered[0].radiance - whole.radiance)  # three frames of five
+    own = np.abs(accumulated[0].radiance - whole.radiance)  # three frames of five
     assert np.median(own) > 3 * np.median(difference)
 
 
@@ -513,12 +513,12 @@ def test_views_of_a_pair_lend_to_each_other(
     animation: Any, blend: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """They see the same floor from two places, each with its own camera."""
-    gathered = []
+    accumulated = []
     accumulate = finishing.accumulate
 
     def keep(own: Any, lenders: Any, *more: Any) -> Any:
         found = accumulate(own, lenders, *more)
-        gathered.extend([(own, list(lenders), found)] if lenders else [])
+        accumulated.extend([(own, list(lenders), found)] if lenders else [])
         return found
 
     monkeypatch.setattr(finishing, "accumulate", keep)
@@ -527,7 +527,7 @@ def test_views_of_a_pair_lend_to_each_other(
     animation.camera.data.stereo.interocular_distance = 0.3
     animation.frame_set(3)
     list(shot.render_shot(animation, request(scale=1, temporal_radius=1), [3]))
-    own, (other,), found = gathered[0]
+    own, (other,), found = accumulated[0]
     assert own.number == other.number == 3
     apart = np.linalg.inv(other.camera.view) - np.linalg.inv(own.camera.view)
     assert np.linalg.norm(apart[:3, 3]) == pytest.approx(0.3, rel=1e-3)

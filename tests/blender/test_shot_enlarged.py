@@ -109,10 +109,10 @@ def test_guides_of_what_stands_still_are_rendered_a_few_times(
     rendered = []
     samples = []
     guides = CyclesPasses.guides_by_view
-    gather = super_resolution.gathered_guides
+    gather = super_resolution.accumulated_guides
 
     def count(passes: CyclesPasses, *given: Any, **named: Any) -> Any:
-        rendered.append(named["portion"].offset)
+        rendered.append(named["subset"].offset)
         return guides(passes, *given, **named)
 
     def look(*given: Any) -> Any:
@@ -121,7 +121,7 @@ def test_guides_of_what_stands_still_are_rendered_a_few_times(
         return found
 
     monkeypatch.setattr(CyclesPasses, "guides_by_view", count)
-    monkeypatch.setattr(super_resolution, "gathered_guides", look)
+    monkeypatch.setattr(super_resolution, "accumulated_guides", look)
     render(lit, "shot", job={"temporal_radius": 1}, frames=[1, 2, 3, 4, 5, 6])
     assert sorted(rendered) == [0, 1, 2]  # and frames 4 to 6 take what is there
     assert samples == [2, 3, 3, 3, 3, 3]

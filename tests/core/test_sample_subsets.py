@@ -11,9 +11,9 @@ from xrds_core.temporal.sample_subsets import SampleSubset, consecutive_subset
 FRAMES = range(12)
 
 
-def taken(portion: SampleSubset) -> set[tuple[int, int]]:
-    first = portion.offset
-    return {(portion.seed, x) for x in range(first, first + portion.length)}
+def taken(subset: SampleSubset) -> set[tuple[int, int]]:
+    first = subset.offset
+    return {(subset.seed, x) for x in range(first, first + subset.length)}
 
 
 @pytest.mark.parametrize("radius", [0, 1, 4])

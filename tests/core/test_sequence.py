@@ -102,7 +102,7 @@ class Counting:
         return self.denoiser(*passes)
 
 
-def test_where_nothing_is_lent_the_picture_is_that_of_the_frame_alone(
+def test_where_nothing_is_reused_the_picture_is_that_of_the_frame_alone(
     denoiser: Denoiser,
 ) -> None:
     """Also beside pixels of many samples, where denoisers keep more of the noise."""
@@ -117,7 +117,8 @@ def test_where_nothing_is_lent_the_picture_is_that_of_the_frame_alone(
     lent = shot.accumulated.samples > 4.0
     assert lent[:, : half - 4].mean() > 0.5
     np.testing.assert_array_equal(shot.picture[:, half + 2 :], alone[:, half + 2 :])
-    assert (shot.picture[:, : half - 8] != alone[:, : half - 8]).mean() > 0.5
+    # without halves much is doubted, and what is doubted stays the frame's own
+    assert (shot.picture[:, : half - 8] != alone[:, : half - 8]).mean() > 0.1
 
 
 def test_what_is_lent_everywhere_or_nowhere_is_denoised_once(

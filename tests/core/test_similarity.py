@@ -54,7 +54,7 @@ def shot(light: Array, albedo: Array, others: tuple[Array, Array]) -> list[Store
     ]
 
 
-def gathered(frames: list[Stored]) -> tuple[Array, Array]:
+def accumulated(frames: list[Stored]) -> tuple[Array, Array]:
     """The radiance of the middle frame and its samples, in those of one frame."""
     result = accumulate(frames[2], frames[:2] + frames[3:])
     assert result.radiance is not None
@@ -72,12 +72,12 @@ def stored(kept: bool, number: int, light: Array, albedo: Array) -> Stored:
 
 
 def test_neighbours_that_agree_all_count() -> None:
-    _, samples = gathered(shot(PLAIN, SPOTS, (PLAIN, SPOTS)))
+    _, samples = accumulated(shot(PLAIN, SPOTS, (PLAIN, SPOTS)))
     assert samples.mean() > 4.1  # halves are taken for parts of one sequence
 
 
 def test_without_halves_neighbours_that_agree_count_as_well() -> None:
-    _, samples = gathered([stored(False, n, PLAIN, SPOTS) for n in range(1, 6)])
+    _, samples = accumulated([stored(False, n, PLAIN, SPOTS) for n in range(1, 6)])
     assert samples.mean() > 4.1
 
 
@@ -86,7 +86,7 @@ def test_a_pattern_that_differs_is_seen_though_its_mean_is_the_same(kept: bool) 
     truth, other = PLAIN * SPOTS, OTHER_SPOTS
     seen = (other, other, SPOTS, other, other)
     frames = [stored(kept, n, PLAIN, x) for n, x in enumerate(seen)]
-    judged, samples = gathered(frames)
+    judged, samples = accumulated(frames)
     assert samples.mean() < 1.1
     alone = frames[2].picture[:, :3].reshape(truth.shape)
     assert error(judged, truth) < 1.05 * error(alone, truth)
@@ -96,7 +96,7 @@ def test_a_pattern_of_light_alone_is_seen_by_halves_alone() -> None:
     """As fine as pixels, in a mirror: to the pixels around it is the frame's noise."""
     seen = (OTHER_SPOTS, OTHER_SPOTS, SPOTS, OTHER_SPOTS, OTHER_SPOTS)
     lent = {
-        kept: gathered([stored(kept, n, x, PLAIN) for n, x in enumerate(seen)])[
+        kept: accumulated([stored(kept, n, x, PLAIN) for n, x in enumerate(seen)])[
             1
         ].mean()
         for kept in (True, False)
@@ -111,7 +111,7 @@ def test_a_shadow_that_guides_do_not_show_lends_nothing(kept: bool) -> None:
     shadow[:, 32:] *= 0.3
     lights = (PLAIN, PLAIN, shadow, PLAIN, PLAIN)
     frames = [stored(kept, n, x, PLAIN) for n, x in enumerate(lights)]
-    _, samples = gathered(frames)
+    _, samples = accumulated(frames)
     assert samples[:, 40:].mean() < 1.1
 
 
@@ -135,7 +135,7 @@ def test_guides_alone_lend_where_they_are_alike(noise: float) -> None:
 def test_one_wrong_neighbour_far_away_spoils_no_near_ones() -> None:
     right, wrong = (PLAIN, SPOTS), (PLAIN, OTHER_SPOTS)
     frames = [store(frame(n, *(wrong if n in (1, 5) else right))) for n in range(1, 6)]
-    _, samples = gathered(frames)
+    _, samples = accumulated(frames)
     assert 2.5 < samples.mean() < 3.1
 
 
@@ -160,7 +160,7 @@ def test_a_shadow_that_moves_on_stays_in_its_frame() -> None:
 def test_a_pixel_without_samples_takes_those_of_neighbours() -> None:
     frames = [frame(n, PLAIN, SPOTS) for n in range(1, 6)]
     frames[2].radiance[20, 30] = np.nan
-    picture, samples = gathered([store(x) for x in frames])
+    picture, samples = accumulated([store(x) for x in frames])
     assert np.isfinite(picture).all()
     assert samples[20, 30] == pytest.approx(4.0, rel=0.05)
 

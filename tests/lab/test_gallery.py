@@ -205,10 +205,9 @@ def test_references_grow_in_parts(tmp_path: Path) -> None:
     ranks = [whole.rank(shot, r) for parts in more for r in parts]
     assert ranks == [(0, 0), (1, 0)] * 2
     store = Store(tmp_path)
-    flat = np.zeros((2, 2, 3), np.float32)
-    camera = Camera(np.eye(4), np.eye(4), (2, 2))
     for value, part in enumerate(more[0]):
-        lit = Frame(5, camera, flat + value, flat, flat, flat[..., 0])
+        lit = np.full((2, 2, 4), value, np.float32)
+        lit[..., 3] = 1.0
         store.keep_reference(part, lit)
     mean = store.reference(more[0])
     assert mean[0, 0].tolist() == [0.5, 0.5, 0.5, 1.0]

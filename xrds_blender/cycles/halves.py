@@ -35,7 +35,7 @@ class Half:
 
 
 def sample_halves(
-    engine: Any, depsgraph: Any, portion: SampleSubset, geometry: _Geometry
+    engine: Any, depsgraph: Any, subset: SampleSubset, geometry: _Geometry
 ) -> tuple[dict[str, Half], dict[str, float]]:
     """Render a part of a sequence, of two samples or more, in two halves.
 
@@ -46,14 +46,14 @@ def sample_halves(
     is_even = COUNTS not in geometry
     with LayerSession(engine, depsgraph) as layer:
         parts, passes, clocks = [], [], []
-        for part in portion.halves():
+        for part in subset.halves():
             samples, clock = sample_layer(
-                engine, depsgraph, portion=part, is_even=is_even, geometry=geometry
+                engine, depsgraph, subset=part, is_even=is_even, geometry=geometry
             )
             parts.append({v: _counted(x, part, clock) for v, x in samples.items()})
             passes.append(layer.all_passes())
             clocks.append(clock)
-        shares = portion.shares()
+        shares = subset.shares()
         found = {
             view: _joined(first, parts[1][view], shares)
             for view, first in parts[0].items()

@@ -23,14 +23,14 @@ def render_once(
     seed: int | None = None,
     denoiser: Denoising | None = None,
     noisy: bool = False,
-    portion: SampleSubset | None = None,
+    subset: SampleSubset | None = None,
     is_even: bool = True,
 ) -> StageClock:
     """Render into the engine's result, exactly as Cycles' own engine would.
 
     `samples`, `seed` and `denoiser` None leave the scene's own. `noisy` switches
     Cycles' denoiser off, adds the passes that guide another one, and takes samples by
-    the pattern that suits it. `portion` is of a
+    the pattern that suits it. `subset` is of a
     longer sequence, in the place of samples and seed; it `is_even` as in `set_samples`.
     Raises Cancelled when the user stops it.
     """
@@ -40,7 +40,7 @@ def render_once(
         for name, letters, _ in GUIDE_PASSES:
             spare_passes.add(engine, layer.name, name, letters)
     with Borrowed() as borrowed:
-        set_samples(borrowed, scene, samples, seed, portion, is_even)
+        set_samples(borrowed, scene, samples, seed, subset, is_even)
         if noisy:
             set_blue_noise(borrowed, scene)
             set_denoising(borrowed, scene, layer, False)

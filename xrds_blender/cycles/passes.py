@@ -103,16 +103,16 @@ class CyclesPasses(LayerSession):
         samples: int | None = None,
         *,
         seed: int | None = None,
-        portion: SampleSubset | None = None,
+        subset: SampleSubset | None = None,
     ) -> dict[str, LowSamples]:
         """Render as `beauties`, and leave the noise in.
 
-        `portion` is of a longer sequence, in the place of samples and seed. Depth and
+        `subset` is of a longer sequence, in the place of samples and seed. Depth and
         vectors are there as far as `geometry` asked for them.
         """
         grid = self._grid(scale)
         with Borrowed() as borrowed:
-            set_samples(borrowed, self._scene, samples, seed, portion)
+            set_samples(borrowed, self._scene, samples, seed, subset)
             set_blue_noise(borrowed, self._scene)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             live.samples(scale)
@@ -165,15 +165,15 @@ class CyclesPasses(LayerSession):
         *,
         seed: int | None = None,
         how: GuideRender | None = None,
-        portion: SampleSubset | None = None,
+        subset: SampleSubset | None = None,
     ) -> dict[str, Guides]:
         """As `guides`, for every view by name; `how` names what may be left out.
 
-        `portion` is of a longer sequence, in the place of samples and seed.
+        `subset` is of a longer sequence, in the place of samples and seed.
         """
         how = how or GuideRender(shadows=False)
         with Borrowed() as borrowed, guide_settings(self._depsgraph, how):
-            set_samples(borrowed, self._scene, samples, seed, portion)
+            set_samples(borrowed, self._scene, samples, seed, subset)
             set_blue_noise(borrowed, self._scene)
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             live.guides()

@@ -60,14 +60,14 @@ def sample_layer(
     *,
     samples: int | None = None,
     seed: int | None = None,
-    portion: SampleSubset | None = None,
+    subset: SampleSubset | None = None,
     is_even: bool = True,
     geometry: Sequence[tuple[str, str]] = (),
 ) -> tuple[dict[str, Samples], session.StageClock]:
     """Render without Cycles' denoiser; samples by view, and what it took.
 
     `geometry` names those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS.
-    `portion` is of a longer sequence, in the place of samples and seed; `is_even` as in
+    `subset` is of a longer sequence, in the place of samples and seed; `is_even` as in
     `set_samples`. The result holds Cycles' own passes. Raises Cancelled when the user
     stops it.
     """
@@ -80,7 +80,7 @@ def sample_layer(
         samples=samples,
         seed=seed,
         noisy=True,
-        portion=portion,
+        subset=subset,
         is_even=is_even,
     )
     found = samples_in(engine, layer_name, {name for name, _ in geometry})

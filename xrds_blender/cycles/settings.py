@@ -50,7 +50,7 @@ def set_samples(
     scene: Any,
     samples: int | None,
     seed: int | None,
-    portion: SampleSubset | None,
+    subset: SampleSubset | None,
     is_even: bool = True,
 ) -> None:
     """Take samples as `set_sampling`, or in their place a part of a sequence.
@@ -58,11 +58,11 @@ def set_samples(
     If not `is_even` that is half of one, whose pixels stop where its noise is what the
     file's threshold leaves when both halves are added up.
     """
-    if portion is None:
+    if subset is None:
         set_sampling(borrowed, scene, samples, seed)
         return
-    threshold, least = _stops_at(scene.cycles, portion.whole)
-    set_sampling(borrowed, scene, portion.whole, portion.seed)
+    threshold, least = _stops_at(scene.cycles, subset.whole)
+    set_sampling(borrowed, scene, subset.whole, subset.seed)
     if not is_even:
         borrowed.set(
             scene.cycles,
@@ -70,12 +70,12 @@ def set_samples(
             adaptive_threshold=threshold * math.sqrt(2.0),
             adaptive_min_samples=max(1, least // 2),
         )
-    if portion.length != portion.whole:
+    if subset.length != subset.whole:
         borrowed.set(
             scene.cycles,
             use_sample_subset=True,
-            sample_offset=portion.offset,
-            sample_subset_length=portion.length,
+            sample_offset=subset.offset,
+            sample_subset_length=subset.length,
         )
 
 

@@ -46,7 +46,7 @@ class GuideSource:
     """Guides of one frame.
 
     `decision` says afterwards where they came from, and `name`, where it is known,
-    what they show: guides of the same name hold each other's samples. `portion` says
+    what they show: guides of the same name hold each other's samples. `subset` says
     which samples are new, where frames of a shot continue one sequence.
     """
 
@@ -58,12 +58,12 @@ class GuideSource:
         chosen: Plan,
         facts: Facts,
         report: Callable[[set[str], str], None],
-        portion: SampleSubset | None = None,
+        subset: SampleSubset | None = None,
     ) -> None:
         self._passes, self._graph, self._request = passes, depsgraph, request
         self._report = report
         self._chosen, self._facts = chosen, facts
-        self._portion = portion
+        self._subset = subset
         self.name: GuideName | None = None
         folder = request.guide_cache
         self._folder = None if folder is None else Path(folder)
@@ -131,7 +131,7 @@ class GuideSource:
             raise NotFollowed(f"the pass {', '.join(light)}")
         passes, scene = self._passes, self._facts.scene
         how = sorted(asdict(self._chosen.guides).items())
-        if self._portion is not None:
+        if self._subset is not None:
             # Depth and index may be empty: guides of single frames are others
             names.append("continued")
         frame = passes.frame, passes.region, passes.views, names, how
@@ -153,7 +153,7 @@ class GuideSource:
             samples,
             seed=seed,
             how=self._chosen.guides,
-            portion=self._portion and replace(self._portion, length=samples),
+            subset=self._subset and replace(self._subset, length=samples),
         )
 
     def _add(

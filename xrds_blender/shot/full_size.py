@@ -81,14 +81,14 @@ class FullSize(Method):
     ) -> Picture:
         """The picture of a packed frame with the samples of its neighbours."""
         finished = finish_frame(own, neighbours, self._denoiser, self._movement, report)
-        gathered = finished.accumulated
+        accumulated = finished.accumulated
         return self._picture(
             finished.denoised,
-            gathered.albedo,
-            gathered.normal,
+            accumulated.albedo,
+            accumulated.normal,
             finished.seconds,
-            decisions=(accumulation(gathered),),
-            temporal=temporal(self.settings, gathered),
+            decisions=(accumulation(accumulated),),
+            temporal=temporal(self.settings, accumulated),
         )
 
     def _alone(self, samples: Samples, report: Report | None) -> Picture:
@@ -137,16 +137,16 @@ def _only(sampled: Sampled, view: str) -> Sampled:
     return replace(sampled, views={view: sampled.views[view]})
 
 
-def temporal(settings: Settings, gathered: Accumulated) -> Temporal:
+def temporal(settings: Settings, accumulated: Accumulated) -> Temporal:
     """What neighbours added to a picture, as it reports."""
-    samples = float(gathered.samples.mean())
+    samples = float(accumulated.samples.mean())
     radius = settings.temporal_radius
-    return Temporal(radius, gathered.frames, samples, gathered.rejected)
+    return Temporal(radius, accumulated.frames, samples, accumulated.rejected)
 
 
-def accumulation(gathered: Accumulated) -> Decision:
+def accumulation(accumulated: Accumulated) -> Decision:
     """What was decided where neighbours' samples were reused."""
-    frames = gathered.frames
+    frames = accumulated.frames
     reason = "neighbouring frames show the same: their samples count here as well"
     return Decision("accumulation", f"frames {frames[0]} to {frames[-1]}", reason)
 

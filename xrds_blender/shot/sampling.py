@@ -81,7 +81,7 @@ class Sampling:
         """A stage's name in the status bar, with the frame's number in a shot."""
         return stage if self.is_alone else f"{stage} of frame {self.number}"
 
-    def portion(self, count: int, other: int = 0) -> SampleSubset | None:
+    def subset(self, count: int, other: int = 0) -> SampleSubset | None:
         """The frame's part, of `count` samples, of the sequence it continues.
 
         `other` sequences have other seeds. None where each frame begins its own.
@@ -233,7 +233,7 @@ def noisy_frame(
             depsgraph,
             samples=request.settings.samples,
             seed=how.own_seed,
-            portion=how.portion(how.count),
+            subset=how.subset(how.count),
             geometry=how.geometry,
         )
     except Cancelled:
@@ -255,10 +255,10 @@ def _frames_of_halves(
     motion, seconds = {}, dict.fromkeys(("sync", "beauty"), 0.0)
     if how.needs_motion:
         motion, seconds = sample_motion(engine, depsgraph, how.own_seed)
-    portion = how.portion(how.count) or SampleSubset(
+    subset = how.subset(how.count) or SampleSubset(
         how.own_seed, how.count, 0, how.count
     )
-    found, more = sample_halves(engine, depsgraph, portion, how.geometry)
+    found, more = sample_halves(engine, depsgraph, subset, how.geometry)
     frames = {}
     for view, half in found.items():
         samples = half.whole
@@ -278,9 +278,9 @@ def first_sample(engine: Any, depsgraph: Any, request: Request, place: int) -> N
     The result then holds its passes. `place` is as in `sampling_of`.
     """
     how = sampling_of(engine, depsgraph, request, place)
-    portion = how.portion(how.count)
-    assert portion is not None
-    sample_layer(engine, depsgraph, portion=replace(portion, offset=0, length=1))
+    subset = how.subset(how.count)
+    assert subset is not None
+    sample_layer(engine, depsgraph, subset=replace(subset, offset=0, length=1))
 
 
 def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:

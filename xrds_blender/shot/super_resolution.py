@@ -161,7 +161,7 @@ class SuperResolution(Method):
         if isinstance(inputs, View):
             assert self._denoiser is not None
             neighbours = own.neighbours(view, others)
-            inputs = gathered_inputs(
+            inputs = accumulated_inputs(
                 inputs, neighbours, self.settings, self._denoiser, self._movement
             )
         started = time.perf_counter()
@@ -302,9 +302,9 @@ class _Renders:
         """The noisy low-resolution light by view."""
         self._begin(stages.LOW, 1)
         how, settings = self.how, self.settings
-        portion = how.portion(how.count)
+        subset = how.subset(how.count)
         return self.passes.low_samples(
-            settings.scale, settings.samples, seed=how.own_seed, portion=portion
+            settings.scale, settings.samples, seed=how.own_seed, subset=subset
         )
 
     def _exposure(self) -> float | None:
@@ -367,7 +367,7 @@ class _Renders:
             self.chosen,
             self.facts,
             self.engine.report,
-            self.how.portion(samples, other=1),
+            self.how.subset(samples, other=1),
         )
 
     def _guides(
@@ -438,7 +438,7 @@ def _summed(rendered: Sequence[Mapping[str, float]]) -> dict[str, float]:
 # --- Finishing -----------------------------------------------------------------------
 
 
-def gathered_inputs(
+def accumulated_inputs(
     own: View,
     others: Sequence[View],
     settings: Settings,
@@ -447,10 +447,10 @@ def gathered_inputs(
 ) -> Inputs:
     """What the network takes of a view, with the samples of its neighbours."""
     started = time.perf_counter()
-    gathered = accumulate(own.light, [each.light for each in others], movement)
-    guides = gathered_guides(own, others, movement)
+    accumulated = accumulate(own.light, [each.light for each in others], movement)
+    guides = accumulated_guides(own, others, movement)
     accumulated = time.perf_counter()
-    beauty = _denoised(own, gathered, denoiser)
+    beauty = _denoised(own, accumulated, denoiser)
     seconds = {
         "accumulate": accumulated - started,
         "denoise": time.perf_counter() - accumulated,
@@ -460,22 +460,22 @@ def gathered_inputs(
         guides,
         own.exposure,
         own.plan.skip_idle,
-        (*own.plan.decisions, accumulation(gathered)),
+        (*own.plan.decisions, accumulation(accumulated)),
         seconds,
-        temporal(settings, gathered),
+        temporal(settings, accumulated),
     )
 
 
-def _denoised(own: View, gathered: Accumulated, denoiser: Denoiser) -> Beauty:
-    assert gathered.radiance is not None
-    picture = np.dstack((gathered.radiance, gathered.alpha))
+def _denoised(own: View, accumulated: Accumulated, denoiser: Denoiser) -> Beauty:
+    assert accumulated.radiance is not None
+    picture = np.dstack((accumulated.radiance, accumulated.alpha))
     if not own.plan.denoise:
         return own.place.beauty(picture)
-    denoised = denoiser(picture, gathered.albedo, gathered.normal)
-    return own.place.beauty(denoised.radiance, gathered.radiance)
+    denoised = denoiser(picture, accumulated.albedo, accumulated.normal)
+    return own.place.beauty(denoised.radiance, accumulated.radiance)
 
 
-def gathered_guides(own: View, others: Sequence[View], movement: Movement) -> Guides:
+def accumulated_guides(own: View, others: Sequence[View], movement: Movement) -> Guides:
     """Guides with the samples of other frames; the richest of those of one name."""
     others = [each for each in others if each.guides is not None]
     if own.guide_name is not None:
@@ -491,7 +491,7 @@ def gathered_guides(own: View, others: Sequence[View], movement: Movement) -> Gu
         target = reprojected_placeholder(number, own.camera, beside)
     found = accumulate(target, neighbours, movement)
     assert found.alpha is not None
-    # their own number: where nothing is gathered there are no more
+    # their own number: where nothing is accumulated there are no more
     samples = max(1, int(target.samples))
     return Guides(found.albedo, found.normal, found.alpha, None, samples)
 

@@ -307,7 +307,7 @@ class _Reprojected:
 
 def _samples(
     frame: Stored, pixels: slice | NDArray[np.integer], count: int
-) -> NDArray[np.float32]:
+) -> Array:
     """Return the sample counts of flat pixels (n,) of a frame."""
     if frame.counts is None:
         return np.full(count, frame.samples, np.float32)

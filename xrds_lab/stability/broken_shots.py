@@ -40,7 +40,7 @@ def shots() -> Iterator[Measured]:
 
 def spoilt(frames: Frames) -> Iterator[Measured]:
     """NaN and infinities in one frame: a neighbour's, and the frame's own."""
-    clean = gathered(frames)
+    clean = accumulated(frames)
     height, width = frames[_MIDDLE].shape
     bad = np.zeros((height, width), bool)
     bad[height // 3, :] = bad[:, width // 4] = True
@@ -53,7 +53,7 @@ def spoilt(frames: Frames) -> Iterator[Measured]:
             these = frames | {number: _with(frames[number], bad, value)}
             wrong += faults(finished(these, _MIDDLE, RADIUS))
             if number == _MIDDLE:
-                result = gathered(these).radiance
+                result = accumulated(these).radiance
                 change = relative_difference(result[~near], clean.radiance[~near])
                 changed = max(changed, change)
     yield Measured("accumulation.nan.faults", float(wrong))
@@ -149,7 +149,7 @@ def long(frames: Frames) -> Measured:
     return Measured("accumulation.long.memory", growth(late) / 4, above)
 
 
-def gathered(frames: Frames) -> Accumulated:
+def accumulated(frames: Frames) -> Accumulated:
     """The middle frame with its neighbours' samples, before it is denoised."""
     others = [frames[n] for n in Shot(tuple(frames), RADIUS).neighbours(_MIDDLE)]
     return accumulate(frames[_MIDDLE], others)

@@ -76,7 +76,7 @@ def pinhole(stage: Builder) -> None:
 
 
 def caustics(stage: Builder) -> None:
-    """Light gathered by glass and by a ring of metal."""
+    """Light accumulated by glass and by a ring of metal."""
     still(stage)
     glass = solid("glass", Transmission_Weight=1.0, Roughness=0.0, IOR=1.5)
     stage.put(sphere(0.45), glass, (-0.1, -1.4, 0.45))
