@@ -22,28 +22,8 @@ DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
 def add_request(command: argparse.ArgumentParser) -> None:
     """Add what a request holds."""
     add_scene(command)
+    _add_mode(command)
     add = command.add_argument
-    size = command.add_mutually_exclusive_group()
-    size.add_argument(
-        "--scale",
-        type=int,
-        choices=SCALES,
-        default=2,
-        help="enlargement along each side; 1 is full size (default: 2)",
-    )
-    size.add_argument("--plain", action="store_true", help="render with Cycles alone")
-    size.add_argument(
-        "--time-budget",
-        type=arguments.factor,
-        metavar="SECONDS",
-        help="time for a frame; XRDS chooses the best settings that stay within it",
-    )
-    size.add_argument(
-        "--quality",
-        type=arguments.factor,
-        metavar="DB",
-        help="expected PSNR; XRDS chooses the fastest settings that reach it",
-    )
     add(
         "--samples",
         type=arguments.positive,
@@ -84,6 +64,31 @@ def add_request(command: argparse.ArgumentParser) -> None:
         help="seed of Cycles' noise, in place of the file's",
     )
     add_network(command)
+
+
+def _add_mode(command: argparse.ArgumentParser) -> None:
+    """Add what decides how the picture is made: one of these alone."""
+    size = command.add_mutually_exclusive_group()
+    size.add_argument(
+        "--scale",
+        type=int,
+        choices=SCALES,
+        default=2,
+        help="enlargement along each side; 1 is full size (default: 2)",
+    )
+    size.add_argument("--plain", action="store_true", help="render with Cycles alone")
+    size.add_argument(
+        "--time-budget",
+        type=arguments.factor,
+        metavar="SECONDS",
+        help="time for a frame; XRDS chooses the best settings that stay within it",
+    )
+    size.add_argument(
+        "--quality",
+        type=arguments.factor,
+        metavar="DB",
+        help="expected PSNR; XRDS chooses the fastest settings that reach it",
+    )
 
 
 def add_scene(command: argparse.ArgumentParser) -> None:

@@ -82,17 +82,24 @@ def render_file(
             written.append(_write(scene, output, number, last, request, encoding))
     if cache:
         _cache_others(scene, request, numbers, cache)
-    settings = (last and last.settings) or request.settings
     rendered = {entry["frame"] for entry in written}
     return {
         "output": output,
         "resolution": list(size),
-        "scale": settings.scale,
-        "preset": settings.preset if settings.is_enlarged else None,
-        "device": last.device if last else "",
+        **_described(last, request),
         "frames": written,
         "kept": [n for n in numbers if n not in rendered] if output else [],
         "samples": cache and cache.report(numbers),
+    }
+
+
+def _described(last: Picture | None, request: Request) -> dict[str, Any]:
+    """What the pictures were rendered by, as the last one says."""
+    settings = (last and last.settings) or request.settings
+    return {
+        "scale": settings.scale,
+        "preset": settings.preset if settings.is_enlarged else None,
+        "device": last.device if last else "",
         "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
     }
 

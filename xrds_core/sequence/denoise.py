@@ -145,18 +145,11 @@ def denoise_sequence(
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     todo = [n for n in readable if n not in done]
     shot = Shot(tuple(todo), radius, others=beside)
-    entries = []
-    clock = Clock()
-    for entry in _entries(files, denoiser, shot, loader, resume, say):
-        entries.append(entry)
-        number = entry["frame"]
-        left = sum(n > number and n not in loader.failed for n in todo)
-        say(f"frame {number}: {entry['output']}, {clock.lap(left)}")
     return {
         "output": files.output,
         "temporal_radius": radius,
         "device": denoiser.device,
-        "frames": entries,
+        "frames": list(_entries(files, denoiser, shot, loader, resume, say)),
         "kept": sorted(done),
         "left_out": _left_out(loader, [n for n in numbers if n not in done]),
     }
@@ -175,6 +168,7 @@ def _entries(
     A frame that cannot be written is left out; two of them in a row are an error.
     """
     selection, movement, fails = NeighbourSelection(say), Movement(), False
+    clock = Clock()
     for found in Window(shot, loader.load):
         number, own = found.number, found.own
         # another machine may have finished it
@@ -196,6 +190,8 @@ def _entries(
         selection.record(others, finished.accumulated)
         seconds = {"read": loader.seconds(), **finished.seconds}
         seconds["write"] = time.perf_counter() - started
+        left = sum(n > number and n not in loader.failed for n in shot.frames)
+        say(f"frame {number}: {path}, {clock.lap(left)}")
         yield _entry(number, path, shot.radius, finished, seconds)
     selection.report()
 

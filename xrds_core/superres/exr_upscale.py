@@ -24,17 +24,14 @@ def upscale_file(
     guide_file: str | Path,
     output: str | Path,
     *,
-    scale: int = 2,
-    preset: str = "fast",
     guide_samples: int | None = None,
     exposure: float | None = None,
-    device: str = "auto",
     memory_limit: int | None = None,
-    weights: str | Path | None = None,
     names: Names = CYCLES,
     encoding: Encoding = FLOAT_ZIP,
     threads: int | None = None,
     progress: Callback | None = None,
+    **network: Any,
 ) -> dict[str, Any]:
     """Enlarge a low-resolution EXR under full-resolution passes; write an EXR.
 
@@ -44,15 +41,13 @@ def upscale_file(
         guide_file: albedo and normal.
         output: gets R, G, B, scene-linear, and A where `beauty` has alpha; its folder
             is made.
-        weights: a folder of presets, or a file, in place of the shipped ones.
-        names: what the passes are called in both files.
-        encoding: how the output holds its pixels.
+        names, encoding: of the passes in both files, and of the output's pixels.
         threads: of the processor, for this process from now on.
+        network: what `Upscaler` is made of: preset, scale, device, weights.
 
-    The other arguments are those of `Upscaler`.
+    The other arguments are those of a call of `Upscaler`.
 
-    Returns:
-        {output, seconds, bad_pixels, tiles}; seconds of wall clock, files included.
+    Returns {output, seconds, bad_pixels, tiles}; wall clock, files included.
 
     Raises:
         PictureError: a file cannot be read, written, or lacks a pass.
@@ -63,9 +58,8 @@ def upscale_file(
     _check_output(Path(output), (beauty, guide_file))
     if threads is not None:
         torch.set_num_threads(threads)
-    upscaler = Upscaler(preset, scale, device, weights=weights)
-    low = read_beauty(beauty, names)
-    passes = read_guides(guide_file, names)
+    upscaler = Upscaler(**network)
+    low, passes = read_beauty(beauty, names), read_guides(guide_file, names)
     result = upscaler(
         low.picture,
         passes.albedo,
@@ -78,16 +72,7 @@ def upscale_file(
         progress=progress,
     )
     planes = zip("RGBA", np.moveaxis(result.radiance, 2, 0), strict=False)
-    seconds = time.perf_counter() - start
-    record = {
-        "version": package_version(),
-        "way": "super-resolution",
-        "scale": scale,
-        "preset": preset,
-        "device": upscaler.device,
-        "seconds": f"{seconds:.1f}",
-    }
-    metadata = {f"xrds.{name}": str(value) for name, value in record.items()}
+    metadata = _metadata(upscaler, time.perf_counter() - start)
     write_picture(output, dict(planes), encoding, metadata)
     return {
         "output": str(output),
@@ -95,6 +80,19 @@ def upscale_file(
         "bad_pixels": result.bad_pixels,
         "tiles": result.tiles,
     }
+
+
+def _metadata(upscaler: Upscaler, seconds: float) -> dict[str, str]:
+    """What made the picture, for the file."""
+    record = {
+        "version": package_version(),
+        "mode": "super-resolution",
+        "scale": upscaler.scale,
+        "preset": upscaler.preset,
+        "device": upscaler.device,
+        "seconds": f"{seconds:.1f}",
+    }
+    return {f"xrds.{name}": str(value) for name, value in record.items()}
 
 
 def _check_output(path: Path, inputs: Sequence[str | Path]) -> None:

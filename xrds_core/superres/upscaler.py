@@ -81,7 +81,7 @@ class Upscaler:
         precision: str = "auto",
         weights: str | Path | XRDS | None = None,
     ) -> None:
-        self.device = choose_device(device)
+        self.preset, self.device = preset, choose_device(device)
         self.precision = choose_precision(precision, self.device)
         self.network = choose_network(preset, scale, weights).to(self.device)
         folder = None if isinstance(weights, XRDS) else weights
@@ -136,15 +136,8 @@ class Upscaler:
             OutOfMemory: the device has no room even for the smallest tiles.
             Cancelled: `progress` returned False.
         """
-        inputs = check(
-            self.scale,
-            radiance,
-            albedo,
-            normal,
-            guide_alpha,
-            noisy,
-            guide_samples,
-        )
+        scale, given = self.scale, (radiance, albedo, normal, guide_alpha, noisy)
+        inputs = check(scale, *given, guide_samples)
         exposure = choose_exposure(exposure, inputs.low)
         area = self._area(inputs, skip_idle)
         device = self.device.type

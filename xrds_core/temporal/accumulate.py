@@ -305,9 +305,7 @@ class _Reprojected:
         sums.add(values, weight, reused, _noise(other, found.pixel, block))
 
 
-def _samples(
-    frame: Stored, pixels: slice | NDArray[np.integer], count: int
-) -> Array:
+def _samples(frame: Stored, pixels: slice | NDArray[np.integer], count: int) -> Array:
     """Return the sample counts of flat pixels (n,) of a frame."""
     if frame.counts is None:
         return np.full(count, frame.samples, np.float32)
