@@ -13,12 +13,7 @@ from hypothesis import strategies as st
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Costs, Curve, ErrorModel
 from xrds_blender.planning.request import Goal
-from xrds_blender.planning.settings import (
-    DEFAULT_DENOISING,
-    Denoising,
-    Mode,
-    Settings,
-)
+from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising, Mode, Settings
 
 
 def at_full_size(denoising: Denoising, samples: int | None = None) -> Settings:

@@ -16,18 +16,20 @@ import xrds_blender
 from xrds_blender.choosing import history
 from xrds_blender.frame import stages
 from xrds_blender.interface import (
-    cycles_panels,
     machine,
     operators,
-    panels,
-    paragraph,
     preferences,
     properties,
     registration,
-    remarks,
     status_bar,
-    summary,
     translations,
+)
+from xrds_blender.interface.panel import (
+    cycles_panels,
+    panels,
+    paragraph,
+    remarks,
+    summary,
 )
 from xrds_blender.internals.lifetimes import FILE, PROCESS
 from xrds_blender.planning import estimates

@@ -16,7 +16,7 @@ from xrds_blender.planning import estimates
 
 FOLDER = Path(interface.__file__).parent
 # The panel shows what a way lacks.
-SOURCES = [*sorted(FOLDER.glob("*.py")), Path(str(estimates.__file__))]
+SOURCES = [*sorted(FOLDER.rglob("*.py")), Path(str(estimates.__file__))]
 WORDS = translations.read()
 # Shown as they are in every language.
 NAMES = {"XRDS", "CPU", "Metal", "Error: "}

@@ -9,7 +9,8 @@ import bpy
 
 from ..cycles import session
 from ..internals.engine_override import ENGINE
-from . import support, thread_guard
+from . import thread_guard
+from .panel import support
 
 
 class XRDSRender(bpy.types.RenderEngine):

@@ -13,7 +13,7 @@ from xrds_core.errors import UsageError
 
 from ..frame import torch_folder
 from . import get_torch, machine
-from .paragraph import translated
+from .panel.paragraph import translated
 from .self_test import XRDS_OT_self_test
 
 # Numbers stay with their devices: a preference holds the number.

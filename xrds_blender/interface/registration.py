@@ -10,15 +10,8 @@ import bpy
 from ..cycles import session
 from ..internals import engine_override
 from ..internals.lifetimes import PROCESS, RENDER_JOB
-from . import (
-    engine,
-    live_picture,
-    operators,
-    panels,
-    preferences,
-    properties,
-    thread_guard,
-)
+from . import engine, live_picture, operators, preferences, properties, thread_guard
+from .panel import panels
 
 
 @dataclass

@@ -7,10 +7,10 @@ from typing import Any
 
 import bpy
 
-from ..choosing.capabilities import weights_headers
-from ..planning.estimates import Capabilities, missing
-from ..planning.request import Request
-from ..planning.settings import MODES, Mode
+from ...choosing.capabilities import weights_headers
+from ...planning.estimates import Capabilities, missing
+from ...planning.request import Request
+from ...planning.settings import MODES, Mode
 from . import support
 
 NO_DENOISER = (

@@ -13,7 +13,7 @@ from typing import Any
 
 import bpy
 
-from ..internals.engine_override import ENGINE
+from ...internals.engine_override import ENGINE
 
 CYCLES = "CYCLES"
 _ROOTS = (bpy.types.Panel, bpy.types.Menu, bpy.types.Header)

@@ -7,26 +7,19 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ..choosing import history
-from ..choosing.capabilities import capabilities
-from ..choosing.modes import best_mode, estimates
-from ..internals.engine_override import ENGINE
-from ..internals.lifetimes import FILE
-from ..planning.estimates import Capabilities
-from ..planning.request import Request
-from ..planning.settings import PRESETS, Mode
-from . import (
-    cycles_panels,
-    mode_table,
-    paragraph,
-    presets,
-    status_bar,
-    summary,
-    translations,
-)
-from .properties import request_of
+from ...choosing import history
+from ...choosing.capabilities import capabilities
+from ...choosing.modes import best_mode, estimates
+from ...internals.engine_override import ENGINE
+from ...internals.lifetimes import FILE
+from ...planning.estimates import Capabilities
+from ...planning.request import Request
+from ...planning.settings import PRESETS, Mode
+from .. import presets, status_bar, translations
+from ..properties import request_of
+from ..translations import CONTEXT
+from . import cycles_panels, mode_table, paragraph, summary
 from .remarks import remarks
-from .translations import CONTEXT
 
 
 class _RenderPanel:

@@ -58,7 +58,7 @@ def _measure(context: Any) -> Callable[[str], float]:
 
 def translated(text: str, **values: object) -> str:
     """A text of the panel in the interface's language, with values put in."""
-    from .translations import CONTEXT
+    from ..translations import CONTEXT
 
     found = bpy.app.translations.pgettext_iface(text, CONTEXT)
     return found.format(**values) if values else found

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..choosing.plan_facts import join_facts
-from ..planning.facts import Facts, SceneFacts
-from ..planning.settings import Settings
-from ..scene.contents import scene_facts
+from ...choosing.plan_facts import join_facts
+from ...planning.facts import Facts, SceneFacts
+from ...planning.settings import Settings
+from ...scene.contents import scene_facts
 
 
 class FactsCache:

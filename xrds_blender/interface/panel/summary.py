@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from ..choosing.history import LastRender, scene_settings
-from ..cycles.size import frame_size
-from ..planning import forecast
-from ..planning.estimates import Capabilities
-from ..planning.plan import Plan
-from ..planning.request import Request
-from ..planning.settings import Mode, Settings
-from .machine import machine
+from ...choosing.history import LastRender, scene_settings
+from ...cycles.size import frame_size
+from ...planning import forecast
+from ...planning.estimates import Capabilities
+from ...planning.plan import Plan
+from ...planning.request import Request
+from ...planning.settings import Mode, Settings
+from ..machine import machine
+from ..properties import DENOISE
 from .mode_table import NAMES
 from .paragraph import translated
-from .properties import DENOISE
 
 if TYPE_CHECKING:
     from .facts_cache import FactsCache
@@ -85,7 +85,7 @@ def _neighbours(size: tuple[int, int], settings: Settings) -> list[Row]:
 
 def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
     """What a time budget will about choose."""
-    from ..choosing.chosen import foresee
+    from ...choosing.chosen import foresee
 
     networks = sorted(here.networks) if here.torch else []
     found = foresee(scene, request, networks) if here.any_denoiser else None

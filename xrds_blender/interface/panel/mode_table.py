@@ -6,10 +6,10 @@ from typing import Any
 
 from xrds_core.time_left import duration
 
-from ..planning.estimates import Estimate
-from ..planning.settings import MODES, Mode
+from ...planning.estimates import Estimate
+from ...planning.settings import MODES, Mode
+from ..translations import CONTEXT
 from .paragraph import translated
-from .translations import CONTEXT
 
 NAMES = {
     Mode.AUTOMATIC: "Automatic",
