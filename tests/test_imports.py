@@ -6,6 +6,7 @@ import ast
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -196,10 +197,17 @@ def test_importing_a_package_loads_no_torch(package: str) -> None:
 
 @pytest.mark.parametrize("path", SOURCES, ids=module_name)
 def test_files_and_functions_stay_small(path: Path) -> None:
+    most = 60 if module_name(path).split(".")[0] in SHIPPED else 80
     assert len(path.read_text().splitlines()) <= 600
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            assert node.end_lineno - node.lineno < 80, node.name
+            assert node.end_lineno - node.lineno < most, node.name
+
+
+@pytest.mark.parametrize("package", SHIPPED)
+def test_folders_stay_small(package: str) -> None:
+    count = Counter(path.parent for path in below(package) if path.stem != "__init__")
+    assert max(count.values()) <= 18, count.most_common(1)
 
 
 def test_no_child_process_runs_what_lies_in_the_working_folder() -> None:

@@ -36,13 +36,12 @@ def upscale_file(
     """Enlarge a low-resolution EXR under full-resolution passes; write an EXR.
 
     Args:
-        beauty: the low-resolution render, denoised, with alpha or without; the noisy
-            picture, where the file has one too, shows what the denoiser took away.
+        beauty: the low-resolution render, denoised; the noisy picture, where the file
+            has one too, shows what the denoiser took away.
         guide_file: albedo and normal.
-        output: gets R, G, B, scene-linear, and A where `beauty` has alpha; its folder
-            is made.
+        output: R, G, B, scene-linear, and A if `beauty` has it; the folder is made.
         names, encoding: of the passes in both files, and of the output's pixels.
-        threads: of the processor, for this process from now on.
+        threads: of the processor, from now on.
         network: what `Upscaler` is made of: preset, scale, device, weights.
 
     The other arguments are those of a call of `Upscaler`.
