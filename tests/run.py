@@ -1,4 +1,4 @@
-"""Run every test: core ones together, every other module in its own process.
+"""Run every test: core ones together, each other module by itself, two at once.
 
 A process that rendered with the bpy module can hang when it ends, so each module of
 tests/blender and tests/lab gets its own process, which leaves with pytest's exit status
@@ -14,10 +14,12 @@ import tempfile
 import time
 import xml.etree.ElementTree as ET
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
+AT_ONCE = 2  # most of a test's seconds run on one core
 MODULE_LIMIT = 1200.0  # seconds for one process; single tests have their own limit
 PYTEST = """
 import os, sys
@@ -65,12 +67,16 @@ def run(name: str, paths: list[Path], options: list[str]) -> Verdict:
                 cwd=TESTS.parent,
                 check=False,
                 timeout=MODULE_LIMIT,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
             )
-            ended = f"exit status {done.returncode}"
+            ended, printed = f"exit status {done.returncode}", done.stdout
             ok = done.returncode == 0
-        except subprocess.TimeoutExpired:
-            ended, ok = f"stopped after {MODULE_LIMIT:.0f} s", False
+        except subprocess.TimeoutExpired as error:
+            ended, printed = f"stopped after {MODULE_LIMIT:.0f} s", error.stdout or b""
+            ok = False
         counts = read_counts(report)
+    print(f"--- {name}\n{printed.decode(errors='replace')}", end="", flush=True)
     if not ok and not counts["failed"]:  # interrupted, crashed, hung or empty
         print(f"{name}: {ended}, with no test failed", flush=True)
         counts["failed"] += 1
@@ -88,11 +94,11 @@ def batches() -> list[tuple[str, list[Path]]]:
     return found + [(f"{p.parent.name}/{p.stem}", [p]) for p in sorted(alone)]
 
 
-def closing_line(verdicts: list[Verdict]) -> str:
+def closing_line(verdicts: list[Verdict], seconds: float) -> str:
     """Write the totals as pytest writes its own closing line."""
     total: Counter[str] = sum((v.counts for v in verdicts), Counter())
     told = ", ".join(f"{n} {word}" for word, n in sorted(total.items()) if n)
-    return f"{told or 'no tests'} in {sum(v.seconds for v in verdicts):.0f} s"
+    return f"{told or 'no tests'} in {seconds:.0f} s"
 
 
 def main() -> int:
@@ -105,15 +111,14 @@ def main() -> int:
         for name, paths in batches()
         if not wanted.only or any(part in name for part in wanted.only)
     ]
-    verdicts = []
-    for name, paths in chosen:
-        print(f"--- {name}", flush=True)
-        verdicts.append(run(name, paths, options))
+    start = time.perf_counter()
+    with ThreadPoolExecutor(AT_ONCE) as workers:
+        verdicts = [*workers.map(lambda batch: run(*batch, options), chosen)]
     print("=" * 60)
     for verdict in verdicts:
         told = ", ".join(f"{n} {word}" for word, n in verdict.counts.items() if n)
         print(f"{verdict.name:40} {verdict.seconds:6.0f} s  {told}")
-    print(closing_line(verdicts))
+    print(closing_line(verdicts, time.perf_counter() - start))
     return 0 if verdicts and all(v.ok for v in verdicts) else 1
 
 

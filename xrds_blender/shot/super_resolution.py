@@ -449,11 +449,11 @@ def accumulated_inputs(
     started = time.perf_counter()
     accumulated = accumulate(own.light, [each.light for each in others], movement)
     guides = accumulated_guides(own, others, movement)
-    accumulated = time.perf_counter()
+    done = time.perf_counter()
     beauty = _denoised(own, accumulated, denoiser)
     seconds = {
-        "accumulate": accumulated - started,
-        "denoise": time.perf_counter() - accumulated,
+        "accumulate": done - started,
+        "denoise": time.perf_counter() - done,
     }
     return Inputs(
         beauty,
