@@ -8,6 +8,7 @@ and without an interpreter's end. That status is the verdict; the JUnit file cou
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -19,7 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 TESTS = Path(__file__).resolve().parent
-AT_ONCE = 2  # most of a test's seconds run on one core
+# Most of a test's seconds run on one core. Two pools of OpenMP's threads, which spin
+# while they wait, would take each other's.
+AT_ONCE = 2
 MODULE_LIMIT = 1200.0  # seconds for one process; single tests have their own limit
 PYTEST = """
 import os, sys
@@ -67,6 +70,7 @@ def run(name: str, paths: list[Path], options: list[str]) -> Verdict:
                 cwd=TESTS.parent,
                 check=False,
                 timeout=MODULE_LIMIT,
+                env={**os.environ, "OMP_NUM_THREADS": "1"},
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
             )
@@ -88,10 +92,11 @@ def batches() -> list[tuple[str, list[Path]]]:
 
     tests/app is not among them: it needs a Blender program and half an hour.
     """
-    core = [*TESTS.glob("test_*.py"), *(TESTS / "core").glob("test_*.py")]
-    alone = [p for name in ("blender", "lab") for p in (TESTS / name).glob("test_*.py")]
-    found = [("core", sorted(core))]
-    return found + [(f"{p.parent.name}/{p.stem}", [p]) for p in sorted(alone)]
+    core = [*TESTS.glob("test_*.py"), *(TESTS / "core").rglob("test_*.py")]
+    apart = ("blender", "extension", "lab")
+    alone = sorted(p for name in apart for p in (TESTS / name).rglob("test_*.py"))
+    named = [(str(p.relative_to(TESTS).with_suffix("")), [p]) for p in alone]
+    return [("core", sorted(core)), *named]
 
 
 def closing_line(verdicts: list[Verdict], seconds: float) -> str:

@@ -24,36 +24,34 @@ COPIED = (
     "xrds_blender",
     "xrds_lab",
     "tests/blender",
-    "tests/guides",
+    "tests/support",
     "tests/conftest.py",
-    "tests/channels.py",
-    "tests/hostile.py",
     "pyproject.toml",
 )
 # Left out: what starts a Python of its own.
 MODULES = (
-    "borrowed",
-    "cover",
-    "engine",
-    "engine_override",
-    "features",
-    "full_size",
-    "guide_cache",
-    "guide_changes",
-    "guide_key",
-    "live",
-    "low_camera",
-    "omissions",
-    "panels",
-    "passes",
-    "picking",
-    "record",
-    "shot",
-    "shot_budget",
-    "shot_enlarged",
-    "spare_passes",
-    "translations",
-    "unchanged",
+    "choosing/selecting",
+    "choosing/shot_budget",
+    "cycles/live",
+    "cycles/low_camera",
+    "cycles/passes",
+    "frame/guide_cache",
+    "frame/guide_changes",
+    "frame/record",
+    "interface/engine",
+    "interface/panels",
+    "interface/translations",
+    "internals/borrowed",
+    "internals/engine_override",
+    "internals/spare_passes",
+    "planning/omissions",
+    "scene/guide_key",
+    "shot/alpha",
+    "shot/features",
+    "shot/full_size",
+    "shot/shot",
+    "shot/shot_enlarged",
+    "shot/unchanged",
 )
 Verdicts = dict[str, str]
 
@@ -105,16 +103,17 @@ def verdicts() -> dict[Path, Verdicts]:
 def test_feature_tests_pass(
     program: Program, checkout: Path, verdicts: dict[Path, Verdicts], module: str
 ) -> None:
-    report = checkout / f"{module}.xml"
+    folder, _, name = module.partition("/")
+    report = checkout / f"{name}.xml"
     done = program.run(
         *("blender", "-b", "--factory-startup", "--python-exit-code", "3"),
         *("--python", program.seen(checkout / "run_pytest.py"), "--"),
         program.seen(checkout),
-        f"tests/blender/test_{module}.py",
+        f"tests/blender/{folder}/test_{name}.py",
         *("-rs", "--timeout=900", f"--junit-xml={program.seen(report)}"),
         timeout=2400,
     )
-    (program.share / f"{module}.log").write_text(done.stdout)
+    (program.share / f"{name}.log").write_text(done.stdout)
     told = read(report)
     verdicts.setdefault(program.path, {}).update(told)
     wrong = sorted(name for name, verdict in told.items() if verdict == "failed")

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-JOB_TYPES = Path(__file__).resolve().parents[1] / "docs" / "pipeline"
+JOB_TYPES = Path(__file__).resolve().parents[2] / "docs" / "pipeline"
 # What the Manager gives a job type: chunks of frames, tasks, commands.
 MANAGER = """
 const author = {
