@@ -42,8 +42,8 @@ def render(scene: Any, scale: int = 2, **choices: Any) -> Picture:
     """Render the current frame of `scene` and return its picture.
 
     `choices` are `layer`, the name of a view layer (the first that is used by default),
-    and the others of `xrds_blender.planning.request.request`. The scene's own `xrds`
-    settings and its compositor play no part, and everything in it is as before
+    and the others of `xrds_blender.planning.request.render_request`. The scene's own
+    `xrds` settings and its compositor play no part, and everything in it is as before
     afterwards.
 
     Raises SceneError without a camera, WeightsError without the weights, UsageError

@@ -11,7 +11,7 @@ from xrds_core.exr.encoding import CODECS, FLOAT_ZIP, Encoding
 from xrds_core.frames import RADIUS
 
 from ..planning.plan import SAVINGS
-from ..planning.request import Request, request
+from ..planning.request import Request, render_request
 from ..planning.settings import PRESETS, QUALITIES, SCALES
 from . import arguments
 from .scene_file import SceneChoice
@@ -19,7 +19,7 @@ from .scene_file import SceneChoice
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
 
 
-def add_request(command: argparse.ArgumentParser) -> None:
+def add_render_request(command: argparse.ArgumentParser) -> None:
     """Add what a request holds."""
     add_scene(command)
     _add_mode(command)
@@ -184,7 +184,7 @@ def choice_of(options: argparse.Namespace) -> SceneChoice:
 
 def request_of(options: argparse.Namespace) -> Request:
     """What the options of `add_request` ask for; raises UsageError."""
-    return request(
+    return render_request(
         scale=options.scale,
         samples=options.samples,
         guide_samples=options.guide_samples,

@@ -8,7 +8,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from xrds_core.frames import RADIUS
 
 from ..choosing import modes
-from ..planning.request import Request, request
+from ..planning.request import Request, render_request
 from ..planning.settings import Mode
 from .machine import machine
 from .translations import CONTEXT
@@ -191,7 +191,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
 def request_of(settings: XRDSSettings) -> Request:
     """What a scene's settings and the preferences describe."""
     here = machine()
-    wanted = request(
+    wanted = render_request(
         scale=1,
         guide_samples=settings.guide_samples,
         preset=settings.preset,

@@ -98,7 +98,7 @@ class Request:
         return decide(facts, self.savings)
 
 
-def request(
+def render_request(
     scale: int = 2,
     *,
     plain: bool = False,

@@ -25,7 +25,7 @@ from ..frame import stages, torch_folder
 from ..frame.picture import NetworkFailed, Picture, joined
 from ..frame.rendering import call_engine
 from ..internals.lifetimes import RENDER_JOB
-from ..planning.request import Request, request
+from ..planning.request import Request, render_request
 from .cycles_only import CyclesOnly
 from .engine_frames import EngineFrames
 from .full_size import FullSize
@@ -67,7 +67,7 @@ def render(
     scene: Any, scale: int = 2, *, layer: str | None = None, **choices: Any
 ) -> Picture:
     """As `xrds_blender.render`; the engine must be registered."""
-    return render_scene(scene, request(scale, **choices), layer)
+    return render_scene(scene, render_request(scale, **choices), layer)
 
 
 def render_scene(scene: Any, request: Request, layer: str | None = None) -> Picture:

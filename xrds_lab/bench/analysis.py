@@ -5,10 +5,9 @@ from __future__ import annotations
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.modes import ALIKE
-
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Curve
+from xrds_blender.planning.estimates import ALIKE
 from xrds_blender.planning.settings import (
     DEFAULT_DENOISING,
     OUR_DENOISING,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
 
 from . import machine, tasks
@@ -168,7 +168,7 @@ def _limited_network(shot: Shot, settings: Settings, network: Network) -> Task:
 
 def _xrds_frame(shot: Shot, settings: Settings, network: Network) -> Task:
     """A frame with the rays of one full-resolution sample and one guide sample."""
-    job = request(
+    job = render_request(
         **network._asdict(),
         samples=network.scale**2,
         guide_samples=1,

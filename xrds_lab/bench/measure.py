@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_blender.choosing.probing import probe, with_guides
 from xrds_blender.planning import budget
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Mode
 from xrds_blender.planning.settings import Settings as RenderSettings
 from xrds_core.atomic import read_json, write_json
@@ -230,7 +230,7 @@ class SceneBench:
         """Render a whole frame within a budget; measure its error on the window."""
         seconds = multiple * self.unit()
         networks = self.settings.networks
-        job = request(
+        job = render_request(
             time_budget=seconds, device=networks.device, weights=networks.weights
         )
         picture, run = tasks.frame(self.shot, job)

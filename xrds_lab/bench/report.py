@@ -7,8 +7,7 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.modes import ALIKE
-
+from xrds_blender.planning.estimates import ALIKE
 from xrds_core.atomic import replacing
 
 from . import analysis, plots

@@ -10,7 +10,7 @@ import numpy as np
 
 from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
 from xrds_blender.planning.request import Request as RenderRequest
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
 
 from .inputs import Request, open_scene, sample_adaptively
@@ -72,11 +72,11 @@ def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str
 
 def plain_job() -> RenderRequest:
     """1 spp + OIDN with Blender's defaults: the unit of all budgets."""
-    return request(plain=True, samples=1, denoiser=DEFAULT_DENOISING)
+    return render_request(plain=True, samples=1, denoiser=DEFAULT_DENOISING)
 
 
 def _adaptive_frame(shot: Shot, config: Config) -> Task:
-    job = request(plain=True, denoiser=Denoising(config.denoiser))
+    job = render_request(plain=True, denoiser=Denoising(config.denoiser))
     return lambda: frame(shot, job, config)[1]
 
 
@@ -206,7 +206,7 @@ def _network(networks: Networks, network: Network, window: Window) -> Task:
 
 
 def _quick_job(networks: Networks, network: Network) -> RenderRequest:
-    return request(
+    return render_request(
         **network._asdict(),
         samples=network.scale,
         guide_samples=1,

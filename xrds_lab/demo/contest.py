@@ -10,7 +10,7 @@ import numpy as np
 
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
-from xrds_blender.planning.request import Request, request
+from xrds_blender.planning.request import Request, render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
 from xrds_blender.shot.render import render_scene
 from xrds_blender.shot.shot import render_shot
@@ -47,23 +47,25 @@ class Way:
 CYCLES = Way(
     "cycles_oidn_default",
     "Cycles + OIDN",
-    request(plain=True, denoiser=DEFAULT_DENOISING),
+    render_request(plain=True, denoiser=DEFAULT_DENOISING),
 )
 QUICK = Way(
     "cycles_oidn_quick",
     "Cycles + OIDN, fast prefilter",
-    request(plain=True, denoiser=Denoising.HIGH_FAST),
+    render_request(plain=True, denoiser=Denoising.HIGH_FAST),
 )
-FULL_SIZE = Way("xrds_x1", "XRDS, full size", request(scale=1))
+FULL_SIZE = Way("xrds_x1", "XRDS, full size", render_request(scale=1))
 ENLARGED = Way(
     "xrds_x2",
     "XRDS, super-resolution x2",
     # every picture is to pay for its own guides
-    request(scale=2, guide_samples=1, savings=savings_but(GUIDE_CACHE)),
+    render_request(scale=2, guide_samples=1, savings=savings_but(GUIDE_CACHE)),
     trials=(4, 16),
     where=" at half size",
 )
-ACCUMULATED = Way("xrds_shot", "XRDS, shot", request(scale=1, temporal_radius=RADIUS))
+ACCUMULATED = Way(
+    "xrds_shot", "XRDS, shot", render_request(scale=1, temporal_radius=RADIUS)
+)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 import xrds_core
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.arrays import Array
@@ -46,7 +46,9 @@ class Clip:
     ) -> None:
         self.shot = shot
         count = None if shot.adaptive else samples
-        job = request(scale=1, samples=count, temporal_radius=REACH, device="cpu")
+        job = render_request(
+            scale=1, samples=count, temporal_radius=REACH, device="cpu"
+        )
         self._method = FullSize(job)
         self.frames = frames
         self.view = next(iter(frames[shot.frames[0]]))

@@ -63,17 +63,17 @@ def render(
 def _render(scene: Any, request: Request, store: Store) -> None:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
     from xrds_blender.frame.rendering import call_engine
-    from xrds_blender.planning.request import request
+    from xrds_blender.planning.request import render_request
     from xrds_blender.shot.sampling import noisy_frame, sample_frame
 
     if request.kind != NOISY:
-        job = request(scale=1, samples=request.samples, seed=request.seed)
+        job = render_request(scale=1, samples=request.samples, seed=request.seed)
         alone = call_engine(scene, lambda *given: sample_frame(*given, job))
         store.keep_reference(request, next(iter(alone.views.values())).picture)
         return
     shot = SHOTS[request.shot]
     samples = None if shot.adaptive else request.samples
-    job = request(scale=1, samples=samples, temporal_radius=REACH)
+    job = render_request(scale=1, samples=samples, temporal_radius=REACH)
     place = shot.frames.index(request.number)
     scene.cycles.samples = request.samples
     frames, _ = call_engine(scene, lambda *given: noisy_frame(*given, job, place))

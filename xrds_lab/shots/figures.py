@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import xrds_core
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.atomic import write_json
@@ -72,7 +72,7 @@ class Clip:
     def _method(self, radius: int) -> FullSize:
         if radius not in self._methods:
             self._methods[radius] = FullSize(
-                request(
+                render_request(
                     scale=1, samples=self.samples, temporal_radius=radius, device="cpu"
                 )
             )

@@ -148,10 +148,12 @@ class ShotFrames:
 def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
     from xrds_blender.frame.rendering import call_engine
-    from xrds_blender.planning.request import request
+    from xrds_blender.planning.request import render_request
     from xrds_blender.shot.sampling import noisy_frame
 
-    job = request(scale=1, samples=request.samples, temporal_radius=request.reach)
+    job = render_request(
+        scale=1, samples=request.samples, temporal_radius=request.reach
+    )
     place = request.number - (MIDDLE - request.reach)
     frames, seconds = call_engine(scene, lambda *given: noisy_frame(*given, job, place))
     return packing.pack(frames), seconds

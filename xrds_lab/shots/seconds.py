@@ -59,12 +59,12 @@ class SceneSeconds:
 def timed(shot: Shot, samples: int, radii: Sequence[int], rounds: int) -> Timed:
     """Time a panning shot of whole frames: seconds by stage, `total` and `cpu`."""
     from xrds_blender import render
-    from xrds_blender.planning.request import request
+    from xrds_blender.planning.request import render_request
 
     reach = max(*radii, rounds // 2, 1)
     scene = open_scene(shot.path, shot.window.whole)
     animate(scene, shot.window, "pan", MIDDLE, reach)
-    job = request(scale=1, samples=samples, temporal_radius=reach)
+    job = render_request(scale=1, samples=samples, temporal_radius=reach)
     plain = {"plain": True, "samples": samples, "denoiser": DEFAULT_DENOISING}
     sampled: dict[int, Stored] = {}
     ours, rival = [], []

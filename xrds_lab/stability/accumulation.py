@@ -53,14 +53,14 @@ def film(name: str) -> Filmed:
     """Render a shot's frames by the product, and references of those judged."""
     from xrds_blender import run_job
     from xrds_blender.frame.rendering import call_engine
-    from xrds_blender.planning.request import request
+    from xrds_blender.planning.request import render_request
     from xrds_blender.planning.settings import DEFAULT_DENOISING
     from xrds_blender.shot.sampling import sample_frame
 
     from .moving_scenes import FRAMES, JUDGED, build, set_frame
 
     scene = build(name)
-    job = request(scale=1, samples=SAMPLES, temporal_radius=RADIUS)
+    job = render_request(scale=1, samples=SAMPLES, temporal_radius=RADIUS)
     frames, truth = {}, {}
     for place, number in enumerate(FRAMES):
         set_frame(scene, name, number)
@@ -102,7 +102,7 @@ def fisheye() -> Iterator[Measured]:
     import bpy
 
     from xrds_blender.command.render_file import render_file
-    from xrds_blender.planning.request import request
+    from xrds_blender.planning.request import render_request
 
     from .moving_scenes import build
 
@@ -110,7 +110,7 @@ def fisheye() -> Iterator[Measured]:
     with tempfile.TemporaryDirectory() as folder:
         blend = Path(folder) / "fisheye.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-        job = request(scale=1, samples=1, temporal_radius=RADIUS, device="cpu")
+        job = render_request(scale=1, samples=1, temporal_radius=RADIUS, device="cpu")
         made = render_file(blend, f"{folder}/#.exr", job, frames=[1, 2, 3])
     lent = [frame for frame in made["frames"] if frame["temporal"] is not None]
     yield Measured("accumulation.fisheye.lent", float(len(lent)))
@@ -118,11 +118,11 @@ def fisheye() -> Iterator[Measured]:
 
 def finished(frames: dict[int, Stored], number: int, radius: int) -> Array:
     """A frame (H, W, 3) as the product finishes it."""
-    from xrds_blender.planning.request import request
+    from xrds_blender.planning.request import render_request
     from xrds_blender.shot.full_size import FullSize
     from xrds_core.temporal.window import Shot
 
-    job = request(scale=1, samples=SAMPLES, temporal_radius=radius, device="cpu")
+    job = render_request(scale=1, samples=SAMPLES, temporal_radius=radius, device="cpu")
     lenders = [frames[n] for n in Shot(tuple(frames), radius).neighbours(number)]
     return FullSize(job).finish_stored(frames[number], lenders).radiance
 

@@ -130,11 +130,11 @@ def crashes(frames: Frames) -> int:
 
 def long(frames: Frames) -> Measured:
     """Growth of memory in KiB per frame over a thousand frames, one after the other."""
-    from xrds_blender.planning.request import request
+    from xrds_blender.planning.request import render_request
     from xrds_blender.shot.full_size import FullSize
 
     originals = list(frames.values())
-    job = request(scale=1, samples=SAMPLES, temporal_radius=RADIUS, device="cpu")
+    job = render_request(scale=1, samples=SAMPLES, temporal_radius=RADIUS, device="cpu")
     method, memory = FullSize(job), []
 
     def load(number: int) -> Stored:

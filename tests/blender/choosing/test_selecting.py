@@ -15,7 +15,7 @@ from xrds_blender.choosing import chosen, probing
 from xrds_blender.cycles import session
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
-from xrds_blender.planning.request import Goal, request
+from xrds_blender.planning.request import Goal, render_request
 from xrds_blender.planning.settings import Denoising, Mode, Settings
 from xrds_blender.shot.explain import explain
 from xrds_core.errors import UsageError, XRDSError
@@ -227,7 +227,7 @@ def test_the_plan_told_is_the_one_rendered(
     only(**{name: 40.0 if name == best else 20.0 for name in ("xrds", "plain", "full")})
     ensure_registered()
     scene = still_life(64, 48)
-    told = explain(scene, request(**goal))
+    told = explain(scene, render_request(**goal))
     picture = render(scene, **goal)
     before = [(each["decision"], each["value"]) for each in told["decisions"]]
     decided = [(each.decision, each.value) for each in picture.plan]
@@ -282,4 +282,4 @@ def test_panel_setting_reaches_the_job(still_life: Callable[..., Any]) -> None:
 )
 def test_wrong_wishes_are_refused(wrong: dict[str, Any], message: str) -> None:
     with pytest.raises(UsageError, match=message):
-        request(**wrong)
+        render_request(**wrong)

@@ -19,7 +19,7 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Costs, Curve, ErrorModel
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import Denoising, Mode, Settings
 from xrds_blender.shot.explain import explain
 
@@ -70,7 +70,7 @@ def best(monkeypatch: pytest.MonkeyPatch, probed: list[int]) -> Callable[..., No
 
 
 def rendered(blend: Path, radius: int = 1, **more: Any) -> dict[str, Any]:
-    job = request(temporal_radius=radius, **{"time_budget": 300.0, **more})
+    job = render_request(temporal_radius=radius, **{"time_budget": 300.0, **more})
     frames = str(blend.parent / "command" / "#.exr")
     return render_file(blend, frames, job, frames=FRAMES, resume=True)
 
@@ -140,7 +140,7 @@ def test_the_plan_told_is_the_one_rendered(
 ) -> None:
     ensure_registered()
     bpy.ops.wm.open_mainfile(filepath=str(blend))
-    job = request(temporal_radius=1, **goal)
+    job = render_request(temporal_radius=1, **goal)
     told = explain(bpy.context.scene, job, FRAMES)["decisions"]
     plan = rendered(blend, **({"time_budget": None} | goal))["plan"]
     assert told[0] == plan[0]

@@ -13,7 +13,7 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.rendering import call_engine
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.shot import sampling
 from xrds_core.temporal.frame import Frame
 
@@ -29,7 +29,7 @@ def scene(blend: Path) -> Any:
 
 
 def sampled(scene: Any, **job: Any) -> Frame:
-    how = request(**{"scale": 1, "temporal_radius": 2, "seed": 3} | job)
+    how = render_request(**{"scale": 1, "temporal_radius": 2, "seed": 3} | job)
     frames, _ = call_engine(scene, lambda *given: sampling.noisy_frame(*given, how))
     return next(iter(frames.values()))
 

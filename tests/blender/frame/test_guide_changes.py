@@ -31,11 +31,11 @@ from xrds_blender.frame.guides import GuideSource
 from xrds_blender.frame.rendering import call_engine, run_job
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.plan import GuideRender, savings_but
-from xrds_blender.planning.request import Request, request
+from xrds_blender.planning.request import Request, render_request
 from xrds_lab.studio import traps
 from xrds_lab.studio.nodes import Surface
 
-KEPT = request(scale=2, samples=1, guide_samples=1, seed=1)
+KEPT = render_request(scale=2, samples=1, guide_samples=1, seed=1)
 ANEW = replace(KEPT, savings=savings_but("guide cache"))
 Passes = dict[tuple[str, str], np.ndarray]
 
@@ -198,12 +198,12 @@ def test_a_key_with_a_hole_costs_a_render_and_no_picture(
     monkeypatch.setattr(frame_guides, "guide_key", lambda *_: "always the same")
     told: list[str] = []
     bpy.ops.wm.open_mainfile(filepath=str(stages("still") / "stage.blend"))
-    assert guides(KEPT)[0] == "kept 1 samples"
+    assert guides(KEPT)[0] == "cached 1 samples"
     assert guides(KEPT, told)[0] == "used 1 samples"
     assert not told
     deeds.cut_by_marker(Path())
     said, reason, kept = guides(KEPT, told)
-    assert said == "kept 1 samples"
+    assert said == "cached 1 samples"
     assert "a probe render shows other guides" in reason
     assert "guide cache: nothing XRDS looks at has changed, but" in told[0]
     assert not differ(kept, guides(ANEW)[2])
@@ -266,6 +266,6 @@ def test_bevelled_edges_of_a_texture_find_their_guides_again() -> None:
     bevel = thing.modifiers.new("Bevel", "BEVEL")
     bevel.width, bevel.limit_method = 0.02, "NONE"
     said = [guides(KEPT)[0] for _ in range(6)]
-    assert said == ["kept 1 samples", *["used 1 samples"] * 5]
+    assert said == ["cached 1 samples", *["used 1 samples"] * 5]
     thing.data.uv_layers[0].data[7].uv = (0.9, 0.1)
-    assert guides(KEPT)[0] == "kept 1 samples"
+    assert guides(KEPT)[0] == "cached 1 samples"

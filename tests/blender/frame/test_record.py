@@ -15,7 +15,7 @@ bpy = pytest.importorskip("bpy")
 from xrds_blender.frame import record
 from xrds_blender.frame.picture import Picture
 from xrds_blender.planning.plan import Decision
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 
 NAMES = ("version", "mode", "scale", "preset", "samples", "device", "seconds")
 
@@ -92,7 +92,7 @@ def test_what_was_left_out_is_named() -> None:
         Decision("guide cache", "used 4 samples", ""),
     )
     picture = Picture(None, None, plan=plan, device="cpu", seconds={"total": 1.26})
-    told = record.fields(picture, request(scale=4).settings, 16)
+    told = record.fields(picture, render_request(scale=4).settings, 16)
     assert told["left_out"] == "motion blur, guides, from the cache"
     assert told["guide_samples"] == "2"
     assert told["seconds"] == "1.3"
@@ -110,7 +110,7 @@ def test_the_commands_files_tell_what_made_them(
 
     path, output = tmp_path / "life.blend", tmp_path / f"frame{suffix}"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    render_file(path, str(output), request(scale=1, samples=3))
+    render_file(path, str(output), render_request(scale=1, samples=3))
     assert is_whole(output, (45, 33))
     if suffix == ".png":
         found = texts(output.read_bytes())

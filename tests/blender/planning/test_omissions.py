@@ -15,7 +15,7 @@ from xrds_blender.choosing.plan_facts import find_facts
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning import plan
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import Settings
 from xrds_blender.shot.explain import explain
 from xrds_lab.studio import traps
@@ -192,7 +192,7 @@ def test_a_plan_is_of_the_frames_asked_for() -> None:
     scene.collection.objects.link(other)
     for frame, camera in ((1, scene.camera), (8, other)):
         scene.timeline_markers.new(camera.name, frame=frame).camera = camera
-    job = request(scale=2, temporal_radius=2)
+    job = render_request(scale=2, temporal_radius=2)
 
     def told(*frames: int) -> tuple[bool, dict[str, str]]:
         found = explain(scene, job, frames)

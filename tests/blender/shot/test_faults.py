@@ -28,7 +28,7 @@ from xrds_blender.command.whole_file import is_whole
 from xrds_blender.cycles import session
 from xrds_blender.frame import denoisers, guide_cache, networks, stages
 from xrds_blender.frame.picture import NetworkFailed
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_core.errors import Cancelled, OutOfMemory, PictureError, XRDSError
 
 SIZE = (45, 33)
@@ -127,7 +127,9 @@ def test_a_frame_whose_folder_vanishes_is_kept_elsewhere(
     bpy.app.handlers.render_complete.append(vanish)
     try:
         with pytest.raises(PictureError, match="the frame was saved as ") as error:
-            render_file(blend, f"{folder}/#.{suffix}", request(), frames=(1, 2, 3))
+            render_file(
+                blend, f"{folder}/#.{suffix}", render_request(), frames=(1, 2, 3)
+            )
     finally:
         bpy.app.handlers.render_complete.remove(vanish)
     assert not folder.exists()
@@ -185,7 +187,7 @@ def test_too_little_memory_writes_the_low_resolution_file(
     blend: Path, too_large: None, tmp_path: Path
 ) -> None:
     with pytest.raises(XRDSError, match=r"frame 1: .*memory.*, saved as .*1_low\.exr"):
-        render_file(blend, f"{tmp_path}/f/#.exr", request(), frames=(1, 2))
+        render_file(blend, f"{tmp_path}/f/#.exr", render_request(), frames=(1, 2))
     assert names(tmp_path / "f") == ["1_low.exr"]
     assert exr.read_beauty(tmp_path / "f" / "1_low.exr").radiance.shape == (17, 23, 3)
 
@@ -292,7 +294,7 @@ def test_a_killed_animation_resumes_at_the_first_missing_frame(
     assert left.endswith(".unfinished")
     first = (folder / "1.exr").read_bytes()
     (folder / "3.exr").write_bytes(first[: len(first) // 2])  # as another program would
-    job = request(plain=True, samples=1)
+    job = render_request(plain=True, samples=1)
     result = render_file(blend, output, job, frames=(1, 2, 3, 4), resume=True)
     assert result["kept"] == [1]
     assert [each["frame"] for each in result["frames"]] == [2, 3, 4]
@@ -325,7 +327,7 @@ def test_what_another_render_has_finished_meanwhile_is_left(
             (folder / "3.exr").write_bytes((folder / "1.exr").read_bytes())
 
     bpy.app.handlers.render_complete.append(finish)
-    job = request(plain=True, samples=1)
+    job = render_request(plain=True, samples=1)
     try:
         result = render_file(
             blend, f"{folder}/#.exr", job, frames=range(1, 4), resume=True
@@ -342,7 +344,7 @@ def test_a_border_resumes_too(blend: Path, tmp_path: Path) -> None:
     edges.border_min_x, edges.border_max_x = 0.31, 0.8
     edges.border_min_y, edges.border_max_y = 0.2, 0.93
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
-    job = request(plain=True, samples=1)
+    job = render_request(plain=True, samples=1)
     results = [
         render_file(blend, f"{tmp_path}/f.png", job, resume=True) for _ in range(2)
     ]

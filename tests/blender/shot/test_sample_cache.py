@@ -22,7 +22,7 @@ pytest.importorskip("mitsuba_oidn")
 from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.command.scene_file import SceneChoice
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.shot import full_size
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError, UsageError
@@ -58,7 +58,7 @@ def saved(folder: Path) -> Path:
 def render(blend: Path, out: str | None, frames: Any, **more: Any) -> dict[str, Any]:
     job = {"scale": 1, "temporal_radius": RADIUS, "denoise": "fast"}
     pattern = None if out is None else str(blend.parent / out / "##.exr")
-    told = request(**job | more.pop("job", {}))
+    told = render_request(**job | more.pop("job", {}))
     return render_file(blend, pattern, told, frames=list(frames), **more)
 
 

@@ -20,7 +20,7 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.internals.lifetimes import RENDER_JOB
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.shot import full_size, shot
 from xrds_blender.shot import render as engine_shots
 from xrds_core.sequence import finishing
@@ -36,7 +36,9 @@ def picture(path: Path) -> np.ndarray:
 def render(blend: Path, out: str, **more: Any) -> dict[str, Any]:
     job = {"scale": 1, "temporal_radius": 2} | more.pop("job", {})
     pattern = str(blend.parent / out / "#.exr")
-    return render_file(blend, pattern, request(**job), **{"frames": FRAMES, **more})
+    return render_file(
+        blend, pattern, render_request(**job), **{"frames": FRAMES, **more}
+    )
 
 
 def truth(blend: Path) -> np.ndarray:
@@ -109,7 +111,7 @@ def test_no_two_frames_have_the_same_noise(blend: Path) -> None:
     scene = bpy.context.scene
     scene.camera.animation_data_clear()
     scene.cycles.use_animated_seed = False
-    job = request(scale=1, temporal_radius=1)
+    job = render_request(scale=1, temporal_radius=1)
     pictures = [p for _, p in shot.render_shot(scene, job, [1, 2])]
     assert pictures[0].temporal.mean_samples == pytest.approx(2.0, abs=0.05)
     method = engine_shots.method_of(Chosen(job))
@@ -139,7 +141,7 @@ def test_under_a_still_camera_frames_continue_one_sequence(
         return found
 
     monkeypatch.setattr(finishing, "accumulate", keep)
-    job = request(scale=1, temporal_radius=2, seed=4)
+    job = render_request(scale=1, temporal_radius=2, seed=4)
     assert len(list(shot.render_shot(scene, job, FRAMES))) == 5
     whole = run_job(scene, lambda p: p.beauty(1, 5, denoise=False, seed=4))
     middle = accumulated[2]
@@ -346,7 +348,7 @@ def test_scripts_see_frames_ahead_as_they_see_their_own(animation: Any) -> None:
     try:
         bpy.ops.render.render(animation=True)
         assert sorted(set(seen)) == FRAMES
-        job = request(scale=1, temporal_radius=2)
+        job = render_request(scale=1, temporal_radius=2)
         pictures = [p.radiance for _, p in shot.render_shot(animation, job, FRAMES)]
     finally:
         bpy.app.handlers.render_pre.remove(dim)
@@ -393,7 +395,7 @@ def test_equirectangular_frames_lend_by_direction(blend: Path) -> None:
     for frame in (1, 5):
         scene.camera.rotation_euler.z = 0.05 * frame
         scene.camera.keyframe_insert("rotation_euler", frame=frame)
-    job = request(scale=1, samples=16, temporal_radius=1)
+    job = render_request(scale=1, samples=16, temporal_radius=1)
     method = engine_shots.method_of(Chosen(job))
     here, there = (
         call_engine(scene, method.sample).views[""]
@@ -526,7 +528,7 @@ def test_views_of_a_pair_lend_to_each_other(
     animation.render.views_format = "STEREO_3D"
     animation.camera.data.stereo.interocular_distance = 0.3
     animation.frame_set(3)
-    list(shot.render_shot(animation, request(scale=1, temporal_radius=1), [3]))
+    list(shot.render_shot(animation, render_request(scale=1, temporal_radius=1), [3]))
     own, (other,), found = accumulated[0]
     assert own.number == other.number == 3
     apart = np.linalg.inv(other.camera.view) - np.linalg.inv(own.camera.view)

@@ -18,7 +18,7 @@ from xrds_blender import run_job
 from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.cycles.settings import has_subsets
-from xrds_blender.planning.request import request
+from xrds_blender.planning.request import render_request
 from xrds_blender.shot import super_resolution
 from xrds_core.errors import XRDSError
 from xrds_core.superres.upscaler import Upscaler
@@ -59,7 +59,9 @@ def lit(life: Any, tmp_path: Path) -> Path:
 def render(blend: Path, out: str, **more: Any) -> dict[str, Any]:
     job = {"scale": 2, "guide_samples": 1, "temporal_radius": 2} | more.pop("job", {})
     pattern = str(blend.parent / out / "#.exr")
-    return render_file(blend, pattern, request(**job), **{"frames": FRAMES, **more})
+    return render_file(
+        blend, pattern, render_request(**job), **{"frames": FRAMES, **more}
+    )
 
 
 def picture(path: Path) -> np.ndarray:
