@@ -19,7 +19,7 @@ from .scene_file import SceneChoice
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
 
 
-def add_render_request(command: argparse.ArgumentParser) -> None:
+def add_request(command: argparse.ArgumentParser) -> None:
     """Add what a request holds."""
     add_scene(command)
     _add_mode(command)
