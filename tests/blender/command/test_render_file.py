@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -16,6 +17,8 @@ import pytest
 from PIL import Image
 
 from xrds_blender.command import main
+from xrds_blender.command.render_file import render_file
+from xrds_blender.planning.request import render_request
 from xrds_core import exr
 from xrds_core.superres import weights
 from xrds_core.superres.network import XRDS, preset_config
@@ -190,3 +193,17 @@ def test_a_render_without_output_is_wrong_usage(folder: Path) -> None:
     done = xrds(folder, "render scene.blend")
     assert done.returncode == 2
     assert "name the output with -o" in done.stderr
+
+
+def test_every_view_of_stereo_is_written(life: Any, tmp_path: Path) -> None:
+    """The first under the name that is given, others with the file's suffix."""
+    life.render.use_multiview = True
+    blend = tmp_path / "stereo.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    for name, radius in (("still", 0), ("shot", 1)):
+        wanted = render_request(1, samples=1, temporal_radius=radius)
+        render_file(blend, f"{tmp_path}/{name}/#.exr", wanted, frames=[1, 2])
+        written = sorted(path.name for path in (tmp_path / name).iterdir())
+        assert written == ["1.exr", "1_R.exr", "2.exr", "2_R.exr"]
+        left, right = (exr.read_beauty(tmp_path / name / f) for f in written[:2])
+        assert np.abs(left.radiance - right.radiance).max() > 0.01
