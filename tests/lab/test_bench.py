@@ -17,7 +17,7 @@ import pytest
 from xrds_blender import run_job
 from xrds_blender.command import main
 from xrds_blender.planning import budget
-from xrds_blender.planning.settings import Denoising, Network
+from xrds_blender.planning.settings import Denoising, Mode, Network, Settings
 from xrds_core.errors import UsageError
 from xrds_lab.bench import (
     growth,
@@ -245,9 +245,9 @@ def test_the_pickers_model_is_written_and_can_be_read(world: World) -> None:
     world.run(timing=False, model=file)
     model = budget.Model.read(file)
     assert model.source.startswith("mean over 1 scenes: cubes; weights: fast x4")
-    plain = budget.Choice(Denoising.HIGH_FAST, 0)
+    plain = Settings(Mode.CYCLES_ONLY, None, Denoising.HIGH_FAST).family
     assert model.errors.curves[plain].samples == (1, 2)
-    own = budget.Choice(Denoising.HIGH_FAST, 0, 4, "fast", "fast", 2)
+    own = Settings(Mode.X4, None, Denoising.HIGH_FAST, "fast", 2)
     assert own in model.errors.curves
 
 
