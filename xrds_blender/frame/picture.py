@@ -79,21 +79,26 @@ class Picture:
         radiance, alpha = pixels[..., :3], pixels[..., 3]
         return cls(np.ascontiguousarray(radiance), np.ascontiguousarray(alpha), **rest)
 
+    @property
+    def pixels(self) -> Array:
+        """Radiance and alpha in one array (H, W, 4)."""
+        import numpy as np
+
+        return np.dstack((self.radiance, self.alpha))
+
 
 def joined(pictures: Mapping[str, Picture], sampled: Mapping[str, float]) -> Picture:
     """The first view's picture, with all views where there are several.
 
     Its seconds are those of `sampled`, of all views together, and of each view.
     """
-    import numpy as np
-
     seconds = dict.fromkeys(STAGES, 0.0) | dict(sampled)
     for picture in pictures.values():
         for stage, spent in picture.seconds.items():
             seconds[stage] = seconds.get(stage, 0.0) + spent
     views = {}
     if len(pictures) > 1:
-        views = {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
+        views = {view: picture.pixels for view, picture in pictures.items()}
     return replace(next(iter(pictures.values())), seconds=seconds, views=views)
 
 

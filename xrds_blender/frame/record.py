@@ -25,7 +25,7 @@ _LEFT_OUT = {
 
 def fields(picture: Picture, settings: Settings, samples: int) -> dict[str, str]:
     """Name and value of what made a picture; `samples` are the scene's own."""
-    entries = {"version": package_version(), "mode": _mode(settings)}
+    entries = {"version": package_version(), "mode": settings.kind}
     entries["scale"] = str(settings.scale)
     if settings.is_enlarged:
         entries["preset"] = settings.preset
@@ -72,12 +72,6 @@ def stamp(engine: Any, entries: dict[str, str], layer: str) -> None:
     result = engine.get_result()
     for name, value in metadata(entries, layer).items():
         result.stamp_data_add_field(name, value)
-
-
-def _mode(settings: Settings) -> str:
-    if settings.is_cycles_only:
-        return "Cycles only"
-    return "super-resolution" if settings.is_enlarged else "full size"
 
 
 def _decided(plan: tuple[Decision, ...], name: str) -> str | None:

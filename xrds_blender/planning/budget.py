@@ -242,7 +242,7 @@ class Selection:
         else:
             other = self.rival
             reason += (
-                f"; best {_kind(other.settings)} for {wanted}: "
+                f"; best {other.settings.kind} for {wanted}: "
                 f"{other.settings.label}: {other.psnr:.1f} dB in {other.seconds:.1f} s"
             )
         return Decision(name, self.settings.label, reason)
@@ -265,7 +265,7 @@ def choose(
         late = max(full_size, key=_merit, default=best)
         if late.psnr > best.psnr:
             return replace(late, fits=False)
-    rivals = [p for p in fitting if _kind(p.settings) != _kind(best.settings)]
+    rivals = [p for p in fitting if p.settings.kind != best.settings.kind]
     rival = max(rivals, key=_merit, default=None)
     return Selection(best.settings, best.seconds, best.psnr, rival)
 
@@ -315,7 +315,7 @@ def reach(
         best = max(found, key=_merit)
         return Selection(best.settings, best.seconds, best.psnr, None, fits=False)
     best = min(enough, key=lambda p: p.seconds)
-    rivals = [p for p in enough if _kind(p.settings) != _kind(best.settings)]
+    rivals = [p for p in enough if p.settings.kind != best.settings.kind]
     rival = min(rivals, key=lambda p: p.seconds, default=None)
     return Selection(best.settings, best.seconds, best.psnr, rival)
 
@@ -368,12 +368,6 @@ def _selection(family: Settings, samples: int, costs: Costs, curve: Curve) -> Se
 def _merit(selected: Selection) -> tuple[float, float]:
     """Least error first; of equals the faster."""
     return selected.psnr, -selected.seconds
-
-
-def _kind(settings: Settings) -> str:
-    if settings.is_enlarged:
-        return "super-resolution"
-    return "Cycles only" if settings.is_cycles_only else "full size"
 
 
 _FAMILY = ("mode", "denoising", "preset", "guide_samples")

@@ -114,8 +114,7 @@ def render_request(
     `denoiser` a mode of Cycles', for `plain` and for the low-resolution picture;
     `time_budget` in seconds and `quality` in dB are goals; `others` are fields of
     Settings, Machine and Request by their names. Raises UsageError on what is out of
-    range, TypeError on
-    unknown names.
+    range, TypeError on unknown names.
     """
     if scale not in SCALES:
         raise UsageError(f"scale {scale} is not one of {', '.join(map(str, SCALES))}")

@@ -157,6 +157,13 @@ class Settings:
         return Settings(self.mode, None, self.denoising, "", 0)
 
     @property
+    def kind(self) -> str:
+        """What makes the picture, in words."""
+        if self.is_enlarged:
+            return "super-resolution"
+        return "Cycles only" if self.is_cycles_only else "full size"
+
+    @property
     def label(self) -> str:
         """In a few words, as the panel and the command print it."""
         samples = "1 sample" if self.samples == 1 else f"{self.samples} samples"

@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from xrds_core.arrays import Array
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.temporal.accumulate import Accumulated
@@ -22,7 +20,6 @@ from ..planning.request import Request
 from ..planning.settings import Denoising, Settings
 from .methods import Method, Report
 from .sampling import OnSampled, Sampled, sample_frame
-from .stopping import quick
 
 if TYPE_CHECKING:
     from xrds_core.denoising import Denoised
@@ -125,11 +122,11 @@ class FullSize(Method):
         )
 
     def stopped(self, own: Sampled) -> dict[str, Array]:
-        alone = FullSize(quick(self.request))
-        pictures = {
-            view: alone.finish(_only(own, view), (), view) for view in own.views
+        fast = self.request.with_settings(denoising=Denoising.XRDS_FAST)
+        alone = FullSize(fast)
+        return {
+            view: alone.finish(_only(own, view), (), view).pixels for view in own.views
         }
-        return {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
 
 
 def _only(sampled: Sampled, view: str) -> Sampled:

@@ -13,8 +13,6 @@ from dataclasses import dataclass, field
 from itertools import takewhile
 from typing import Any
 
-import numpy as np
-
 from xrds_core.arrays import Array
 from xrds_core.errors import Cancelled
 
@@ -176,9 +174,9 @@ def _finish(
         _leave_stopped(engine, layer_name, method, own)
         raise
     started = time.perf_counter()
-    combined = {v: np.dstack((p.radiance, p.alpha)) for v, p in pictures.items()}
-    _write(engine, layer_name, method, own, combined)
     picture = joined(pictures, own.seconds)
+    combined = picture.views or dict.fromkeys(pictures, picture.pixels)
+    _write(engine, layer_name, method, own, combined)
     picture.seconds["write"] = time.perf_counter() - started
     return picture
 

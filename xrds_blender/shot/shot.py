@@ -46,9 +46,7 @@ def render_shot(
     radius = request.settings.temporal_radius
     cached = cache.beside(frames, radius) if cache else []
     there = tuple(sorted({*frames, *cached}))
-    shot = Shot(
-        todo, request.settings.temporal_radius, cuts(scene, there), others=there
-    )
+    shot = Shot(todo, radius, cuts(scene, there), others=there)
 
     def load(number: int) -> Sampled | None:
         if cache and (found := cache.read(number)):

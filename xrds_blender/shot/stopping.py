@@ -61,8 +61,3 @@ def finish_beauties(
         size = result.resolution_y, result.resolution_x
         pictures = enlarged(beauties, request.settings.scale, size)
         session.write_combined(engine, layer_name, pictures)
-
-
-def quick(request: Request) -> Request:
-    """The request with the quickest denoiser, for somebody who waits."""
-    return request.with_settings(denoising=Denoising.XRDS_FAST)
