@@ -27,6 +27,8 @@ from .pass_names import (
 
 GEOMETRY = ((FIRST_HIT, "Z"), (MOTION, "XYZW"))
 """Passes for reprojection into another frame."""
+PATH_LENGTH = (DEPTH, "Z")
+"""Beside the first hit's depth: to what mirrors and glass show."""
 LATE_DEPTH = (DEPTH, "Z")
 """In the place of the first hit's depth where a sequence is continued: that one is
 written by its first sample alone."""
@@ -43,7 +45,8 @@ class Samples:
     `picture` (H, W, 4) is radiance and alpha; `albedo` and `normal` are (H, W, 3),
     normals in camera space. `depth` (H, W) of the first hit, in the scene's units, and
     `vector` (H, W, 4), motion in pixels, are there when asked for; so are `counts`
-    (H, W), the samples that a pixel took as a share of the most that it could.
+    (H, W), the samples that a pixel took as a share of the most that it could, and
+    `path_length` (H, W) as in `Frame`.
     """
 
     picture: Array
@@ -52,6 +55,7 @@ class Samples:
     depth: Array | None = None
     vector: Array | None = None
     counts: Array | None = None
+    path_length: Array | None = None
 
 
 def sample_layer(
@@ -112,15 +116,20 @@ def read_samples(read: Reader, wanted: Collection[str]) -> Samples:
     counts = read(SAMPLE_COUNT) if SAMPLE_COUNT in wanted else None
     if counts is not None:  # all 0 where this Blender's pass has another name
         counts = np.ascontiguousarray(counts[..., 0]) if counts.any() else None
-    return Samples(*(np.ascontiguousarray(x) for x in passes), depth, vector, counts)
+    path = read(DEPTH) if {DEPTH, FIRST_HIT} <= {*wanted} else None
+    if path is not None:
+        path = np.ascontiguousarray(path[..., 0])
+    own = (np.ascontiguousarray(x) for x in passes)
+    return Samples(*own, depth, vector, counts, path)
 
 
 def read_geometry(read: Reader, wanted: Collection[str]) -> tuple[Array, Array | None]:
     """Depth (H, W) and vectors (H, W, 4) where they are among `wanted`."""
-    depth = read(DEPTH if DEPTH in wanted else FIRST_HIT)
+    is_late = DEPTH in wanted and FIRST_HIT not in wanted
+    depth = read(DEPTH if is_late else FIRST_HIT)
     assert depth is not None
     depth = np.ascontiguousarray(depth[..., 0])
-    if DEPTH in wanted:
+    if is_late:
         depth = np.where(depth > 0.0, depth, np.float32(np.inf))  # 0 is the sky
     vector = read(MOTION) if MOTION in wanted else None
     return depth, None if vector is None else np.ascontiguousarray(vector)

@@ -56,7 +56,8 @@ def shot_memory(width: int, height: int, radius: int, scale: int = 1) -> int:
         return 0
     frames = 2 * radius + 1
     low = low_size(width, height, scale)
-    window = bytes_needed(*low, frames, alpha=True, vector=True)
+    images = scale == 1
+    window = bytes_needed(*low, frames, alpha=True, vector=True, images=images)
     if scale > 1:
         window += bytes_needed(
             width, height, frames, alpha=True, vector=True, light=False

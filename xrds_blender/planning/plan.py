@@ -290,7 +290,17 @@ def neighbours(
         reason = "nothing moves: frames differ in noise alone, and every sample counts"
         return (Decision(name, value, reason), *_cuts(cuts))
     reason = "pixels are found again by depth, cameras and motion, if the light agrees"
-    return (Decision(name, value, reason), *_in_part(scene), *_cuts(cuts))
+    decisions = Decision(name, value, reason), _images(facts), *_in_part(scene)
+    return (*decisions, *_cuts(cuts))
+
+
+def _images(facts: Facts) -> Decision:
+    name = "images"
+    if facts.scene.smooth:
+        reason = "what mirrors and glass show is found by where its image lies"
+        return Decision(name, "followed", reason)
+    reason = "nothing is as smooth as a mirror or clear glass"
+    return Decision(name, "skipped", reason)
 
 
 def _in_part(scene: SceneFacts) -> tuple[Decision, ...]:
@@ -306,10 +316,6 @@ def _in_part(scene: SceneFacts) -> tuple[Decision, ...]:
             "volumes have no depth: they are reused with the surface behind them",
         ),
         "hair": (scene.hair, "hair, finer than a pixel, is found again by chance"),
-        "mirrors and glass": (
-            scene.smooth,
-            "what mirrors and glass show moves otherwise than they do",
-        ),
     }
     found = {what: reason for what, (there, reason) in causes.items() if there}
     if not found:

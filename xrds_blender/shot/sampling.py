@@ -14,7 +14,14 @@ from xrds_core.temporal.sample_subsets import SampleSubset, consecutive_subset
 
 from ..cycles import session
 from ..cycles.halves import sample_halves, sample_motion
-from ..cycles.samples import COUNTS, GEOMETRY, LATE_DEPTH, Samples, sample_layer
+from ..cycles.samples import (
+    COUNTS,
+    GEOMETRY,
+    LATE_DEPTH,
+    PATH_LENGTH,
+    Samples,
+    sample_layer,
+)
 from ..cycles.settings import has_subsets
 from ..cycles.view import cameras_of, can_track
 from ..frame import denoisers, stages
@@ -140,18 +147,23 @@ def sampling_of(
     is_even = _is_even(scene, request)
     if not can_continue(scene, request):
         place = None
+    facts = scene_facts(depsgraph)
     geometry = [*_geometry(depsgraph), *([] if is_even else [COUNTS])]
     count = request.settings.samples or session.samples_of(depsgraph)
     blurred = scene.render.use_motion_blur
+    if place is not None:
+        geometry[0] = LATE_DEPTH
+    elif facts.smooth:
+        geometry.append(PATH_LENGTH)
     return Sampling(
         number=scene.frame_current,
         cameras=cameras,
         count=count,
         seed=scene.cycles.seed if request.seed is None else request.seed,
-        geometry=geometry if place is None else [LATE_DEPTH, *geometry[1:]],
+        geometry=geometry,
         place=place,
         radius=request.settings.temporal_radius,
-        still=not scene_facts(depsgraph).moving,
+        still=not facts.moving,
         has_halves=_has_halves(scene, request, count),
         needs_motion=blurred and shapes_move(depsgraph),
     )
@@ -301,6 +313,7 @@ def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
         samples=how.count if counts is None else max(float(counts.mean()), _FEWEST),
         still=how.still,
         counts=counts,
+        path_length=samples.path_length,
     )
 
 

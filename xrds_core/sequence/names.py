@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
 CAMERA_NORMAL = "Denoising Normal"
+PATH_LENGTH = "Denoising Depth"
 NOISE = "XRDS Noise"  # of the samples, as XRDS estimated it before storing them
 # Names of passes in the order in which they are tried, case-insensitive.
 _USUAL = {
@@ -22,7 +23,7 @@ _USUAL = {
     "albedo": ("Denoising Albedo", "albedo", "denoise_albedo", "diffuse_albedo"),
     "normal": (CAMERA_NORMAL, "Normal", "normals", "denoise_normal", "N", "Nn"),
     "position": ("Position", "P", "Pworld"),
-    "depth": ("Depth", "Z", "Denoising Depth"),
+    "depth": ("Depth", "Z", PATH_LENGTH),
     "vector": ("Vector", "motion", "motionvector", "forward"),
 }
 _SINGLE = ("Z", "V", "R", "Y", "z", "r")
@@ -60,6 +61,7 @@ class Found:
     normal: list[str]
     position: list[str]
     depth: list[str]
+    path_length: list[str]
     vector: list[str]
     noise: list[str]
     picture: list[str]
@@ -87,6 +89,7 @@ def find(channels: Channels, names: PassNames) -> Found:
         normal=_needed(channels, names, "normal"),
         position=_channels(channels, names, "position"),
         depth=_depth(channels, names),
+        path_length=_path_length(channels, names),
         vector=_channels(channels, names, "vector", _MOTION),
         noise=_noise(channels),
         picture=channels.of(target) or ["R", "G", "B"],
@@ -147,6 +150,13 @@ def _depth(channels: Channels, names: PassNames) -> list[str]:
     usual = [x.lower() for x in wanted]
     plain = [name for name in channels.names if name.lower() in usual]
     return plain[:1] or _channels(channels, names, "depth", _SINGLE)
+
+
+def _path_length(channels: Channels, names: PassNames) -> list[str]:
+    """Cycles' Denoising Depth, where it is not the only depth."""
+    found = channels.find(PATH_LENGTH, _SINGLE)
+    path = [] if found is None else channels.of(found, _SINGLE)
+    return [] if path == _depth(channels, names) else path
 
 
 def _needed(channels: Channels, names: PassNames, kind: str) -> list[str]:

@@ -106,6 +106,7 @@ def read_frame(
         samples=_samples(part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
         vector=_vector(file, found, reading) if reusable else None,
+        path_length=file.plane(found.path_length[0]) if found.path_length else None,
         still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
     )
     if reading.halves is not None:

@@ -1,7 +1,7 @@
 """Frames stored on disk before denoising, in the format that `reading` reads.
 
 One OpenEXR file with Cycles' pass names holds what accumulation needs: light, guides
-and motion in half floats, as a window stores them in memory, and depth in full. So a
+and motion in half floats, as a window stores them in memory, and depths in full. So a
 frame that was read is reused and finished as if it had just been rendered.
 """
 
@@ -16,7 +16,7 @@ from .. import exr
 from ..exr.openexr_io import Part
 from ..temporal.frame import LARGEST_HALF, noise_in
 from .cameras import to_header
-from .names import CAMERA_NORMAL, NOISE, NOISY
+from .names import CAMERA_NORMAL, NOISE, NOISY, PATH_LENGTH
 from .reading import KEY, NAME, RADIUS, SAMPLES, STILL
 
 if TYPE_CHECKING:
@@ -82,7 +82,10 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
         for name, letters, array in passes
         for i, letter in enumerate(letters)
     }
-    return channels | {f"{layer}Depth.Z": frame.depth.astype(np.float32)}
+    channels[f"{layer}Depth.Z"] = frame.depth.astype(np.float32)
+    if frame.path_length is not None:
+        channels[f"{layer}{PATH_LENGTH}.Z"] = frame.path_length.astype(np.float32)
+    return channels
 
 
 def _noise(frame: Frame) -> Array:

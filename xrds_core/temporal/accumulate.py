@@ -13,11 +13,13 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
 from ..errors import PictureError
+from .candidates import Images, find_images
 from .coarse_rejection import pixel_weights, tile_weights
 from .local_filters import extreme
 from .motion import grid, inverse_depth_range, pair, places
@@ -31,11 +33,13 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..arrays import Array
-    from .frame import Camera, Matrix, Stored
+    from .frame import Stored
     from .motion import Pair
 
     Mask = NDArray[np.bool_]
 
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 # Standard deviation, in pixels, of the weight by distance where frames have one sample
 # per pixel; it falls with their cube root. Noise calls for a wide one, texture for a
 # narrow one: 0.7 and 0.6 were best at 1 and 2 samples, 0.2 to 0.3 at 16.
@@ -85,11 +89,14 @@ def accumulate(
     near, far = _neighbours(target, others, movement or Movement())
     usual = light_for_albedo(target) if others and target.has_light else 0.0
     height, width = target.shape
+    reprojected = [x for x in (*near, *far) if isinstance(x, _Reprojected)]
+    pairs = [x.pair for x in reprojected if x.is_reused]
+    images = find_images(target, pairs, partial(_in_threads, threads=threads))
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
     samples = np.empty(height * width, np.float32)
 
     def work(first: int) -> float:
-        block = _Block(target, slice(first, min(first + _ROWS, height)), usual)
+        block = _Block(target, slice(first, min(first + _ROWS, height)), usual, images)
         groups = [_block_sums(block, group) for group in (near, far) if group]
         for group in groups:
             group.finish()
@@ -142,7 +149,9 @@ class _Block:
     accumulated from several frames is wider than that of one.
     """
 
-    def __init__(self, target: Stored, rows: slice, usual: float) -> None:
+    def __init__(
+        self, target: Stored, rows: slice, usual: float, images: Images | None
+    ) -> None:
         height, width = target.shape
         first, last = max(rows.start - MARGIN, 0), min(rows.stop + MARGIN, height)
         self.rows = slice(first, last)
@@ -151,6 +160,7 @@ class _Block:
         start = self.pixels.start - first * width
         self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
         self.own = _floats(target.picture[self.wide.pixels])
+        self.images = None if images is None else images.of(self.wide)
         self.void = self._void()
         self.known = np.ones(len(self.own), bool)
         if target.invalid is not None:
@@ -280,17 +290,23 @@ class _Reprojected:
                 f"frame {other.number} and frame {target.number} hold different passes:"
                 " give radiance and alpha for all frames of a shot or for none"
             )
-        self._pair = pair
         self._tiles = tile_weights(pair)
-        self._turn = _turn(target.camera, other.camera)
+        self.pair, self._turn = pair, pair.turn
         self._fall = np.float32(-0.5 * target.samples ** (2 / 3) / _SOFTNESS**2)
+
+    @property
+    def is_reused(self) -> bool:
+        """Whether any of its tiles is."""
+        return bool(self._tiles.any())
 
     def add(self, block: _Block, sums: _Sums) -> None:
         """Add its samples that the pixels of a block reuse."""
-        other = self._pair.there
-        if not self._tiles.any():
+        other = self.pair.there
+        if not self.is_reused:
             return
-        found = places(self._pair, block.wide)
+        found = places(self.pair, block.wide)
+        if block.images is not None:
+            found.put(block.images.at, block.images.places(self.pair))
         if other.invalid is not None:
             found.seen[...] &= ~other.invalid.take(found.pixel)
         values = _floats(other.picture.take(found.pixel, axis=0))
@@ -298,7 +314,7 @@ class _Reprojected:
             normal = slice(6, 9) if other.has_light else slice(3, 6)
             values[:, normal] = values[:, normal] @ self._turn.T
         weight = found.seen.astype(np.float32)
-        weight *= pixel_weights(self._tiles, self._pair.here.shape, block.rows).ravel()
+        weight *= pixel_weights(self._tiles, self.pair.here.shape, block.rows).ravel()
         weight *= _samples(other, found.pixel, len(weight))
         reused = weight.copy()
         weight *= np.exp(found.apart * self._fall)
@@ -356,23 +372,6 @@ def _unpacked(
     )
 
 
-def _turn(here: Camera, there: Camera) -> Array | None:
-    """Return (3, 3): normals of `there` in the axes of `here`; None if identical."""
-    turn = here.view[:3, :3] @ np.linalg.inv(there.view[:3, :3])
-    turn = _axes(here) @ turn @ _axes(there).T
-    return None if np.allclose(turn, np.eye(3), atol=1e-7) else turn.astype(np.float32)
-
-
-def _axes(camera: Camera) -> Matrix:
-    """Return (3, 3): from the axes of view matrices to those of Cycles' normals.
-
-    In the latter Z points away from the viewer; in panoramas X does, and Z upwards.
-    """
-    if camera.sphere is None:
-        return np.diag([1.0, 1.0, -1.0])
-    return np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-
-
 def _floats(x: NDArray[Any]) -> Array:
     """Return `x` in float32; half floats from a table, in half of NumPy's time."""
     if x.dtype == np.float16:
@@ -381,8 +380,8 @@ def _floats(x: NDArray[Any]) -> Array:
 
 
 def _in_threads(
-    work: Callable[[int], float], items: Sequence[int], threads: int | None
-) -> list[float]:
+    work: Callable[[Item], Result], items: Sequence[Item], threads: int | None
+) -> list[Result]:
     """Run `work` on every item; NumPy releases the GIL in all that takes long here."""
     count = min(threads or os.cpu_count() or 1, len(items))
     with ThreadPoolExecutor(max(count, 1)) as pool:

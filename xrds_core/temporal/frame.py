@@ -31,8 +31,12 @@ SKY_DEPTH = 1e9
 LARGEST_HALF = 65504.0
 # Relative difference in inverse depth between adjacent pixels of one surface.
 _SURFACE = 0.02
+# Relative to the surface's depth: how far behind it an image lies at least. Less is
+# the slope of a surface, or the edge of something.
+_BEHIND = 0.04
 _PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
 _OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "counts": ()}
+_OPTIONAL |= {"path_length": ()}
 
 
 @dataclass(frozen=True)
@@ -82,6 +86,17 @@ class Camera:
     def orthographic(self) -> bool:
         return self.sphere is None and bool(self.project[3, 3] != 0.0)
 
+    def depth_per_length(self, shape: tuple[int, int]) -> Array:
+        """Return depth per unit of length along the ray of each pixel (H, W)."""
+        if self.sphere is not None or self.orthographic:
+            return np.ones(shape, np.float32)
+        (width, height), (left, top), p = self.size, self.window, self.project
+        x = (np.arange(shape[1]) + left + 0.5) / width * 2 - 1
+        y = 1 - (np.arange(shape[0]) + top + 0.5) / height * 2
+        across, down = (x + p[0, 2]) / p[0, 0], (y + p[1, 2]) / p[1, 1]
+        square = 1.0 + np.square(across) + np.square(down)[:, None]
+        return np.asarray(1.0 / np.sqrt(square), np.float32)
+
     def depth(self, position: Array) -> Array:
         """Return the depth (H, W) of points in world space (H, W, 3).
 
@@ -118,7 +133,8 @@ class Frame:
     one a frame later, in pixels, y upwards; without it all surfaces are assumed to
     stand still. `counts` (H, W): samples of each pixel, where they differ; `samples` is
     their mean. `halves` are the half buffers, from which noise is estimated better than
-    from the surrounding pixels.
+    from the surrounding pixels. `path_length` (H, W): the way from the camera, through
+    mirrors and glass, to what albedo and normal show (Cycles' `Denoising Depth`).
     """
 
     number: int
@@ -133,6 +149,7 @@ class Frame:
     still: bool = False
     counts: Array | None = None
     halves: Halves | None = None
+    path_length: Array | None = None
 
     def __post_init__(self) -> None:
         for name, channels in (_PASSES | _OPTIONAL).items():
@@ -165,7 +182,8 @@ class Stored:
     unknown. `invalid` (H W) is the validity mask, negated: pixels that held NaN or
     infinities and are 0 now; None if there were none. `counts` (H W): samples of each
     pixel where they differ. `noise` is that of `noise_in`, None in a frame of guides
-    alone.
+    alone. `image` (H W) is as `inverse_depth`, of the image that a mirror or glass
+    shows, NaN where there is none; None if there is none anywhere.
     """
 
     number: int
@@ -179,6 +197,7 @@ class Stored:
     still: bool = False
     counts: NDArray[Any] | None = None
     noise: Noise | None = None
+    image: Array | None = None
 
     @property
     def has_light(self) -> bool:
@@ -237,6 +256,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         still=frame.still,
         counts=None if frame.counts is None else _counts(frame.counts),
         noise=None if noise is None else noise.without(invalid),
+        image=_image(frame),
     )
 
 
@@ -269,6 +289,21 @@ def _inverse_depth(frame: Frame) -> Array:
         )
     inverse_depth[sky] = 0.0
     return inverse_depth
+
+
+def _image(frame: Frame) -> Array | None:
+    """Return `Stored.image`: where paths end well behind the surface they start at."""
+    if frame.path_length is None:
+        return None
+    depth = frame.depth
+    end = frame.path_length * frame.camera.depth_per_length(frame.shape)
+    with np.errstate(invalid="ignore"):
+        behind = end > extreme(depth, np.fmax) * np.float32(1.0 + _BEHIND)
+        behind &= (depth > 0.0) & (end < SKY_DEPTH)
+    if not behind.any():
+        return None
+    image = np.where(behind, end, np.float32(np.nan)).ravel()
+    return image if frame.camera.orthographic else np.float32(1.0) / image
 
 
 def _half(vector: Array | None) -> NDArray[Any] | None:

@@ -16,6 +16,7 @@ their antialiasing.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -76,6 +77,11 @@ class Places:
     apart: Array
     seen: NDArray[np.bool_]
 
+    def put(self, at: NDArray[np.intp] | slice, other: Places) -> None:
+        """Replace those `at` some indices by others."""
+        self.pixel[at], self.apart[at] = other.pixel, other.apart
+        self.seen[at] = other.seen
+
 
 @dataclass(frozen=True)
 class ObjectMotion:
@@ -105,6 +111,24 @@ class Pair:
     back: Reprojection
     extent: tuple[Array, Array]
     object_motion: ObjectMotion | None = None
+
+    @cached_property
+    def turn(self) -> Array | None:
+        """(3, 3): normals of `there` in the axes of `here`; None if identical."""
+        here, there = self.here.camera, self.there.camera
+        turn = here.view[:3, :3] @ np.linalg.inv(there.view[:3, :3])
+        turn = _axes(here) @ turn @ _axes(there).T
+        return None if np.allclose(turn, np.eye(3), atol=1e-7) else turn.astype("f4")
+
+
+def _axes(camera: Camera) -> Matrix:
+    """Return (3, 3): from the axes of view matrices to those of Cycles' normals.
+
+    In the latter Z points away from the viewer; in panoramas X does, and Z upwards.
+    """
+    if camera.sphere is None:
+        return np.diag([1.0, 1.0, -1.0])
+    return np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def world_of(camera: Camera) -> Matrix:
@@ -324,9 +348,7 @@ def _with_object_motion(found: Places, pair: Pair, grid: Grid) -> Places:
     )
     moved = nearest(object_motion.x[part], object_motion.y[part], pair.there.shape)
     inside = object_motion.pixels[part] - grid.pixels.start
-    found.pixel[inside] = moved.pixel
-    found.apart[inside] = moved.apart
-    found.seen[inside] = moved.seen
+    found.put(inside, moved)
     return found
 
 

@@ -21,8 +21,9 @@ if TYPE_CHECKING:
 Loaded = TypeVar("Loaded")
 
 # Per pixel: albedo and normal, in half floats, and inverse depth; then radiance and its
-# noise, a Vector pass and an alpha, in half floats.
+# noise, a Vector pass and an alpha, in half floats, and the inverse depth of images.
 _BYTES = 2 * 3 * 2 + 4
+_IMAGE_BYTES = 4
 _LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES = 12, 8, 2
 
 
@@ -157,11 +158,12 @@ def bytes_needed(
     alpha: bool = False,
     vector: bool = False,
     light: bool = True,
+    images: bool = False,
 ) -> int:
     """Return the bytes that `frames` frames of half floats take in a window.
 
     Guides alone have no `light`.
     """
     each = _BYTES + _LIGHT_BYTES * light
-    each += _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha
+    each += _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha + _IMAGE_BYTES * images
     return width * height * each * frames

@@ -81,7 +81,8 @@ def test_the_plan_of_a_shot_names_what_is_reused_less() -> None:
         assert all(each.reason for each in found)
         return {each.decision: each.value for each in found}
 
-    assert lent() == {"accumulation": "3 frames to each side"}
+    assert lent() == {"accumulation": "3 frames to each side", "images": "skipped"}
+    assert lent(smooth=True)["images"] == "followed"
     assert lent(motion_blur=True, volumes=True)["left out by pixel"] == (
         "motion blur, volumes"
     )

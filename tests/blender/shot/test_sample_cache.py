@@ -120,6 +120,7 @@ def test_parts_of_a_shot_make_the_whole(
         lambda scene: setattr(scene.camera.data, "type", "ORTHO"),
         lambda scene: around(scene.camera.data, "EQUIRECTANGULAR"),
         lambda scene: setattr(scene.render, "use_motion_blur", True),
+        lambda scene: chrome(scene),
     ],
     ids=[
         "still camera",
@@ -128,6 +129,7 @@ def test_parts_of_a_shot_make_the_whole(
         "orthographic",
         "panorama",
         "motion blur",
+        "mirrors",
     ],
 )
 def test_whatever_the_scene(blend: Path, change: Callable[[Any], object]) -> None:
@@ -138,6 +140,32 @@ def test_whatever_the_scene(blend: Path, change: Callable[[Any], object]) -> Non
         keep(blend, [number])
     denoise(blend, "denoised")
     assert not different(blend.parent / "whole", blend.parent / "denoised")
+
+
+def chrome(scene: Any, roughness: float = 0.0) -> None:
+    """Make all there is of metal, a mirror if it is not rough."""
+    material = bpy.data.materials.new("metal")
+    material.use_nodes = True
+    shader = material.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Metallic"].default_value = 1.0
+    shader.inputs["Roughness"].default_value = roughness
+    for each in scene.objects:
+        if each.type == "MESH":
+            each.data.materials.clear()
+            each.data.materials.append(material)
+
+
+def test_paths_are_rendered_where_something_mirrors(blend: Path) -> None:
+    chrome(bpy.context.scene, roughness=0.5)
+    saved(blend.parent)
+    keep(blend, [1])
+    plain = exr.File(blend.parent / "samples" / "0001.exr").names.names
+    assert not [name for name in plain if "Denoising Depth" in name]
+    chrome(bpy.context.scene)
+    saved(blend.parent)
+    keep(blend, [1])
+    names = exr.File(blend.parent / "samples" / "0001.exr").names.names
+    assert [name for name in names if name.endswith("Denoising Depth.Z")]
 
 
 def around(camera: Any, kind: str) -> None:
@@ -178,12 +206,13 @@ def test_damaged_samples_are_rendered_again(blend: Path) -> None:
 
 
 def test_what_a_kept_file_holds(blend: Path) -> None:
-    """Cycles' names, light in half floats, depth in full, OpenEXR's own camera."""
+    """Cycles' names, light in half floats, depths in full, OpenEXR's own camera."""
     keep(blend, [7])
     file = exr.File(blend.parent / "samples" / "0007.exr")
     kinds = {name: file.pixels(name).dtype.name for name in file.names.names}
     layer = bpy.context.scene.view_layers[0].name
-    assert kinds.pop(f"{layer}.Depth.Z") == "float32"
+    for depth in ("Depth", "Denoising Depth"):
+        assert kinds.pop(f"{layer}.{depth}.Z") == "float32"
     assert set(kinds.values()) == {"float16"}
     passes = {name.rpartition(".")[0] for name in kinds}
     names = ("Noisy Image", "Denoising Albedo", "Denoising Normal", "Vector")

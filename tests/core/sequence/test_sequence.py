@@ -173,6 +173,19 @@ def test_usual_names_are_known(tmp_path: Path, names: dict[str, str]) -> None:
     np.testing.assert_allclose(told.inverse_depth, expected.inverse_depth, rtol=1e-5)
 
 
+def test_cycles_denoising_depth_is_the_path_through_mirrors(tmp_path: Path) -> None:
+    """Beside a depth; alone it is the depth, as it always was."""
+    own = replace(frame(1), path_length=np.full((48, 64), 30.0, np.float32))
+    name = {"path_length": "ViewLayer.Denoising Depth.Z"}
+    both = read_frame(write(tmp_path, own, CYCLES | name), 1, Reading()).stored
+    np.testing.assert_array_equal(both.image, store(own).image)
+    np.testing.assert_array_equal(both.inverse_depth, store(own).inverse_depth)
+    assert np.isfinite(both.image).any()
+    alone = {k: v for k, v in CYCLES.items() if k != "depth"}
+    alone |= {"depth": name["path_length"]}
+    assert read_frame(write(tmp_path, own, alone), 1, Reading()).stored.image is None
+
+
 def test_other_names_can_be_told(tmp_path: Path) -> None:
     names = {"radiance": "light.RGB", "albedo": "a.RGB", "normal": "n.RGB"}
     path = write(tmp_path, frame(1), names | {"depth": "far.R"})

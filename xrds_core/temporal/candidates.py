@@ -1,0 +1,226 @@
+"""Candidates: where the light of pixels that show an image was in other frames.
+
+A plane mirror shows things at the depth of their image behind it, a pane what is beyond
+it; a curved mirror shows them somewhere between its surface and the length of the path.
+And an image may move by itself: in curved mirrors and thick glass, or with what it
+shows. Each candidate is reprojected into all neighbours, and the one whose guides match
+best is taken (a plane sweep, Collins 1996), for a lattice of spots.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .local_filters import box
+from .motion import Grid, Places, nearest, reproject
+from .noise import guides_of
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable, Sequence
+
+    from numpy.typing import NDArray
+
+    from ..arrays import Array
+    from .frame import Stored
+    from .motion import Pair
+
+    Each = Callable[[Callable[[Pair], Array], Sequence[Pair]], Iterable[Array]]
+
+# Depths, from the surface (0) to the length of the path (1), which is a little too
+# short or too long, as its parts are weighted by what the mirror reflects.
+_SHARES = (0.06, 0.12, 0.25, 0.5, 0.75, 0.9, 1.0, 1.1)
+# Pixels per frame of an image's own motion, from coarse to fine.
+_STEPS = (1.0, 0.5, 0.25)
+# Distance between spots along each axis, in small and large pictures.
+_STRIDES, _LARGE = (2, 4), 1_000_000
+_AREA = 5  # spots across, over which guides are compared
+# An image is believed where it matches better than the surface by this factor.
+_BETTER = 0.85
+_SEEN = 0.5  # of a candidate's spots, in neighbours
+_TINY = np.float32(1e-9)
+
+
+@dataclass(frozen=True)
+class Images:
+    """The images that the pixels of a frame show.
+
+    `lattice` (h, w, 3) holds for every `stride` pixels where the image is, from the
+    surface (0) to the end of the path (1), NaN for a surface, and its own motion, x and
+    y in pixels per frame.
+    """
+
+    frame: Stored
+    stride: int
+    lattice: Array
+
+    def of(self, grid: Grid) -> ImagePlaces:
+        """The images among the pixels of whole rows."""
+        assert self.frame.image is not None
+        assert isinstance(grid.pixels, slice)
+        at = np.flatnonzero(~np.isnan(self.frame.image[grid.pixels]))
+        row, column = np.divmod(at + grid.pixels.start, self.frame.shape[1])
+        found = self.lattice[row // self.stride, column // self.stride]
+        shows = ~np.isnan(found[:, 0])
+        at, found = at[shows], found[shows]
+        spots = Grid(at + grid.pixels.start, grid.x[at], grid.y[at])
+        return ImagePlaces(self.frame, spots, at, found)
+
+
+class ImagePlaces:
+    """Images at some pixels: `at`, counted from the first of their rows."""
+
+    def __init__(
+        self, frame: Stored, spots: Grid, at: NDArray[np.intp], images: Array
+    ) -> None:
+        self.at, self._spots, self._motion = at, spots, images[:, 1:]
+        self._depth = _depth_of(frame, spots, images[:, 0])
+
+    def places(self, pair: Pair) -> Places:
+        """Return where they were in the other frame."""
+        return _places(pair, self._spots, self._depth, self._motion)
+
+
+def find_images(
+    target: Stored,
+    pairs: Sequence[Pair],
+    each: Each = map,
+) -> Images | None:
+    """Return the images that `target` shows; None where it shows none.
+
+    `pairs` are the target and its neighbours; `each` is `map`, or one that runs in
+    threads.
+    """
+    if target.image is None or not pairs:
+        return None
+    height, width = target.shape
+    stride = _STRIDES[height * width >= _LARGE]
+    sweep = _Sweep(target, pairs, stride, each)
+    lattice = sweep.images()
+    return None if np.isnan(lattice[..., 0]).all() else Images(target, stride, lattice)
+
+
+class _Sweep:
+    """Tries candidates at the spots of a lattice, and keeps the best of each."""
+
+    def __init__(
+        self, target: Stored, pairs: Sequence[Pair], stride: int, each: Each
+    ) -> None:
+        assert target.image is not None
+        self._target, self._each = target, each
+        self._pairs = pairs
+        height, width = target.shape
+        half = stride // 2
+        self._shape = -(-height // stride), -(-width // stride)
+        rows = np.minimum(np.arange(self._shape[0]) * stride + half, height - 1)
+        columns = np.minimum(np.arange(self._shape[1]) * stride + half, width - 1)
+        pixels = (rows[:, None] * width + columns).ravel()
+        self._at = np.flatnonzero(~np.isnan(target.image[pixels]))
+        pixels = pixels[self._at]
+        row, column = np.divmod(pixels, width)
+        centre = np.float32(0.5)
+        x, y = column.astype(np.float32) + centre, row.astype(np.float32) + centre
+        self._spots, self._own = Grid(pixels, x, y), _guides(target, pixels)
+        self._inside = self._mean(np.ones(len(pixels), np.float32))
+
+    def images(self) -> Array:
+        """Return `Images.lattice`."""
+        surface = np.zeros((len(self._at), 3), np.float32)
+        limit = self._cost(surface, self._pairs) * np.float32(_BETTER)
+        images = _Best(surface, limit)
+        for share in _SHARES:
+            self._try(images, surface + np.float32([share, 0.0, 0.0]), self._pairs)
+        for step in _STEPS:
+            self._around(images, step, self._pairs)
+        lattice = np.full((self._shape[0] * self._shape[1], 3), np.nan, np.float32)
+        found = images.cost < limit
+        lattice[self._at[found]] = images.candidates[found]
+        return _filled(lattice.reshape(*self._shape, 3))
+
+    def _around(self, images: _Best, step: float, pairs: Sequence[Pair]) -> None:
+        centre = images.candidates.copy()
+        for x in (-step, 0.0, step):
+            for y in (-step, 0.0, step):
+                if x or y:
+                    self._try(images, centre + np.float32([0.0, x, y]), pairs)
+
+    def _try(self, images: _Best, candidates: Array, pairs: Sequence[Pair]) -> None:
+        images.offer(candidates, self._cost(candidates, pairs))
+
+    def _cost(self, candidate: Array, pairs: Sequence[Pair]) -> Array:
+        """Return the squared difference of guides (n,), infinite where not seen."""
+        depth = _depth_of(self._target, self._spots, candidate[:, 0])
+
+        def compare(pair: Pair) -> Array:
+            found = _places(pair, self._spots, depth, candidate[:, 1:])
+            apart = _guides(pair.there, found.pixel, pair.turn) - self._own
+            seen = found.seen.astype(np.float32)
+            return np.stack([np.einsum("ij,ij->i", apart, apart) * seen, seen])
+
+        error, seen = np.sum(list(self._each(compare, pairs)), axis=0)
+        error, seen = self._mean(error), self._mean(seen)
+        error /= np.maximum(seen, _TINY)
+        known = seen >= len(pairs) * np.float32(_SEEN) * self._inside
+        return np.asarray(np.where(known, error, np.float32(np.inf)))
+
+    def _mean(self, x: Array) -> Array:
+        """Return the mean over the spots around each (n,), 0 outside."""
+        plane = np.zeros(self._shape[0] * self._shape[1], np.float32)
+        plane[self._at] = x
+        return box(plane.reshape(self._shape), _AREA).ravel()[self._at]
+
+
+class _Best:
+    """The best candidates (n, 3) so far, and their cost (n,)."""
+
+    def __init__(self, candidates: Array, cost: Array) -> None:
+        self.candidates, self.cost = candidates.copy(), cost.copy()
+
+    def offer(self, candidates: Array, cost: Array) -> None:
+        """Take those that cost less."""
+        better = cost < self.cost
+        self.candidates[better] = candidates[better]
+        self.cost[better] = cost[better]
+
+
+def _filled(lattice: Array) -> Array:
+    """Return a lattice whose holes are filled from the spots beside them.
+
+    Spots at the edge of a mirror may lie just outside of it.
+    """
+    wide = np.pad(lattice, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
+    result = lattice.copy()
+    for beside in (wide[1:-1, :-2], wide[1:-1, 2:], wide[:-2, 1:-1], wide[2:, 1:-1]):
+        hole = np.isnan(result[..., 0])
+        result[hole] = beside[hole]
+    return result
+
+
+def _places(pair: Pair, spots: Grid, depth: Array, motion: Array) -> Places:
+    x, y, _ = reproject(pair.forth, spots.x, spots.y, depth)
+    frames = np.float32(pair.there.number - pair.here.number)
+    return nearest(
+        x + motion[:, 0] * frames, y + motion[:, 1] * frames, pair.there.shape
+    )
+
+
+def _depth_of(frame: Stored, spots: Grid, share: Array) -> Array:
+    """Return inverse depths between surface (0) and the end of the path (1)."""
+    assert frame.image is not None
+    near, far = frame.inverse_depth[spots.pixels], frame.image[spots.pixels]
+    if frame.camera.orthographic:
+        return np.asarray(near + share * (far - near))
+    return np.asarray(near * far / (far + share * (near - far)))
+
+
+def _guides(
+    frame: Stored, pixels: NDArray[np.integer], turn: Array | None = None
+) -> Array:
+    start = 3 if frame.has_light else 0
+    # a slice of the picture would be copied whole before anything is taken of it
+    guides = frame.picture.take(pixels, axis=0)[:, start : start + 6].astype(np.float32)
+    if turn is not None:
+        guides[:, 3:] = guides[:, 3:] @ turn.T
+    return guides_of(guides)
