@@ -10,6 +10,7 @@ best is taken (a plane sweep, Collins 1996), for a lattice of spots.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,6 +41,8 @@ _AREA = 5  # spots across, over which guides are compared
 # An image is believed where it matches better than the surface by this factor.
 _BETTER = 0.85
 _SEEN = 0.5  # of a candidate's spots, in neighbours
+REACH = _STRIDES[0] * (_AREA // 2 + 2)
+"""Pixels of small pictures on each side of a pixel that influence its image."""
 _TINY = np.float32(1e-9)
 
 
@@ -117,39 +120,40 @@ class _Sweep:
         rows = np.minimum(np.arange(self._shape[0]) * stride + half, height - 1)
         columns = np.minimum(np.arange(self._shape[1]) * stride + half, width - 1)
         pixels = (rows[:, None] * width + columns).ravel()
-        self._at = np.flatnonzero(~np.isnan(target.image[pixels]))
+        shows = ~np.isnan(target.image[pixels])
+        if target.invalid is not None:
+            shows &= ~target.invalid[pixels]
+        self._at = np.flatnonzero(shows)
         pixels = pixels[self._at]
         row, column = np.divmod(pixels, width)
         centre = np.float32(0.5)
         x, y = column.astype(np.float32) + centre, row.astype(np.float32) + centre
         self._spots, self._own = Grid(pixels, x, y), _guides(target, pixels)
-        self._inside = self._mean(np.ones(len(pixels), np.float32))
+        all_seen = np.full(len(pixels), len(pairs), np.float32)
+        self._enough = np.float32(_SEEN) * self._mean(all_seen)
 
     def images(self) -> Array:
         """Return `Images.lattice`."""
         surface = np.zeros((len(self._at), 3), np.float32)
-        limit = self._cost(surface, self._pairs) * np.float32(_BETTER)
+        limit = self._cost(surface) * np.float32(_BETTER)
         images = _Best(surface, limit)
         for share in _SHARES:
-            self._try(images, surface + np.float32([share, 0.0, 0.0]), self._pairs)
+            self._try(images, surface, share, 0.0, 0.0)
         for step in _STEPS:
-            self._around(images, step, self._pairs)
+            centre = images.candidates.copy()
+            for x, y in product((-step, 0.0, step), repeat=2):
+                if x or y:
+                    self._try(images, centre, 0.0, x, y)
         lattice = np.full((self._shape[0] * self._shape[1], 3), np.nan, np.float32)
         found = images.cost < limit
         lattice[self._at[found]] = images.candidates[found]
         return _filled(lattice.reshape(*self._shape, 3))
 
-    def _around(self, images: _Best, step: float, pairs: Sequence[Pair]) -> None:
-        centre = images.candidates.copy()
-        for x in (-step, 0.0, step):
-            for y in (-step, 0.0, step):
-                if x or y:
-                    self._try(images, centre + np.float32([0.0, x, y]), pairs)
+    def _try(self, images: _Best, start: Array, *further: float) -> None:
+        candidates = start + np.array(further, np.float32)
+        images.offer(candidates, self._cost(candidates))
 
-    def _try(self, images: _Best, candidates: Array, pairs: Sequence[Pair]) -> None:
-        images.offer(candidates, self._cost(candidates, pairs))
-
-    def _cost(self, candidate: Array, pairs: Sequence[Pair]) -> Array:
+    def _cost(self, candidate: Array) -> Array:
         """Return the squared difference of guides (n,), infinite where not seen."""
         depth = _depth_of(self._target, self._spots, candidate[:, 0])
 
@@ -157,12 +161,14 @@ class _Sweep:
             found = _places(pair, self._spots, depth, candidate[:, 1:])
             apart = _guides(pair.there, found.pixel, pair.turn) - self._own
             seen = found.seen.astype(np.float32)
+            if pair.there.invalid is not None:
+                seen[pair.there.invalid.take(found.pixel)] = 0.0
             return np.stack([np.einsum("ij,ij->i", apart, apart) * seen, seen])
 
-        error, seen = np.sum(list(self._each(compare, pairs)), axis=0)
+        error, seen = np.sum(list(self._each(compare, self._pairs)), axis=0)
         error, seen = self._mean(error), self._mean(seen)
         error /= np.maximum(seen, _TINY)
-        known = seen >= len(pairs) * np.float32(_SEEN) * self._inside
+        known = seen >= self._enough
         return np.asarray(np.where(known, error, np.float32(np.inf)))
 
     def _mean(self, x: Array) -> Array:

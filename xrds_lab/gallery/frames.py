@@ -21,7 +21,7 @@ from .stage import SIZE
 from .table import SAMPLES, SHOTS, Shot
 
 NOISY, REFERENCE = "noisy", "reference"
-GENERATION = {NOISY: 2, REFERENCE: 1}
+GENERATION = {NOISY: 3, REFERENCE: 1}
 """Each counts up whenever the same request is rendered otherwise."""
 REACH = 4
 """Frames to each side that lend to a frame."""

@@ -10,7 +10,7 @@ import hashlib
 import io
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -28,6 +28,7 @@ from xrds_core.temporal.window import Shot as Window
 
 from ..checksum import checksum
 from ..metrics import to_srgb
+from . import images
 from .frames import REACH, Measure, Request, Store
 from .judge import BLOCK, Verdict, judge, unsteadiness
 from .table import Shot
@@ -58,16 +59,30 @@ class Clip:
         """A frame by itself, radiance and alpha (H, W, 4)."""
         return self._finish(number, [])
 
-    def lent(self, number: int) -> Array:
-        """A frame with its neighbours' samples, and those of its other views."""
-        numbers = Window(self.shot.frames, REACH).neighbours(number)
-        lenders = [self._packed(n)[self.view] for n in numbers]
-        own = self._packed(number)
-        beside = [each for name, each in own.items() if name != self.view]
-        return self._finish(number, lenders + beside)
+    def lent(self, number: int, *, images: bool = True) -> Array:
+        """A frame with its neighbours' samples, and those of its other views.
 
-    def _finish(self, number: int, lenders: Sequence[Stored]) -> Array:
-        own = self._packed(number)[self.view]
+        Without `images` these are found by surfaces alone.
+        """
+        return self._finish(number, self.neighbours(number), images=images)
+
+    def neighbours(self, number: int) -> list[Stored]:
+        """Its neighbours, and its other views."""
+        numbers = Window(self.shot.frames, REACH).neighbours(number)
+        beside = self._packed(number).items()
+        return [self._packed(n)[self.view] for n in numbers] + [
+            each for name, each in beside if name != self.view
+        ]
+
+    def own(self, number: int) -> Stored:
+        """A frame by itself, as it was sampled."""
+        return self._packed(number)[self.view]
+
+    def _finish(
+        self, number: int, lenders: Sequence[Stored], *, images: bool = True
+    ) -> Array:
+        own = self.own(number)
+        own = own if images else replace(own, image=None)
         made = self._method.finish_stored(own, lenders)
         return np.dstack((made.radiance, made.alpha))
 
@@ -125,6 +140,8 @@ class ShotFigures:
             point[name] = _rounded(verdict)
         if number == self.shot.judged[0]:
             point["flicker"] = _flicker(clip, lent, alone)
+        if clip.own(number).image is not None:
+            point["images"] = images.figures(clip, number, references)
         point["crops"] = [
             crops(verdict, name, alone, lent, np.mean(references, axis=0))
             for name, verdict in verdicts.items()
@@ -152,6 +169,7 @@ class ShotFigures:
             "bare_worst_block": min(v["bare_worst"] for v in verdicts),
             "bare_share": max(v["bare_share"] for v in verdicts),
             "flicker": frames[0].get("flicker"),
+            **frames[0].get("images", {}),
             "passed": all(v["passed"] for v in verdicts),
             "frames": frames,
         }

@@ -31,6 +31,11 @@ _COLUMNS = {
     "flicker": "flicker",
     "psnr": "PSNR",
     "psnr_alone": "PSNR alone",
+    "image_share": "images, share",
+    "image_gain": "images, gain (dB)",
+    "surface_gain": "the same by surfaces",
+    "followed_share": "followed, share",
+    "moved_share": "of them moved, share",
 }
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 76em; }
@@ -99,7 +104,8 @@ def _introduction(settings: Point) -> str:
         "sees, is added on both sides; 'bare' is without. Worst and share are of both "
         "frames, colour and alpha; gain and PSNR of the middle frame. Flicker, where "
         "the camera stands still: the median second difference of three frames, as a "
-        "ratio to frames alone."
+        "ratio to frames alone. Images are what mirrors and glass show under a moving "
+        "camera: gains on their pixels, found by surfaces and by images."
     )
 
 
@@ -128,7 +134,7 @@ def _summary(points: Sequence[Point]) -> str:
 def _table(points: Sequence[Point]) -> str:
     rows = ["<h2>Shots</h2><table>", _row("th", tuple(_COLUMNS.values()))]
     for point in points:
-        cells = tuple(_cell(name, point[name]) for name in _COLUMNS)
+        cells = tuple(_cell(name, point.get(name)) for name in _COLUMNS)
         rows.append(_row("td", cells, "" if point["passed"] else "worse"))
     return "\n".join([*rows, "</table>"])
 
@@ -140,7 +146,7 @@ def _cell(name: str, value: Any) -> str:
         return "yes" if value else "no"
     if name.endswith("share"):
         return f"{value:.1%}"
-    if name == "gain" or name.endswith("block"):
+    if name.endswith(("gain", "block")):
         return f"{value:+.2f}"
     return f"{value:.2f}" if isinstance(value, float) else str(value)
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from xrds_core.errors import PictureError
+from xrds_core.temporal import candidates
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Stored
 from xrds_core.temporal.similarity import MARGIN
@@ -45,8 +46,9 @@ def spoilt(frames: Frames) -> Iterator[Measured]:
     bad = np.zeros((height, width), bool)
     bad[height // 3, :] = bad[:, width // 4] = True
     near = np.zeros_like(bad)
-    near[height // 3 - MARGIN : height // 3 + MARGIN + 1] = True
-    near[:, width // 4 - MARGIN : width // 4 + MARGIN + 1] = True
+    margin = MARGIN + candidates.REACH
+    near[height // 3 - margin : height // 3 + margin + 1] = True
+    near[:, width // 4 - margin : width // 4 + margin + 1] = True
     wrong, changed = 0, 0.0
     for number in (_MIDDLE, _MIDDLE + 1):
         for value in _BAD:
@@ -91,7 +93,7 @@ def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
         np.float16,
     )
     noise = None if frame.noise is None else frame.noise.without(bad.ravel())
-    return replace(spoilt, noise=noise, counts=frame.counts)
+    return replace(spoilt, noise=noise, counts=frame.counts, image=frame.image)
 
 
 def missing(frames: Frames) -> Iterator[Measured]:

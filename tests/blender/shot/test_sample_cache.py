@@ -111,6 +111,19 @@ def test_parts_of_a_shot_make_the_whole(
         assert not different(folder / "whole", folder / name), name
 
 
+def chrome(scene: Any, roughness: float = 0.0) -> None:
+    """Make all there is of metal, a mirror if it is not rough."""
+    material = bpy.data.materials.new("metal")
+    material.use_nodes = True
+    shader = material.node_tree.nodes["Principled BSDF"]
+    shader.inputs["Metallic"].default_value = 1.0
+    shader.inputs["Roughness"].default_value = roughness
+    for each in scene.objects:
+        if each.type == "MESH":
+            each.data.materials.clear()
+            each.data.materials.append(material)
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -120,7 +133,7 @@ def test_parts_of_a_shot_make_the_whole(
         lambda scene: setattr(scene.camera.data, "type", "ORTHO"),
         lambda scene: around(scene.camera.data, "EQUIRECTANGULAR"),
         lambda scene: setattr(scene.render, "use_motion_blur", True),
-        lambda scene: chrome(scene),
+        chrome,
     ],
     ids=[
         "still camera",
@@ -140,19 +153,6 @@ def test_whatever_the_scene(blend: Path, change: Callable[[Any], object]) -> Non
         keep(blend, [number])
     denoise(blend, "denoised")
     assert not different(blend.parent / "whole", blend.parent / "denoised")
-
-
-def chrome(scene: Any, roughness: float = 0.0) -> None:
-    """Make all there is of metal, a mirror if it is not rough."""
-    material = bpy.data.materials.new("metal")
-    material.use_nodes = True
-    shader = material.node_tree.nodes["Principled BSDF"]
-    shader.inputs["Metallic"].default_value = 1.0
-    shader.inputs["Roughness"].default_value = roughness
-    for each in scene.objects:
-        if each.type == "MESH":
-            each.data.materials.clear()
-            each.data.materials.append(material)
 
 
 def test_paths_are_rendered_where_something_mirrors(blend: Path) -> None:

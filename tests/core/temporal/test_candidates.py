@@ -131,7 +131,7 @@ def test_lengths_that_say_nothing_change_nothing(length: float) -> None:
     def spoil(frame: Frame) -> Frame:
         return replace(frame, path_length=np.full_like(frame.depth, length))
 
-    frame, found = shot(spoil)
+    _, found = shot(spoil)
     _, surface = shot(without_path)
     assert np.array_equal(found.radiance, surface.radiance)
     assert np.isfinite(found.radiance).all()
@@ -148,7 +148,7 @@ def test_a_mirror_may_fill_the_picture() -> None:
     def fill(frame: Frame) -> Frame:
         return replace(frame, depth=np.full_like(frame.depth, 5.0))
 
-    frame, found = shot(fill)
+    _, found = shot(fill)
     middle = np.s_[8:-8, 12:-12]
     assert float(np.mean(found.samples[middle])) / 4.0 > 4.0
 

@@ -1,0 +1,53 @@
+"""Figures of what mirrors and glass show, apart from the rest of a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_core.arrays import Array
+from xrds_core.temporal.candidates import find_images
+from xrds_core.temporal.motion import pair
+
+from ..metrics import to_srgb
+from .judge import BARE, squared_error
+
+if TYPE_CHECKING:
+    from .pictures import Clip
+
+
+def figures(clip: Clip, number: int, references: Sequence[Array]) -> dict[str, Any]:
+    """Gains in dB over the frame alone on the pixels that show images.
+
+    `surface_gain` is that of neighbours found by their surfaces; `followed_share` of
+    these pixels are found by their image, `moved_share` by one that moves by itself.
+    """
+    own, others = clip.own(number), clip.neighbours(number)
+    assert own.image is not None
+    shown = ~np.isnan(own.image).reshape(own.shape)
+    truth = [to_srgb(each[..., :3]) for each in references]
+
+    def error(picture: Array) -> float:
+        found = squared_error(to_srgb(picture[..., :3]), truth)[shown]
+        return max(float(found.mean()), BARE)
+
+    alone = error(clip.alone(number))
+    gains = {
+        "image_gain": error(clip.lent(number)),
+        "surface_gain": error(clip.lent(number, images=False)),
+    }
+    found = find_images(own, [pair(own, other) for other in others])
+    motion = np.zeros((0, 3)) if found is None else found.lattice.reshape(-1, 3)
+    motion = motion[~np.isnan(motion[:, 0])]
+    spots = shown.sum() / (1 if found is None else found.stride**2)
+    return {
+        "image_share": round(float(shown.mean()), 4),
+        "image_psnr_alone": round(-10 * float(np.log10(alone)), 4),
+        **{k: round(10 * float(np.log10(alone / x)), 4) for k, x in gains.items()},
+        "followed_share": round(min(1.0, len(motion) / spots), 4),
+        "moved_share": round(
+            min(1.0, float(motion[:, 1:].any(axis=1).sum()) / spots), 4
+        ),
+    }
