@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from xrds_core.arrays import Array
 from xrds_core.temporal.candidates import find_images
+from xrds_core.temporal.frame import Stored
 from xrds_core.temporal.motion import pair
 
 from ..metrics import to_srgb
 from .judge import BARE, squared_error
 
-if TYPE_CHECKING:
-    from .pictures import Clip
 
-
-def figures(clip: Clip, number: int, references: Sequence[Array]) -> dict[str, Any]:
+def figures(
+    own: Stored,
+    others: Sequence[Stored],
+    pictures: Sequence[Array],
+    references: Sequence[Array],
+) -> dict[str, Any]:
     """Gains in dB over the frame alone on the pixels that show images.
 
+    `pictures` are the frame alone, with its neighbours `others` found by surfaces, and
+    with these found by images.
     `surface_gain` is that of neighbours found by their surfaces; `followed_share` of
     these pixels are found by their image, `moved_share` by one that moves by itself.
     """
-    own, others = clip.own(number), clip.neighbours(number)
     assert own.image is not None
     shown = ~np.isnan(own.image).reshape(own.shape)
     truth = [to_srgb(each[..., :3]) for each in references]
@@ -33,11 +37,8 @@ def figures(clip: Clip, number: int, references: Sequence[Array]) -> dict[str, A
         found = squared_error(to_srgb(picture[..., :3]), truth)[shown]
         return max(float(found.mean()), BARE)
 
-    alone = error(clip.alone(number))
-    gains = {
-        "image_gain": error(clip.lent(number)),
-        "surface_gain": error(clip.lent(number, images=False)),
-    }
+    alone, *errors = map(error, pictures)
+    gains = dict(zip(("surface_gain", "image_gain"), errors, strict=True))
     found = find_images(own, [pair(own, other) for other in others])
     motion = np.zeros((0, 3)) if found is None else found.lattice.reshape(-1, 3)
     motion = motion[~np.isnan(motion[:, 0])]

@@ -57,14 +57,16 @@ class Clip:
 
     def alone(self, number: int) -> Array:
         """A frame by itself, radiance and alpha (H, W, 4)."""
-        return self._finish(number, [])
+        return self._finish(self.own(number), [])
 
-    def lent(self, number: int, *, images: bool = True) -> Array:
-        """A frame with its neighbours' samples, and those of its other views.
+    def lent(self, number: int) -> Array:
+        """A frame with its neighbours' samples, and those of its other views."""
+        return self._finish(self.own(number), self.neighbours(number))
 
-        Without `images` these are found by surfaces alone.
-        """
-        return self._finish(number, self.neighbours(number), images=images)
+    def by_surface(self, number: int) -> Array:
+        """The same where what mirrors and glass show is not looked for."""
+        own = replace(self.own(number), image=None)
+        return self._finish(own, self.neighbours(number))
 
     def neighbours(self, number: int) -> list[Stored]:
         """Its neighbours, and its other views."""
@@ -78,11 +80,7 @@ class Clip:
         """A frame by itself, as it was sampled."""
         return self._packed(number)[self.view]
 
-    def _finish(
-        self, number: int, lenders: Sequence[Stored], *, images: bool = True
-    ) -> Array:
-        own = self.own(number)
-        own = own if images else replace(own, image=None)
+    def _finish(self, own: Stored, lenders: Sequence[Stored]) -> Array:
         made = self._method.finish_stored(own, lenders)
         return np.dstack((made.radiance, made.alpha))
 
@@ -141,7 +139,10 @@ class ShotFigures:
         if number == self.shot.judged[0]:
             point["flicker"] = _flicker(clip, lent, alone)
         if clip.own(number).image is not None:
-            point["images"] = images.figures(clip, number, references)
+            neighbours, surface = clip.neighbours(number), clip.by_surface(number)
+            point["images"] = images.figures(
+                clip.own(number), neighbours, (alone, surface, lent), references
+            )
         point["crops"] = [
             crops(verdict, name, alone, lent, np.mean(references, axis=0))
             for name, verdict in verdicts.items()
