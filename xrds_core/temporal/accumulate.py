@@ -305,8 +305,11 @@ class _Reprojected:
         if not self.is_reused:
             return
         found = places(self.pair, block.wide)
+        tiles = pixel_weights(self._tiles, self.pair.here.shape, block.rows).ravel()
         if block.images is not None:
             found.put(block.images.at, block.images.places(self.pair))
+            # tiles compare surfaces; light that changes everywhere leaves none of them
+            tiles[block.images.at] = self._tiles.max()
         if other.invalid is not None:
             found.seen[...] &= ~other.invalid.take(found.pixel)
         values = _floats(other.picture.take(found.pixel, axis=0))
@@ -314,7 +317,7 @@ class _Reprojected:
             normal = slice(6, 9) if other.has_light else slice(3, 6)
             values[:, normal] = values[:, normal] @ self._turn.T
         weight = found.seen.astype(np.float32)
-        weight *= pixel_weights(self._tiles, self.pair.here.shape, block.rows).ravel()
+        weight *= tiles
         weight *= _samples(other, found.pixel, len(weight))
         reused = weight.copy()
         weight *= np.exp(found.apart * self._fall)

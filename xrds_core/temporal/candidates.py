@@ -38,8 +38,10 @@ _STEPS = (1.0, 0.5, 0.25)
 # Distance between spots along each axis, in small and large pictures.
 _STRIDES, _LARGE = (2, 4), 1_000_000
 _AREA = 5  # spots across, over which guides are compared
-# An image is believed where it matches better than the surface by this factor.
-_BETTER = 0.85
+# An image is believed where it matches better than the surface by this factor, and by
+# this many standard errors of the difference, over the spots: where guides are noisy,
+# one of many candidates always matches better by chance.
+_BETTER, _SURE = 0.85, 3.0
 _SEEN = 0.5  # of a candidate's spots, in neighbours
 REACH = _STRIDES[0] * (_AREA // 2 + 2)
 """Pixels of small pictures on each side of a pixel that influence its image."""
@@ -135,7 +137,8 @@ class _Sweep:
     def images(self) -> Array:
         """Return `Images.lattice`."""
         surface = np.zeros((len(self._at), 3), np.float32)
-        limit = self._cost(surface) * np.float32(_BETTER)
+        cost, self._of_surface = self._cost(surface)
+        limit = cost * np.float32(_BETTER)
         images = _Best(surface, limit)
         for share in _SHARES:
             self._try(images, surface, share, 0.0, 0.0)
@@ -151,10 +154,22 @@ class _Sweep:
 
     def _try(self, images: _Best, start: Array, *further: float) -> None:
         candidates = start + np.array(further, np.float32)
-        images.offer(candidates, self._cost(candidates))
+        cost, error = self._cost(candidates)
+        images.offer(candidates, np.where(self._is_sure(error), cost, np.inf))
 
-    def _cost(self, candidate: Array) -> Array:
-        """Return the squared difference of guides (n,), infinite where not seen."""
+    def _is_sure(self, error: Array) -> NDArray[np.bool_]:
+        """Whether errors (n,) are less than those of the surface, but for chance."""
+        less = self._of_surface - error
+        mean, square = self._mean(less), self._mean(np.square(less))
+        # of all spots, those outside included: they differ by 0
+        chance = np.maximum(square - np.square(mean), 0.0) / _AREA**2
+        return np.asarray(mean > _SURE * np.sqrt(chance))
+
+    def _cost(self, candidate: Array) -> tuple[Array, Array]:
+        """Return squared differences of guides (n,): around each spot, and at it.
+
+        The former are infinite where too little is seen.
+        """
         depth = _depth_of(self._target, self._spots, candidate[:, 0])
 
         def compare(pair: Pair) -> Array:
@@ -166,10 +181,10 @@ class _Sweep:
             return np.stack([np.einsum("ij,ij->i", apart, apart) * seen, seen])
 
         error, seen = np.sum(list(self._each(compare, self._pairs)), axis=0)
-        error, seen = self._mean(error), self._mean(seen)
-        error /= np.maximum(seen, _TINY)
-        known = seen >= self._enough
-        return np.asarray(np.where(known, error, np.float32(np.inf)))
+        around, known = self._mean(error), self._mean(seen)
+        around /= np.maximum(known, _TINY)
+        around[known < self._enough] = np.inf
+        return around, error / np.maximum(seen, np.float32(1.0))
 
     def _mean(self, x: Array) -> Array:
         """Return the mean over the spots around each (n,), 0 outside."""

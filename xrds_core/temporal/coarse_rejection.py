@@ -52,8 +52,6 @@ def tile_weights(pair: Pair) -> Array:
     seen = found.seen & still
     if _is_shot_cut(pair, step, spots, seen, in_frame & still):
         return np.zeros(tiles, np.float32)
-    if pair.here.image is not None:  # its light is that of other things
-        seen &= np.isnan(pair.here.image[spots])
     alike = pair.here.samples == pair.there.samples
     own = _brightness(pair.here, spots, alike)
     other = _brightness(pair.there, found.pixel, alike)
