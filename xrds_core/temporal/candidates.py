@@ -39,9 +39,9 @@ _STEPS = (1.0, 0.5, 0.25)
 _STRIDES, _LARGE = (2, 4), 1_000_000
 _AREA = 5  # spots across, over which guides are compared
 # An image is believed where it matches better than the surface by this factor, and by
-# this many standard errors of the difference, over the spots: where guides are noisy,
-# one of many candidates always matches better by chance.
-_BETTER, _SURE = 0.85, 3.0
+# so many standard errors of the difference, over the spots: one on the path, and one
+# that moves by itself, of which there are so many that one always matches by chance.
+_BETTER, _SURE, _SURE_IF_MOVED = 0.85, 2.0, 3.0
 _SEEN = 0.5  # of a candidate's spots, in neighbours
 REACH = _STRIDES[0] * (_AREA // 2 + 2)
 """Pixels of small pictures on each side of a pixel that influence its image."""
@@ -141,29 +141,31 @@ class _Sweep:
         limit = cost * np.float32(_BETTER)
         images = _Best(surface, limit)
         for share in _SHARES:
-            self._try(images, surface, share, 0.0, 0.0)
+            self._try(images, surface, (share, 0.0, 0.0), _SURE)
         for step in _STEPS:
             centre = images.candidates.copy()
             for x, y in product((-step, 0.0, step), repeat=2):
                 if x or y:
-                    self._try(images, centre, 0.0, x, y)
+                    self._try(images, centre, (0.0, x, y), _SURE_IF_MOVED)
         lattice = np.full((self._shape[0] * self._shape[1], 3), np.nan, np.float32)
         found = images.cost < limit
         lattice[self._at[found]] = images.candidates[found]
         return _filled(lattice.reshape(*self._shape, 3))
 
-    def _try(self, images: _Best, start: Array, *further: float) -> None:
+    def _try(
+        self, images: _Best, start: Array, further: tuple[float, ...], sure: float
+    ) -> None:
         candidates = start + np.array(further, np.float32)
         cost, error = self._cost(candidates)
-        images.offer(candidates, np.where(self._is_sure(error), cost, np.inf))
+        images.offer(candidates, np.where(self._is_sure(error, sure), cost, np.inf))
 
-    def _is_sure(self, error: Array) -> NDArray[np.bool_]:
-        """Whether errors (n,) are less than those of the surface, but for chance."""
+    def _is_sure(self, error: Array, sure: float) -> NDArray[np.bool_]:
+        """Whether errors (n,) are less than the surface's by `sure` standard errors."""
         less = self._of_surface - error
         mean, square = self._mean(less), self._mean(np.square(less))
         # of all spots, those outside included: they differ by 0
         chance = np.maximum(square - np.square(mean), 0.0) / _AREA**2
-        return np.asarray(mean > _SURE * np.sqrt(chance))
+        return np.asarray(mean > np.float32(sure) * np.sqrt(chance))
 
     def _cost(self, candidate: Array) -> tuple[Array, Array]:
         """Return squared differences of guides (n,): around each spot, and at it.
