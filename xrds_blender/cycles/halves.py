@@ -119,14 +119,16 @@ def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Hal
         albedo=halves.mean("albedo"),
         normal=halves.mean("normal"),
         counts=None if counts is None else counts.sum(axis=0),
-        path_length=_mean_length(first, second, shares[0]),
+        path_length=_mean_length(first, second, halves.share()),
     )
     return Half(whole, halves)
 
 
-def _mean_length(first: Samples, second: Samples, share: float) -> Array | None:
+def _mean_length(first: Samples, second: Samples, share: Array) -> Array | None:
     one, two = first.path_length, second.path_length
-    return None if one is None or two is None else one * share + two * (1.0 - share)
+    if one is None or two is None:
+        return None
+    return np.asarray(one * share + two * (np.float32(1.0) - share))
 
 
 def _merged(

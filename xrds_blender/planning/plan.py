@@ -296,8 +296,11 @@ def neighbours(
 
 def _images(facts: Facts) -> Decision:
     name = "images"
+    if facts.scale > 1:
+        reason = "above scale 1 neighbours are found by surfaces alone"
+        return Decision(name, "skipped", reason)
     if facts.scene.smooth:
-        reason = "what mirrors and glass show is found by where its image lies"
+        reason = "where the camera moves, mirrors and glass are found by their images"
         return Decision(name, "followed", reason)
     reason = "nothing is as smooth as a mirror or clear glass"
     return Decision(name, "skipped", reason)

@@ -153,7 +153,7 @@ def sampling_of(
     blurred = scene.render.use_motion_blur
     if place is not None:
         geometry[0] = LATE_DEPTH
-    elif facts.smooth:
+    elif facts.smooth and not request.settings.is_enlarged:
         geometry.append(PATH_LENGTH)
     return Sampling(
         number=scene.frame_current,

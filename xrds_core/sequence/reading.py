@@ -106,7 +106,7 @@ def read_frame(
         samples=_samples(part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
         vector=_vector(file, found, reading) if reusable else None,
-        path_length=file.plane(found.path_length[0]) if found.path_length else None,
+        path_length=_path_length(file, found) if reusable else None,
         still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
     )
     if reading.halves is not None:
@@ -232,6 +232,10 @@ def _from_depth(depth: Array) -> Array:
     with np.errstate(invalid="ignore"):
         hit = (depth > _NEAREST) & (depth < SKY_DEPTH)
     return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
+
+
+def _path_length(file: File, found: Found) -> Array | None:
+    return file.plane(found.path_length[0]) if found.path_length else None
 
 
 def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:

@@ -21,6 +21,7 @@ import numpy as np
 from ..errors import PictureError
 from .candidates import Images, find_images
 from .coarse_rejection import pixel_weights, tile_weights
+from .half_floats import floats
 from .local_filters import extreme
 from .motion import grid, inverse_depth_range, pair, places
 from .shot_cuts import same_shot
@@ -46,8 +47,6 @@ Result = TypeVar("Result")
 _SOFTNESS = 0.7
 _ROWS = 128  # at a time, plus the margin of the similarity weight
 _TINY = np.float32(1e-9)
-# Every half float, by its bits.
-_HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
 
 
 @dataclass(frozen=True)
@@ -159,7 +158,7 @@ class _Block:
         self.wide = grid(target.shape, first, last)
         start = self.pixels.start - first * width
         self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
-        self.own = _floats(target.picture[self.wide.pixels])
+        self.own = floats(target.picture[self.wide.pixels])
         self.images = None if images is None else images.of(self.wide)
         self.void = self._void()
         self.known = np.ones(len(self.own), bool)
@@ -182,7 +181,7 @@ def _similarity(target: Stored, block: _Block, usual: float) -> Similarity:
     noise, pixels = target.noise, block.wide.pixels
     assert noise is not None
     parts = (noise.brightness, noise.difference, noise.guides)
-    brightness, difference, guides = (block.shaped(_floats(x[pixels])) for x in parts)
+    brightness, difference, guides = (block.shaped(floats(x[pixels])) for x in parts)
     return Similarity(
         block.shaped(block.own),
         brightness,
@@ -260,7 +259,7 @@ def _noise(
     if block.similarity is None or other.noise is None:
         return ()
     noise = other.noise
-    return tuple(_floats(x[pixels]) for x in (noise.brightness, noise.difference))
+    return tuple(floats(x[pixels]) for x in (noise.brightness, noise.difference))
 
 
 class _Aligned:
@@ -276,7 +275,7 @@ class _Aligned:
         if other.invalid is not None:
             weight[other.invalid[pixels]] = 0.0
         # a copy: NumPy's own float32 pictures are not to be changed
-        values = _floats(other.picture[pixels]).copy()
+        values = floats(other.picture[pixels]).copy()
         sums.add(values, weight, weight, _noise(other, pixels, block))
 
 
@@ -291,7 +290,7 @@ class _Reprojected:
                 " give radiance and alpha for all frames of a shot or for none"
             )
         self._tiles = tile_weights(pair)
-        self.pair, self._turn = pair, pair.turn
+        self.pair = pair
         self._fall = np.float32(-0.5 * target.samples ** (2 / 3) / _SOFTNESS**2)
 
     @property
@@ -312,10 +311,9 @@ class _Reprojected:
             tiles[block.images.at] = self._tiles.max()
         if other.invalid is not None:
             found.seen[...] &= ~other.invalid.take(found.pixel)
-        values = _floats(other.picture.take(found.pixel, axis=0))
-        if self._turn is not None:
-            normal = slice(6, 9) if other.has_light else slice(3, 6)
-            values[:, normal] = values[:, normal] @ self._turn.T
+        values = floats(other.picture.take(found.pixel, axis=0))
+        if (turn := self.pair.turn) is not None:
+            values[:, other.normals] = values[:, other.normals] @ turn.T
         weight = found.seen.astype(np.float32)
         weight *= tiles
         weight *= _samples(other, found.pixel, len(weight))
@@ -328,7 +326,7 @@ def _samples(frame: Stored, pixels: slice | NDArray[np.integer], count: int) -> 
     """Return the sample counts of flat pixels (n,) of a frame."""
     if frame.counts is None:
         return np.full(count, frame.samples, np.float32)
-    return _floats(frame.counts[pixels]).copy()
+    return floats(frame.counts[pixels]).copy()
 
 
 def _means(
@@ -373,13 +371,6 @@ def _unpacked(
         rejected,
         frames,
     )
-
-
-def _floats(x: NDArray[Any]) -> Array:
-    """Return `x` in float32; half floats from a table, in half of NumPy's time."""
-    if x.dtype == np.float16:
-        return np.asarray(_HALVES.take(np.ascontiguousarray(x).view(np.uint16)))
-    return x.astype(np.float32, copy=False)
 
 
 def _in_threads(

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .half_floats import floats
 from .local_filters import box
-from .motion import Grid, Places, nearest, reproject
+from .motion import Grid, Places, centres, nearest, reproject, spot_stride
 from .noise import guides_of
 
 if TYPE_CHECKING:
@@ -35,16 +36,12 @@ if TYPE_CHECKING:
 _SHARES = (0.06, 0.12, 0.25, 0.5, 0.75, 0.9, 1.0, 1.1)
 # Pixels per frame of an image's own motion, from coarse to fine.
 _STEPS = (1.0, 0.5, 0.25)
-# Distance between spots along each axis, in small and large pictures.
-_STRIDES, _LARGE = (2, 4), 1_000_000
 _AREA = 5  # spots across, over which guides are compared
 # An image is believed where it matches better than the surface by this factor, and by
 # so many standard errors of the difference, over the spots: one on the path, and one
 # that moves by itself, of which there are so many that one always matches by chance.
 _BETTER, _SURE, _SURE_IF_MOVED = 0.85, 2.0, 3.0
 _SEEN = 0.5  # of a candidate's spots, in neighbours
-REACH = _STRIDES[0] * (_AREA // 2 + 2)
-"""Pixels of small pictures on each side of a pixel that influence its image."""
 _TINY = np.float32(1e-9)
 
 
@@ -88,22 +85,23 @@ class ImagePlaces:
         return _places(pair, self._spots, self._depth, self._motion)
 
 
+def reach(shape: tuple[int, int]) -> int:
+    """Return the pixels on each side of a pixel that influence its image."""
+    return spot_stride(shape) * (_AREA // 2 + 2)
+
+
 def find_images(
-    target: Stored,
-    pairs: Sequence[Pair],
-    each: Each = map,
+    target: Stored, pairs: Sequence[Pair], each: Each = map
 ) -> Images | None:
     """Return the images that `target` shows; None where it shows none.
 
-    `pairs` are the target and its neighbours; `each` is `map`, or one that runs in
+    `pairs` are of the target and each neighbour; `each` is `map`, or one that runs in
     threads.
     """
     if target.image is None or not pairs:
         return None
-    height, width = target.shape
-    stride = _STRIDES[height * width >= _LARGE]
-    sweep = _Sweep(target, pairs, stride, each)
-    lattice = sweep.images()
+    stride = spot_stride(target.shape)
+    lattice = _Sweep(target, pairs, stride, each).images()
     return None if np.isnan(lattice[..., 0]).all() else Images(target, stride, lattice)
 
 
@@ -114,8 +112,7 @@ class _Sweep:
         self, target: Stored, pairs: Sequence[Pair], stride: int, each: Each
     ) -> None:
         assert target.image is not None
-        self._target, self._each = target, each
-        self._pairs = pairs
+        self._target, self._pairs, self._each = target, pairs, each
         height, width = target.shape
         half = stride // 2
         self._shape = -(-height // stride), -(-width // stride)
@@ -127,21 +124,19 @@ class _Sweep:
             shows &= ~target.invalid[pixels]
         self._at = np.flatnonzero(shows)
         pixels = pixels[self._at]
-        row, column = np.divmod(pixels, width)
-        centre = np.float32(0.5)
-        x, y = column.astype(np.float32) + centre, row.astype(np.float32) + centre
-        self._spots, self._own = Grid(pixels, x, y), _guides(target, pixels)
+        self._spots = Grid(pixels, *centres(pixels, width))
+        self._own = _guides(target, pixels)
         all_seen = np.full(len(pixels), len(pairs), np.float32)
         self._enough = np.float32(_SEEN) * self._mean(all_seen)
+        self._surface = np.zeros((len(pixels), 3), np.float32)
+        self._cost_of_surface, self._error_of_surface = self._cost(self._surface)
 
     def images(self) -> Array:
         """Return `Images.lattice`."""
-        surface = np.zeros((len(self._at), 3), np.float32)
-        cost, self._of_surface = self._cost(surface)
-        limit = cost * np.float32(_BETTER)
-        images = _Best(surface, limit)
+        limit = self._cost_of_surface * np.float32(_BETTER)
+        images = _Best(self._surface, limit)
         for share in _SHARES:
-            self._try(images, surface, (share, 0.0, 0.0), _SURE)
+            self._try(images, self._surface, (share, 0.0, 0.0), _SURE)
         for step in _STEPS:
             centre = images.candidates.copy()
             for x, y in product((-step, 0.0, step), repeat=2):
@@ -161,7 +156,7 @@ class _Sweep:
 
     def _is_sure(self, error: Array, sure: float) -> NDArray[np.bool_]:
         """Whether errors (n,) are less than the surface's by `sure` standard errors."""
-        less = self._of_surface - error
+        less = self._error_of_surface - error
         mean, square = self._mean(less), self._mean(np.square(less))
         # of all spots, those outside included: they differ by 0
         chance = np.maximum(square - np.square(mean), 0.0) / _AREA**2
@@ -235,15 +230,15 @@ def _depth_of(frame: Stored, spots: Grid, share: Array) -> Array:
     near, far = frame.inverse_depth[spots.pixels], frame.image[spots.pixels]
     if frame.camera.orthographic:
         return np.asarray(near + share * (far - near))
-    return np.asarray(near * far / (far + share * (near - far)))
+    # a ratio first: the product of two inverse depths may be beyond float32
+    return np.asarray(near * (far / (far + share * (near - far))))
 
 
 def _guides(
     frame: Stored, pixels: NDArray[np.integer], turn: Array | None = None
 ) -> Array:
-    start = 3 if frame.has_light else 0
     # a slice of the picture would be copied whole before anything is taken of it
-    guides = frame.picture.take(pixels, axis=0)[:, start : start + 6].astype(np.float32)
+    guides = floats(frame.picture.take(pixels, axis=0))
     if turn is not None:
-        guides[:, 3:] = guides[:, 3:] @ turn.T
-    return guides_of(guides)
+        guides[:, frame.normals] = guides[:, frame.normals] @ turn.T
+    return guides_of(guides[:, frame.normals.start - 3 : frame.normals.stop])

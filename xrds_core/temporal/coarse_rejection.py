@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .motion import Grid, still_places
+from .motion import Grid, spot_stride, still_places
 from .noise import brightness, luminance
 
 if TYPE_CHECKING:
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
 
 TILE = 64  # pixels across
-# Distance between the pixels compared, along each axis, in small and large pictures.
-_STRIDES, _LARGE = (2, 4), 1_000_000
 # Of the hits that reproject into the other frame: if fewer match, it is a shot cut.
 _LEAST_SHARE = 1 / 3
 # Radii in tiles: tests single tiles, 3x3 tiles, and the whole picture.
@@ -42,7 +40,7 @@ def tile_weights(pair: Pair) -> Array:
     tiles = -(-height // TILE), -(-width // TILE)
     if pair.here.is_empty:  # there is nothing to compare
         return np.ones(tiles, np.float32)
-    step = _STRIDES[height * width >= _LARGE]
+    step = spot_stride(pair.here.shape)
     y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]
     spots = (y * width + x).ravel()
     half = np.float32(0.5)

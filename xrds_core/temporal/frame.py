@@ -205,6 +205,11 @@ class Stored:
         return self.picture.shape[1] >= 9
 
     @property
+    def normals(self) -> slice:
+        """The channels of `picture` with normals; albedo lies before them."""
+        return slice(6, 9) if self.has_light else slice(3, 6)
+
+    @property
     def nearer(self) -> np.ufunc:
         """Which of two values of `inverse_depth` is that of the nearer surface."""
         return np.fmin if self.camera.orthographic else np.fmax
@@ -297,7 +302,7 @@ def _image(frame: Frame) -> Array | None:
         return None
     depth = frame.depth
     end = frame.path_length * frame.camera.depth_per_length(frame.shape)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
         behind = end > extreme(depth, np.fmax) * np.float32(1.0 + _BEHIND)
         behind &= (depth > 0.0) & (end < SKY_DEPTH)
     if not behind.any():

@@ -52,6 +52,8 @@ _OFF, _WHOLE = 0.6, 0.02
 # Multiples of these spread evenly over a unit square (M. Roberts, R3 and R2 sequences).
 _SPREAD_X = np.array([0.8191725134, 0.6710436067, 0.5497004779], np.float32)
 _SPREAD_Y = np.array([0.7548776662, 0.5698402910, 0.6180339887], np.float32)
+# Distance between spots along each axis, in small and large pictures.
+_STRIDES, _LARGE = (2, 4), 1_000_000
 
 
 @dataclass(frozen=True)
@@ -118,7 +120,8 @@ class Pair:
         here, there = self.here.camera, self.there.camera
         turn = here.view[:3, :3] @ np.linalg.inv(there.view[:3, :3])
         turn = _axes(here) @ turn @ _axes(there).T
-        return None if np.allclose(turn, np.eye(3), atol=1e-7) else turn.astype("f4")
+        same = np.allclose(turn, np.eye(3), atol=1e-7)
+        return None if same else turn.astype(np.float32)
 
 
 def _axes(camera: Camera) -> Matrix:
@@ -235,6 +238,11 @@ def inverse_depth_range(frame: Stored) -> tuple[Array, Array]:
     )
     slack = np.float32(_INVERSE_DEPTH_SLACK)
     return least * (1 - slack), most * (1 + slack)
+
+
+def spot_stride(shape: tuple[int, int]) -> int:
+    """Return the pixels between spots, where some of a picture's are enough."""
+    return _STRIDES[shape[0] * shape[1] >= _LARGE]
 
 
 def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Grid:

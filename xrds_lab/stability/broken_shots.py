@@ -46,7 +46,7 @@ def spoilt(frames: Frames) -> Iterator[Measured]:
     bad = np.zeros((height, width), bool)
     bad[height // 3, :] = bad[:, width // 4] = True
     near = np.zeros_like(bad)
-    margin = MARGIN + candidates.REACH
+    margin = MARGIN + candidates.reach((height, width))
     near[height // 3 - margin : height // 3 + margin + 1] = True
     near[:, width // 4 - margin : width // 4 + margin + 1] = True
     wrong, changed = 0, 0.0

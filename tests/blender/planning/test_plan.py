@@ -77,7 +77,7 @@ def test_the_plan_of_a_shot_names_what_is_reused_less() -> None:
 
     def lent(cuts: tuple[int, ...] = (), **more: object) -> dict[str, str]:
         scene = replace(quiet, **more)
-        found = plan.neighbours(replace(FACTS, scene=scene), 3, cuts)
+        found = plan.neighbours(replace(FACTS, scene=scene, scale=1), 3, cuts)
         assert all(each.reason for each in found)
         return {each.decision: each.value for each in found}
 
@@ -89,5 +89,7 @@ def test_the_plan_of_a_shot_names_what_is_reused_less() -> None:
     assert lent(moving=(), volumes=True) == {"accumulation": "3 frames to each side"}
     assert lent(cuts=(9, 5))["cuts"] == "frame 5, 9"
     assert lent(cuts=tuple(range(9)))["cuts"] == "frame 0, 1, 2, 3, 4, 5 and 3 more"
+    mirrors = replace(FACTS, scene=replace(quiet, smooth=True))
+    assert plan.neighbours(mirrors, 3)[1].value == "skipped"  # above scale 1
     panorama = plan.neighbours(replace(FACTS, reprojects=False), 3)
     assert [each.value for each in panorama] == ["none"]

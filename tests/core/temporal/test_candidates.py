@@ -18,15 +18,12 @@ MIRROR = (0.0, 0.0)  # where its middle is, half as far away as what it shows
 STEP = 0.23  # of the camera, in no whole number of pixels
 
 
-def mirrored(number: int, eye: Camera, noise: float = 0.4, way: float = 1.0) -> Frame:
-    """A mirror before a wall, which shows one just as far behind it as the wall is.
-
-    ``way`` times the length of the path is what the frame says of it.
-    """
-    shown = view(number, eye, World(wall_half=90.0), noise).frame
+def mirrored(number: int, eye: Camera) -> Frame:
+    """A mirror before a wall, which shows one just as far behind it as the wall is."""
+    shown = view(number, eye, World(wall_half=90.0), noise=0.4).frame
     depth = view(number, eye, World(card=MIRROR, card_half=1.6)).frame.depth
     length = shown.depth / eye.depth_per_length(shown.shape)
-    return replace(shown, depth=depth, path_length=way * length, samples=4.0)
+    return replace(shown, depth=depth, path_length=length, samples=4.0)
 
 
 def mirror(frame: Frame) -> NDArray[np.bool_]:
@@ -75,7 +72,6 @@ def test_what_a_mirror_shows_is_found_by_its_image() -> None:
 
 
 def test_what_is_no_mirror_is_reused_as_before() -> None:
-    """Or better: a mirror's light no longer counts against what is beside it."""
     frame, found = shot()
     _, surface = shot(without_path)
     outside = np.ones(frame.shape, bool)
@@ -160,8 +156,8 @@ def test_threads_change_nothing() -> None:
     assert np.array_equal(one.radiance, two.radiance)
 
 
-def test_images_survive_a_cut_and_a_missing_image() -> None:
-    """A neighbour without paths is followed as well: it is this frame's that count."""
+def test_a_neighbour_without_paths_is_followed() -> None:
+    """It is the frame's own paths that count."""
     frames = [mirrored(k, camera(STEP * (k - 1))) for k in range(3)]
     plain = [replace(x, path_length=None) for x in frames]
     whole = accumulate(store(frames[1]), [store(x) for x in (frames[0], frames[2])])
