@@ -27,7 +27,22 @@ def add_request(command: argparse.ArgumentParser) -> None:
     add(
         "--samples",
         type=arguments.positive,
-        help="samples per pixel of the low-resolution render, or at scale 1",
+        help="samples per pixel of the low-resolution render, or at scale 1, in place "
+        "of the file's; without its noise threshold and its time limit",
+    )
+    share = command.add_mutually_exclusive_group()
+    share.add_argument(
+        "--same-picture",
+        action="store_true",
+        default=None,
+        help="frames of a shot as the file's own samples make them, from fewer where "
+        "neighbours help (default at scale 1, without --samples)",
+    )
+    share.add_argument(
+        "--same-time",
+        action="store_false",
+        dest="same_picture",
+        help="all of the file's samples, and better frames",
     )
     add(
         "--denoise",
@@ -200,6 +215,7 @@ def request_of(options: argparse.Namespace) -> Request:
         threads=options.threads,
         denoise=options.denoise,
         temporal_radius=_temporal_radius(options),
+        same_picture=_same_picture(options),
         savings=() if options.skip_nothing else SAVINGS,
         guide_cache=options.guide_cache,
         guide_limit=options.guide_limit,
@@ -217,6 +233,23 @@ def _temporal_radius(options: argparse.Namespace) -> int:
     several = len(getattr(options, "frames", None) or ()) > 1
     several |= getattr(options, "sample_cache", None) is not None
     return RADIUS if several and not incompatible else 0
+
+
+def _same_picture(options: argparse.Namespace) -> bool:
+    """Whether frames of a shot may have fewer samples than the file's."""
+    requested: bool | None = options.same_picture
+    others = {
+        "--samples": options.samples,
+        "--scale above 1": options.scale > 1,
+        "--plain": options.plain,
+        "--time-budget": options.time_budget,
+        "--quality": options.quality,
+        "--sample-cache": getattr(options, "sample_cache", None),
+    }
+    found = [name for name, value in others.items() if value]
+    if requested and found:
+        raise UsageError(f"--same-picture cannot be had with {found[0]}")
+    return not found if requested is None else requested
 
 
 def _incompatible(options: argparse.Namespace) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from xrds_core.errors import UsageError
 
-from ..planning.plan import GUIDE_CACHE
+from ..planning.plan import GUIDE_CACHE, SAME_PICTURE
 from . import arguments
 from .deferred import need_blender
 from .options import add_output, add_request, choice_of, encoding_of, request_of
@@ -113,5 +113,5 @@ def _lines(result: dict[str, Any]) -> list[str]:
 def _outcome(decision: dict[str, Any]) -> str:
     """A decision after a render: with its reason where this says what was found."""
     line = _decision(decision)
-    found = decision["decision"] == GUIDE_CACHE
+    found = decision["decision"] in (GUIDE_CACHE, SAME_PICTURE)
     return f"{line}: {decision['reason']}" if found else line

@@ -221,6 +221,7 @@ def _write(
         "output": str(target),
         "seconds": seconds,
         "temporal": picture.temporal and dataclasses.asdict(picture.temporal),
+        "share": settings.share,
         "peak_memory": picture.peak_memory,
     }
 

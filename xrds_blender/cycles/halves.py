@@ -50,7 +50,7 @@ def sample_halves(
             samples, clock = sample_layer(
                 engine, depsgraph, subset=part, is_even=is_even, geometry=geometry
             )
-            parts.append({v: _counted(x, part, clock) for v, x in samples.items()})
+            parts.append({v: counted(x, part, clock) for v, x in samples.items()})
             passes.append(layer.all_passes())
             clocks.append(clock)
         shares = subset.shares()
@@ -62,7 +62,7 @@ def sample_halves(
     return found, _seconds(clocks)
 
 
-def _counted(samples: Samples, part: SampleSubset, clock: StageClock) -> Samples:
+def counted(samples: Samples, part: SampleSubset, clock: StageClock) -> Samples:
     """With the number of each pixel's samples in the place of its share of the most."""
     if samples.counts is None:
         return samples

@@ -148,19 +148,28 @@ class LayerSession:
         return self._run(size, grid.rendered(self._size), exact=exact)
 
     def _run(
-        self, size: tuple[int, int], window: Region, *, exact: bool
+        self,
+        size: tuple[int, int],
+        window: Region,
+        *,
+        exact: bool,
+        is_part: bool = False,
     ) -> session.StageClock:
-        """Render `window` of a frame of `size` into the lower left of the result."""
+        """Render `window` of a frame of `size` into the lower left of the result.
+
+        Without a border in the file that is all of it, unless it `is_part`.
+        """
         depth = self._pipeline.depth
         with Borrowed() as borrowed:
             try:
                 borrowed.set(self._render, resolution_percentage=100)
                 width, height = size
                 self._pipeline.set(resolution_x=width, resolution_y=height)
-                if self._render.use_border:
+                if self._render.use_border or is_part:
                     # A quarter pixel in, so that truncation finds the same pixel.
                     borrowed.set(
                         self._render,
+                        use_border=True,
                         border_min_x=(window.x + 0.25) / width,
                         border_max_x=min(1.0, (window.x + window.width + 0.25) / width),
                         border_min_y=(height - window.y - window.height + 0.25)

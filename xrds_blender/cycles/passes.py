@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 
+from xrds_core.arrays import Array
 from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals.borrowed import Borrowed
@@ -20,9 +22,9 @@ from .guide_settings import guide_settings
 from .layer_session import LayerSession
 from .low_camera import LowGrid, Region
 from .low_samples import LowPlace, LowSamples
-from .pass_names import ALBEDO, DEPTH, NOISY, NORMAL
+from .pass_names import ALBEDO, DEPTH, NOISY, NORMAL, SAMPLE_COUNT
 from .rendered import Beauty, Guides, InProcess, Probe
-from .samples import read_samples
+from .samples import Samples, read_samples
 from .settings import (
     set_blue_noise,
     set_denoising,
@@ -122,6 +124,32 @@ class CyclesPasses(LayerSession):
         first = low[self.views[0]]
         live.show(first.samples.picture, scale, first.place.offset)
         return low
+
+    def part_samples(
+        self, region: Region, subset: SampleSubset, *, is_even: bool = True
+    ) -> tuple[dict[str, Samples], session.StageClock]:
+        """Render samples of a part of the frame, by view; `subset` and `is_even` as in
+        `set_samples`. Counts are there where `geometry` asked for them.
+        """
+        with Borrowed() as borrowed:
+            set_samples(borrowed, self._scene, None, None, subset, is_even)
+            set_blue_noise(borrowed, self._scene)
+            set_denoising(borrowed, self._scene, self._layer_eval, False)
+            live.samples()
+            size = self.width, self.height
+            is_part = region != self.region
+            clock = self._run(size, region, exact=True, is_part=is_part)
+        found = {}
+        for view in self.views:
+            samples = read_samples(self._corner_reader(view, region), ())
+            found[view] = replace(samples, counts=self._counts(view, region))
+        return found, clock
+
+    def _counts(self, view: str, region: Region) -> Array | None:
+        if SAMPLE_COUNT not in self._geometry:
+            return None
+        counts = self._corner_reader(view, region)(SAMPLE_COUNT)
+        return None if counts is None else np.ascontiguousarray(counts[..., 0])
 
     def stopped_samples(self, scale: int) -> dict[str, LowSamples]:
         """What `low_samples` has left in the result when the user stopped it."""

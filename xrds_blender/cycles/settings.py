@@ -89,6 +89,19 @@ def _stops_at(cycles: Any, samples: int) -> tuple[float, int]:
     return threshold, max(4, least)
 
 
+def set_share(borrowed: Borrowed, scene: Any, samples: int, share: float) -> None:
+    """Let a pixel stop at a `share` of what the file's noise threshold asks for.
+
+    `samples` are the most that the file allows: an automatic threshold follows them.
+    """
+    threshold, least = _stops_at(scene.cycles, samples)
+    borrowed.set(
+        scene.cycles,
+        adaptive_threshold=threshold / math.sqrt(share),
+        adaptive_min_samples=max(1, round(least * share)),
+    )
+
+
 def has_subsets(scene: Any) -> bool:
     """Whether this Blender's Cycles can take a part of a sequence; from 4.4 on."""
     return hasattr(scene.cycles, "use_sample_subset")

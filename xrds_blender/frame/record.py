@@ -31,7 +31,8 @@ def fields(picture: Picture, settings: Settings, samples: int) -> dict[str, str]
         entries["preset"] = settings.preset
     elif not settings.is_cycles_only:
         entries["preset"] = settings.quality
-    entries["samples"] = str(settings.samples or samples)
+    count = (settings.samples or samples) * settings.share
+    entries["samples"] = str(max(1, round(count)))
     if settings.is_enlarged:
         entries["guide_samples"] = _decided(picture.plan, "guide samples") or "0"
     if picture.temporal is not None:

@@ -36,6 +36,7 @@ class XRDS_OT_preset_add(AddPresetBase, bpy.types.Operator):
         "scene.xrds.time_budget",
         "scene.xrds.denoise",
         "scene.xrds.temporal_radius",
+        "scene.xrds.animation",
         "scene.xrds.preset",
         "scene.xrds.guide_samples",
         "scene.xrds.use_exposure",

@@ -13,6 +13,7 @@ from ..planning.settings import Mode
 from .machine import machine
 from .translations import CONTEXT
 
+SAME_PICTURE, SAME_TIME = "same_picture", "same_time"
 _MODES = [
     (
         Mode.AUTOMATIC,
@@ -23,8 +24,8 @@ _MODES = [
     (
         Mode.FULL_SIZE,
         "Full Size",
-        "Cycles renders every pixel and XRDS denoises the picture. The best choice for "
-        "final frames, stills and animations alike",
+        "Cycles renders every pixel and XRDS denoises the picture. In animations with "
+        "the samples of neighbouring frames; a still gains little but time",
     ),
     (
         Mode.X2,
@@ -102,6 +103,22 @@ DENOISE = [
 ]
 
 
+_ANIMATIONS = [
+    (
+        SAME_PICTURE,
+        "Same Picture",
+        "Frames look as the file's own samples make them, sooner: each takes as many "
+        "samples as it needs beside those of its neighbours. How many is measured in "
+        "the first frame, and where neighbours are of no use all are taken",
+    ),
+    (
+        SAME_TIME,
+        "Same Samples",
+        "Each frame takes the file's own samples, and the neighbours' make it better",
+    ),
+]
+
+
 class XRDSSettings(bpy.types.PropertyGroup):
     """How the engine XRDS renders a scene."""
 
@@ -138,6 +155,14 @@ class XRDSSettings(bpy.types.PropertyGroup):
         description="In an animation, how many frames before and after give their "
         "samples to each frame. More give less noise and flicker and take more memory; "
         "0 renders every frame by itself",
+    )
+    animation: EnumProperty(
+        name="Animation",
+        translation_context=CONTEXT,
+        items=_ANIMATIONS,
+        default=SAME_PICTURE,
+        description="What neighbouring frames' samples are used for in an animation: "
+        "fewer samples for each frame, or better frames",
     )
     guide_samples: IntProperty(
         name="Samples per Pixel",
@@ -204,5 +229,6 @@ def request_of(settings: XRDSSettings) -> Request:
         threads=here.threads,
         finish_stopped=here.finish_stopped,
         temporal_radius=settings.temporal_radius,
+        same_picture=settings.animation == SAME_PICTURE,
     )
     return modes.in_mode(wanted, Mode(settings.mode), settings.id_data)

@@ -72,7 +72,8 @@ def resolved(settings: Settings, scene: SceneSettings) -> Settings:
     elif settings.mode is Mode.FULL_SIZE:
         denoising = Denoising.ours(settings.quality)
     family = replace(settings, denoising=denoising).family
-    return replace(family, samples=settings.samples or scene.samples)
+    samples = settings.samples or scene.samples
+    return replace(family, samples=max(1, round(samples * settings.share)))
 
 
 def missing(settings: Settings, here: Capabilities) -> str:

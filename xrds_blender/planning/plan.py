@@ -15,6 +15,7 @@ from .forecast import low_size
 
 __all__ = [
     "GUIDE_CACHE",
+    "SAME_PICTURE",
     "SAVINGS",
     "Decision",
     "Facts",
@@ -27,12 +28,14 @@ __all__ = [
     "full_size",
     "guide_bounces",
     "neighbours",
+    "same_picture",
     "savings_but",
 ]
 
 # Mirrors and glass show other things' albedo and normals; four bounces hold them.
 GUIDE_BOUNCES = 4
 GUIDE_CACHE = "guide cache"
+SAME_PICTURE = "same picture"
 # What may be left out where a scene does not need it, by the names of the decisions.
 SAVINGS = (
     "denoise",
@@ -292,6 +295,15 @@ def neighbours(
     reason = "pixels are found again by depth, cameras and motion, if the light agrees"
     decisions = Decision(name, value, reason), _images(facts), *_in_part(scene)
     return (*decisions, *_cuts(cuts))
+
+
+def same_picture(samples: int) -> Decision:
+    """The decision of a shot that may have fewer samples than the file's."""
+    reason = (
+        f"each frame takes as many of {samples} samples as it needs beside its "
+        "neighbours', as the first frame shows; --same-time takes all"
+    )
+    return Decision(SAME_PICTURE, "as few samples as it needs", reason)
 
 
 def _images(facts: Facts) -> Decision:

@@ -60,7 +60,8 @@ class Request:
     names what the plan may leave out where the scene does not need it. `guide_cache` is
     a folder for guides beside those in memory; each render of the same view adds its
     samples to them until they are `guide_limit`. `finish_stopped` leaves what there is
-    in the result when the user stops the render.
+    in the result when the user stops the render. A shot that is to have the
+    `same_picture` as the file's own settings takes fewer samples where it can.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -72,6 +73,7 @@ class Request:
     guide_cache: str | Path | None = None
     guide_limit: int = 0
     finish_stopped: bool = False
+    same_picture: bool = False
 
     def __post_init__(self) -> None:
         unknown = set(self.savings) - set(SAVINGS)

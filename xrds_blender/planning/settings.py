@@ -108,7 +108,8 @@ class Settings:
     Cycles' own. `denoising` is ours or Cycles'; where Cycles is alone, ours leaves what
     the scene has, and None is no denoising at all. `preset` names the network and
     `guide_samples` are per full-size pixel: both are for enlargements. In a shot,
-    samples of `temporal_radius` frames before and after are reused.
+    samples of `temporal_radius` frames before and after are reused, and `share` is how
+    much of the samples a frame takes; with a noise threshold, of those it asks for.
     """
 
     mode: Mode = Mode.X2
@@ -117,6 +118,7 @@ class Settings:
     preset: str = "fast"
     guide_samples: int = 4
     temporal_radius: int = 0
+    share: float = 1.0
 
     @property
     def scale(self) -> int:
@@ -153,7 +155,7 @@ class Settings:
     def family(self) -> Settings:
         """All but how many samples, and nothing that the mode does not use."""
         if self.is_enlarged:
-            return replace(self, samples=None, temporal_radius=0)
+            return replace(self, samples=None, temporal_radius=0, share=1.0)
         return Settings(self.mode, None, self.denoising, "", 0)
 
     @property

@@ -18,7 +18,9 @@ from ..cycles.passes import CyclesPasses
 from ..frame import stages
 from ..scene.contents import requested_passes
 from ..scene.cuts import cuts
+from .full_size import FullSize
 from .methods import Method
+from .same_picture import Part, render_more, same_picture
 from .sampling import Sampled, can_continue, first_sample
 from .visiting import go_to
 
@@ -67,6 +69,8 @@ class EngineFrames:
         found = cls(method)
         numbers = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
         radius, begins = method.request.settings.temporal_radius, cuts(scene, numbers)
+        if isinstance(method, FullSize):
+            method.same_picture = same_picture(scene, method.request, len(numbers))
         found.window = Window(Shot(tuple(numbers), radius, begins), found._load)
         return found
 
@@ -86,12 +90,30 @@ class EngineFrames:
             last = missing[-1] if missing else None
             self._call = _Call(engine, depsgraph, passes, number, last)
             try:
-                return self._whole(number)
+                found = self._whole(number)
             finally:
                 self._call = None
                 go_to(engine, depsgraph, number)
                 if number in self.ahead:
                     passes.put_back(self.ahead.pop(number))
+            return self._completed(engine, depsgraph, found)
+
+    def _completed(
+        self, engine: Any, depsgraph: Any, found: Neighbourhood[Sampled]
+    ) -> Neighbourhood[Sampled]:
+        """The frame with more samples where it is to have the same picture."""
+        method = self.method
+        if not isinstance(method, FullSize) or method.same_picture is None:
+            return found
+
+        def more(part: Part) -> Any:
+            scene = depsgraph.scene_eval
+            place = scene.frame_current // scene.frame_step
+            return render_more(engine, depsgraph, method.request, place, part)
+
+        others = list(found.neighbours.values())
+        own = method.same_picture.complete(method, found.own, others, more)
+        return replace(found, own=own)
 
     def _whole(self, number: int) -> Neighbourhood[Sampled]:
         """A frame with its neighbours, sampled again where these lack what it lacks."""

@@ -10,9 +10,10 @@ from typing import Any
 from ..choosing.chosen import Chosen, chosen
 from ..choosing.plan_facts import find_facts
 from ..frame.rendering import call_engine
-from ..planning.plan import neighbours
+from ..planning.plan import neighbours, same_picture
 from ..planning.request import Request
 from ..scene.cuts import cuts
+from .same_picture import can_save
 from .sampling import has_neighbours
 
 
@@ -46,5 +47,7 @@ def _described(
     decisions = request.plan(facts).decisions
     if radius and len(shot) > 1:
         decisions += neighbours(facts, radius, cuts(scene, shot))
+    if can_save(scene, request, len(shot)):
+        decisions += (same_picture(scene.cycles.samples),)
     decisions = choice.all_decisions(decisions)
     return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.arrays import Array
 from xrds_core.sequence.finishing import finish_frame
-from xrds_core.temporal.accumulate import Accumulated
+from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.vectors import Movement
 
 from ..cycles.samples import Samples
@@ -19,7 +19,8 @@ from ..planning.plan import Decision, full_size
 from ..planning.request import Request
 from ..planning.settings import Denoising, Settings
 from .methods import Method, Report
-from .sampling import OnSampled, Sampled, sample_frame
+from .same_picture import SamePicture
+from .sampling import Gathered, OnSampled, Sampled, sample_frame
 
 if TYPE_CHECKING:
     from xrds_core.denoising import Denoised
@@ -40,6 +41,7 @@ class FullSize(Method):
         denoise_in_time: Callable[[], str] | None = None,
     ) -> None:
         super().__init__(request)
+        self.same_picture: SamePicture | None = None
         self._on_sampled, self._denoise_in_time = on_sampled, denoise_in_time
         self._quality = self.settings.quality
         self._denoiser = load_denoiser(self._quality, request.machine)
@@ -52,7 +54,13 @@ class FullSize(Method):
         place: int | None = None,
         between: bool = False,
     ) -> Sampled:
-        return sample_frame(engine, depsgraph, self.request, place, self._on_sampled)
+        same = self.same_picture
+        if same is None:
+            return sample_frame(
+                engine, depsgraph, self.request, place, self._on_sampled
+            )
+        same.sampled(depsgraph.scene_eval.frame_current)
+        return sample_frame(engine, depsgraph, same.request(self.request), place)
 
     def begin_finishing(self, engine: Any) -> Report:
         if self._denoise_in_time is not None:
@@ -71,13 +79,41 @@ class FullSize(Method):
         if isinstance(frame, Samples):
             return self._alone(frame, report)
         neighbours = own.neighbours(view, others)
-        return self.finish_stored(frame, neighbours, report)
+        gathered = own.gathered.get(view)
+        picture = self.finish_stored(frame, neighbours, report, gathered)
+        assert picture.settings is not None
+        settings = replace(picture.settings, share=own.share)
+        plan = (*picture.plan, *own.decisions)
+        return replace(picture, settings=settings, plan=plan)
+
+    def accumulate(
+        self, own: Sampled, others: Sequence[Sampled], view: str
+    ) -> Accumulated:
+        """One view with the samples of its neighbours."""
+        neighbours = own.neighbours(view, others)
+        return accumulate(own.views[view], neighbours, self._movement)
+
+    def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
+        """Samples by themselves, denoised."""
+        return self._denoiser(radiance, albedo, normal).radiance
 
     def finish_stored(
-        self, own: Stored, neighbours: Sequence[Stored], report: Report | None = None
+        self,
+        own: Stored,
+        neighbours: Sequence[Stored],
+        report: Report | None = None,
+        gathered: Gathered | None = None,
     ) -> Picture:
         """The picture of a packed frame with the samples of its neighbours."""
-        finished = finish_frame(own, neighbours, self._denoiser, self._movement, report)
+        finished = finish_frame(
+            own,
+            neighbours,
+            self._denoiser,
+            self._movement,
+            report,
+            accumulated=gathered and gathered.accumulated,
+            extra=gathered and gathered.extra,
+        )
         accumulated = finished.accumulated
         return self._picture(
             finished.denoised,

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from xrds_core.errors import Cancelled, SceneError
+from xrds_core.sequence.extra_samples import ExtraSamples
+from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.frame import Camera, Frame, store
 from xrds_core.temporal.sample_subsets import SampleSubset, consecutive_subset
 
@@ -22,9 +24,11 @@ from ..cycles.samples import (
     Samples,
     sample_layer,
 )
-from ..cycles.settings import has_subsets
+from ..cycles.settings import has_subsets, set_share
 from ..cycles.view import cameras_of, can_track
 from ..frame import denoisers, stages
+from ..internals.borrowed import Borrowed
+from ..planning.plan import Decision
 from ..planning.request import Request
 from ..scene.contents import scene_facts, shapes_move, stands_still
 from .stopping import finish_samples
@@ -40,16 +44,29 @@ OnSampled = Callable[[Mapping[str, Frame]], object]
 
 
 @dataclass(frozen=True)
+class Gathered:
+    """A view with its neighbours' samples, and `extra` ones beside its own."""
+
+    accumulated: Accumulated
+    extra: ExtraSamples | None = None
+
+
+@dataclass(frozen=True)
 class Sampled:
     """One frame before it is finished, by view, and the seconds that it took.
 
     At full size views are `Stored`, of a still `Samples`; above scale 1 they are a
     `View` or `Inputs` of `super_resolution`; of Cycles alone finished pictures.
+    `gathered` is what is known already of a view with its neighbours; `share` is how
+    much of the samples requested it has, decided for the reasons in `decisions`.
     """
 
     number: int
     views: dict[str, Any]
     seconds: dict[str, float]
+    gathered: Mapping[str, Gathered] = field(default_factory=dict)
+    share: float = 1.0
+    decisions: tuple[Decision, ...] = ()
 
     def neighbours(self, view: str, frames: Sequence[Sampled]) -> list[Any]:
         """That view of other frames, and this frame's other views."""
@@ -61,16 +78,17 @@ class Sampled:
 class Sampling:
     """How a frame is sampled, and the cameras that see it, by view.
 
-    `count` samples per pixel; `geometry` names passes. `place` is the frame's in the
-    shot where frames continue one sequence, None where each begins its own. `still`
-    is as in `Frame`. A frame that `has_halves` is sampled in two; one that
-    `needs_motion` is rendered once more without motion blur for its motion. One that
-    `is_alone` has no neighbours: it is sampled as its file has it.
+    `count` samples per pixel, of the `whole` of a sequence; `geometry` names passes.
+    `place` is the frame's in the shot where frames continue one sequence, None where
+    each begins its own. `still` is as in `Frame`. A frame that `has_halves` is sampled
+    in two; one that `needs_motion` is rendered once more without motion blur for its
+    motion. One that `is_alone` has no neighbours: it is sampled as its file has it.
     """
 
     number: int
     cameras: dict[str, Camera] = field(default_factory=dict)
     count: int = 0
+    whole: int = 0
     seed: int = 0
     geometry: Sequence[tuple[str, str]] = ()
     place: int | None = None
@@ -98,6 +116,12 @@ class Sampling:
         return consecutive_subset(self.place, count, self.radius, self.seed + other)
 
     @property
+    def sequence(self) -> SampleSubset:
+        """All samples that the file asks for; the frame takes the first of them."""
+        own = SampleSubset(self.own_seed, self.whole, 0, self.whole)
+        return self.subset(self.whole) or own
+
+    @property
     def own_seed(self) -> int:
         """One that no other frame has."""
         return (self.seed + self.number * SEED_STEP) % LARGEST_SEED
@@ -121,9 +145,7 @@ def can_continue(scene: Any, request: Request) -> bool:
 
     And where the file does not let Cycles decide how many samples a pixel takes.
     """
-    return (
-        stands_still(scene.camera) and has_subsets(scene) and _is_even(scene, request)
-    )
+    return stands_still(scene.camera) and has_subsets(scene) and is_even(scene, request)
 
 
 def sampling_of(
@@ -144,12 +166,14 @@ def sampling_of(
         raise SceneError(
             "such panoramas cannot be reprojected; set the temporal radius to 0"
         )
-    is_even = _is_even(scene, request)
+    even = is_even(scene, request)
     if not can_continue(scene, request):
         place = None
     facts = scene_facts(depsgraph)
-    geometry = [*_geometry(depsgraph), *([] if is_even else [COUNTS])]
-    count = request.settings.samples or session.samples_of(depsgraph)
+    geometry = [*_geometry(depsgraph), *([] if even else [COUNTS])]
+    whole = request.settings.samples or session.samples_of(depsgraph)
+    count = max(1, round(whole * request.settings.share))
+    seed = scene.cycles.seed if request.seed is None else request.seed
     blurred = scene.render.use_motion_blur
     if place is not None:
         geometry[0] = LATE_DEPTH
@@ -159,7 +183,8 @@ def sampling_of(
         number=scene.frame_current,
         cameras=cameras,
         count=count,
-        seed=scene.cycles.seed if request.seed is None else request.seed,
+        whole=whole,
+        seed=seed,
         geometry=geometry,
         place=place,
         radius=request.settings.temporal_radius,
@@ -169,7 +194,7 @@ def sampling_of(
     )
 
 
-def _is_even(scene: Any, request: Request) -> bool:
+def is_even(scene: Any, request: Request) -> bool:
     """Whether every pixel takes as many samples as are requested."""
     cycles = scene.cycles
     decides = cycles.use_adaptive_sampling or cycles.time_limit
@@ -236,18 +261,23 @@ def noisy_frame(
     """
     how = sampling_of(engine, depsgraph, request, place)
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
+    settings = request.settings
     stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
     try:
-        if how.has_halves:
-            return _frames_of_halves(engine, depsgraph, how)
-        noisy, clock = sample_layer(
-            engine,
-            depsgraph,
-            samples=request.settings.samples,
-            seed=how.own_seed,
-            subset=how.subset(how.count),
-            geometry=how.geometry,
-        )
+        with Borrowed() as borrowed:
+            if settings.share < 1.0:
+                most = settings.samples or session.samples_of(depsgraph)
+                set_share(borrowed, depsgraph.scene_eval, most, settings.share)
+            if how.has_halves:
+                return _frames_of_halves(engine, depsgraph, how)
+            noisy, clock = sample_layer(
+                engine,
+                depsgraph,
+                samples=settings.samples,
+                seed=how.own_seed,
+                subset=how.subset(how.count),
+                geometry=how.geometry,
+            )
     except Cancelled:
         finish_samples(engine, layer_name, request)
         raise
@@ -267,9 +297,7 @@ def _frames_of_halves(
     motion, seconds = {}, dict.fromkeys(("sync", "beauty"), 0.0)
     if how.needs_motion:
         motion, seconds = sample_motion(engine, depsgraph, how.own_seed)
-    subset = how.subset(how.count) or SampleSubset(
-        how.own_seed, how.count, 0, how.count
-    )
+    subset = replace(how.sequence, length=how.count)
     found, more = sample_halves(engine, depsgraph, subset, how.geometry)
     frames = {}
     for view, half in found.items():

@@ -12,14 +12,17 @@ from typing import Any
 from xrds_core.temporal.window import Shot, Window, place_of
 
 from ..choosing.chosen import Chosen, choose_for_shot
+from ..cycles import session
 from ..frame import stages
 from ..frame.picture import Picture, joined
 from ..frame.rendering import call_engine
 from ..planning.request import Request
 from ..scene.cuts import cuts
 from .cache import SampleCache
+from .full_size import FullSize
 from .methods import Method
 from .render import method_of
+from .same_picture import Part, render_more, same_picture
 from .sampling import Sampled
 
 
@@ -55,17 +58,44 @@ def render_shot(
             return None
         return _sample(scene, method, frames, number, shot.is_between(number))
 
+    if isinstance(method, FullSize) and not cache:
+        method.same_picture = same_picture(scene, request, len(frames))
     for found in Window(shot, load):
         number, own = found.number, found.own
         if is_done(number):  # another machine was quicker
             continue
         others = list(found.neighbours.values())
+        own = _completed(scene, method, frames, own, others)
         if method.lacks(own, others):
             own = _sample(scene, method, frames, number)
         pictures = {view: method.finish(own, others, view) for view in own.views}
         picture = joined(pictures, own.seconds)
         picture.seconds["total"] = sum(picture.seconds.values())
         yield number, chosen.described(picture)
+
+
+def _completed(
+    scene: Any,
+    method: Method,
+    frames: Sequence[int],
+    own: Sampled,
+    others: Sequence[Sampled],
+) -> Sampled:
+    """The frame with more samples where it is to have the same picture."""
+    if not isinstance(method, FullSize) or method.same_picture is None:
+        return own
+
+    def more(part: Part) -> Any:
+        scene.frame_set(own.number)
+
+        def work(engine: Any, depsgraph: Any) -> Any:
+            session.allocate(engine)
+            place = place_of(own.number, frames)
+            return render_more(engine, depsgraph, method.request, place, part)
+
+        return call_engine(scene, work)
+
+    return method.same_picture.complete(method, own, others, more)
 
 
 def _chosen(scene: Any, request: Request, todo: Sequence[int]) -> Chosen:

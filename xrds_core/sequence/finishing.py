@@ -10,6 +10,7 @@ import numpy as np
 
 from ..temporal.accumulate import Accumulated, accumulate
 from ..temporal.local_filters import box
+from .extra_samples import with_extra
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from ..denoising import Denoised, Denoiser
     from ..temporal.frame import Stored
     from ..temporal.vectors import Movement
+    from .extra_samples import ExtraSamples
 
 
 # The accumulated picture has full weight from this many reused samples for each of the
@@ -56,18 +58,28 @@ def finish_frame(
     progress: Callable[[float], bool] | None = None,
     *,
     region: tuple[slice, slice] | None = None,
+    accumulated: Accumulated | None = None,
+    extra: ExtraSamples | None = None,
 ) -> Finished:
     """Accumulate the samples of `neighbours` on a frame and denoise it.
 
     Where few samples are reused the picture is that of the frame alone, also denoised:
     next to pixels of many samples a denoiser mistakes the noise of few for detail.
     `region`, rows and columns, is the part to denoise: black around a crop would give
-    the denoiser a wrong exposure. Raises Cancelled if `progress` requests it.
+    the denoiser a wrong exposure. `accumulated` is the frame with its neighbours if it
+    is known already; `extra` are samples that it has beside its own. Raises Cancelled
+    if `progress` requests it.
     """
     started = time.perf_counter()
-    accumulated = accumulate(own, neighbours, movement)
+    if accumulated is None:
+        accumulated = accumulate(own, neighbours, movement)
     alone = accumulate(own, []) if neighbours else accumulated
-    share = _share(accumulated, alone, own.samples)
+    samples = own.samples
+    if extra is not None:
+        accumulated = with_extra(accumulated, alone, extra)
+        alone = with_extra(alone, alone, extra)
+        samples += float(extra.samples.mean())
+    share = _share(accumulated, alone, samples)
     denoise_started = time.perf_counter()
     region = region or (slice(None), slice(None))
     share = share[region]

@@ -291,9 +291,9 @@ def test_frames_in_steps_lend_in_steps(animation: Any, blend: Path) -> None:
     seen = []
     finish = full_size.finish_frame
 
-    def look(own: Any, lenders: Any, *rest: Any) -> Any:
+    def look(own: Any, lenders: Any, *rest: Any, **more: Any) -> Any:
         seen.append(sorted([own.number, *(each.number for each in lenders)]))
-        return finish(own, lenders, *rest)
+        return finish(own, lenders, *rest, **more)
 
     animation.frame_step = 2
     full_size.finish_frame = look

@@ -78,6 +78,8 @@ def _draw_choices(
         _offer(column, settings, "preset", offered)
     if not request.settings.is_cycles_only:
         layout.prop(settings, "temporal_radius")
+    if request.settings.mode is Mode.FULL_SIZE and request.settings.temporal_radius:
+        layout.prop(settings, "animation")
 
 
 class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):

@@ -1,4 +1,4 @@
-"""Final frames and shots at full size."""
+"""The file's own samples, and those of neighbouring frames beside them."""
 
 import bpy
 
@@ -7,10 +7,10 @@ scene = bpy.context.scene
 scene.xrds.mode = "full_size"
 scene.xrds.use_time_budget = False
 scene.xrds.time_budget = 60.0
-scene.xrds.denoise = "high"
+scene.xrds.denoise = "best"
 scene.xrds.temporal_radius = 4
+scene.xrds.animation = "same_time"
 scene.xrds.preset = "fast"
 scene.xrds.guide_samples = 4
 scene.xrds.use_exposure = False
 scene.xrds.exposure = 1.0
-scene.cycles.samples = 128

@@ -1,0 +1,182 @@
+"""Shots with the picture of the file's own settings, from fewer samples."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from channels import read_channels
+
+bpy = pytest.importorskip("bpy")
+pytest.importorskip("mitsuba_oidn")
+
+from xrds_blender.command import main
+from xrds_blender.command.render_file import render_file
+from xrds_blender.cycles.settings import has_subsets
+from xrds_blender.planning.request import render_request
+from xrds_blender.shot import same_picture, sampling
+from xrds_core.temporal.frame import Frame, Stored
+
+pytestmark = pytest.mark.skipif(
+    not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
+)
+FRAMES = [1, 2, 3, 4, 5]
+SAMPLES = 16
+
+
+@pytest.fixture
+def shot(blend: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The scene with enough samples to save some, in a short shot."""
+    monkeypatch.setattr(same_picture, "FEWEST_FRAMES", len(FRAMES))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = SAMPLES, False
+    scene.frame_start, scene.frame_end = FRAMES[0], FRAMES[-1]
+    bpy.ops.wm.save_mainfile()
+    return blend
+
+
+def render(blend: Path, out: str, **job: Any) -> list[dict[str, Any]]:
+    request = {"scale": 1, "temporal_radius": 2, "same_picture": True} | job
+    pattern = str(blend.parent / out / "#.exr")
+    result = render_file(blend, pattern, render_request(**request), frames=FRAMES)
+    return result["frames"]
+
+
+def picture(path: Path) -> np.ndarray:
+    channels = read_channels(path)
+    return np.dstack([channels[name] for name in "RGB"])
+
+
+def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[float]:
+    """Let the error of fewer samples be this; returns the counts that are rendered."""
+    monkeypatch.setattr(same_picture, "error_ratio", lambda *_: ratio)
+    lengths: list[float] = []
+    inner = same_picture.more_samples
+
+    def noted(engine: Any, depsgraph: Any, parts: Any, **more: Any) -> Any:
+        lengths.append(sum(part.length for part in parts))
+        return inner(engine, depsgraph, parts, **more)
+
+    monkeypatch.setattr(same_picture, "more_samples", noted)
+    return lengths
+
+
+def test_fewer_samples_are_taken_where_they_are_enough(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured(monkeypatch, 0.5)
+    shares = [frame["share"] for frame in render(shot, "same")]
+    assert min(shares) < 0.5, shares
+    assert np.mean(shares) < 0.7, shares
+    monkeypatch.undo()
+    assert {frame["share"] for frame in render(shot, "time", same_picture=False)} == {1}
+
+
+def test_all_samples_are_taken_where_neighbours_are_of_no_use(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lengths = measured(monkeypatch, float("inf"))
+    frames = render(shot, "same")
+    assert [frame["share"] for frame in frames] == pytest.approx([1.0] * len(FRAMES))
+    # two halves in the first frame, then the rest of those sampled before it was done
+    assert lengths[:2] == [SAMPLES // 2, SAMPLES // 2]
+    assert set(lengths[2:]) == {SAMPLES - SAMPLES // 4}
+
+
+def test_the_rest_of_a_sequence_is_the_picture_of_all(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where no neighbour is used, it is what one render of all samples gives."""
+    measured(monkeypatch, float("inf"))
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    for obj in bpy.data.objects:
+        obj.animation_data_clear()
+    scene = bpy.context.scene
+    for number in FRAMES:  # another camera each: nothing is reused
+        data = bpy.data.cameras.new(str(number))
+        camera = bpy.data.objects.new(str(number), data)
+        camera.matrix_world = scene.camera.matrix_world
+        scene.collection.objects.link(camera)
+        scene.timeline_markers.new(str(number), frame=number).camera = camera
+    bpy.ops.wm.save_mainfile()
+    render(shot, "same")
+    render(shot, "time", same_picture=False)
+    for number in FRAMES:
+        pair = [
+            picture(shot.parent / out / f"{number}.exr") for out in ("same", "time")
+        ]
+        assert np.allclose(*pair, rtol=0.02, atol=2e-3)
+
+
+def test_a_noise_threshold_is_kept_and_raised(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    cycles = bpy.context.scene.cycles
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, 0.2
+    cycles.samples = 64
+    bpy.ops.wm.save_mainfile()
+    sampled: list[float] = []
+    store = sampling.store
+
+    def noted(frame: Frame, *more: Any) -> Stored:
+        sampled.append(frame.samples)
+        return store(frame, *more)
+
+    monkeypatch.setattr(sampling, "store", noted)
+    render(shot, "time", same_picture=False)
+    all_of_them, sampled[:] = sampled[2], []  # the mean of the middle frame's pixels
+    measured(monkeypatch, 0.5)
+    render(shot, "same")
+    assert sampled[2] < 0.6 * all_of_them
+    scene = bpy.context.scene
+    assert scene.cycles.adaptive_threshold == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--sample-cache c"])
+def test_what_rules_it_out_is_said(
+    what: str, shot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["render", str(shot), "-o", str(shot.parent / "#.exr"), "--same-picture"]
+    words += ["--frames", "1-5", *what.split()]
+    if "scale" not in what:
+        words += ["--scale", "1"]
+    assert main.main(words) == 2
+    assert "--same-picture cannot be had with" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("job", "frames"),
+    [({"samples": 16}, 5), ({"temporal_radius": 0}, 5), ({}, 4), ({"scale": 2}, 5)],
+)
+def test_elsewhere_frames_have_the_samples_of_the_file(
+    job: dict[str, Any], frames: int, shot: Path
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    request = {"scale": 1, "temporal_radius": 2, "same_picture": True} | job
+    scene = bpy.context.scene
+    assert not same_picture.can_save(scene, render_request(**request), frames)
+    assert same_picture.can_save(
+        scene, render_request(1, temporal_radius=2, same_picture=True), 5
+    )
+
+
+def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
+    render(shot, "command", temporal_radius=4)
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    scene = bpy.context.scene
+    scene.render.engine, scene.xrds.mode = "XRDS", "full_size"
+    assert scene.xrds.animation == "same_picture"
+    scene.render.filepath = str(shot.parent / "engine" / "#")
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    bpy.ops.render.render(animation=True)
+    for number in FRAMES:
+        pair = [
+            picture(shot.parent / out / f"{number}.exr")
+            for out in ("command", "engine")
+        ]
+        assert np.allclose(*pair, rtol=1e-3, atol=1e-4)

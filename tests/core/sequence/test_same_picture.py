@@ -1,0 +1,147 @@
+"""How many samples are as good with neighbours as more without."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from shots import World, camera, view
+
+from xrds_core.sequence.extra_samples import ExtraSamples, with_extra
+from xrds_core.sequence.same_picture import (
+    BLOCK,
+    Rendered,
+    error_ratio,
+    gain,
+    rectangles,
+)
+from xrds_core.temporal.accumulate import Accumulated, accumulate
+from xrds_core.temporal.frame import store
+
+Array = NDArray[np.float32]
+SHAPE = (192, 256)
+
+
+def noisy(truth: Array, deviation: float, seed: int) -> Array:
+    noise = np.random.default_rng(seed).normal(0.0, deviation, truth.shape)
+    return np.asarray(truth + noise, np.float32)
+
+
+def ratio(ours: float, theirs: float, noise: float = 0.3) -> float:
+    """Of pictures whose errors have these deviations; `theirs` of all samples."""
+    truth = np.full((*SHAPE, 3), 0.5, np.float32)
+    half = theirs * 2.0**0.35  # half of the samples have 2 ** 0.7 times the error
+    first, second = (
+        Rendered(noisy(truth, noise, i), noisy(truth, half, i + 10)) for i in (1, 2)
+    )
+    picture, own = noisy(truth, ours, 3), noisy(truth, noise * 1.4, 4)
+    return error_ratio(picture, own, (first, second))
+
+
+@pytest.mark.parametrize("expected", [0.25, 1.0, 4.0])
+def test_errors_are_measured_without_a_reference(expected: float) -> None:
+    found = ratio(0.05 * expected**0.5, 0.05)
+    assert 0.9 * expected < found < 1.3 * expected + 0.1  # too high rather than too low
+
+
+def test_a_ratio_that_noise_hides_is_infinite() -> None:
+    assert ratio(0.001, 0.001, noise=3.0) == float("inf")
+
+
+def test_radiance_beyond_all_bounds_is_survived() -> None:
+    truth = np.full((64, 64, 3), 0.5, np.float32)
+    bad = truth.copy()
+    bad[3, 4] = 3e38
+    parts = Rendered(bad, truth), Rendered(-bad, truth)
+    assert not np.isnan(error_ratio(truth, bad, parts))
+
+
+def frames(moved: bool = True) -> tuple[list, Accumulated]:
+    """Three frames of a wall, the middle one with its neighbours."""
+    found = [
+        store(view(n, camera(0.3 * n if moved else 0.0), World(), noise=0.2).frame)
+        for n in (1, 2, 3)
+    ]
+    return found, accumulate(found[1], [found[0], found[2]])
+
+
+def test_what_neighbours_bring_is_counted() -> None:
+    found, accumulated = frames(moved=False)
+    gained = gain(accumulated, found[1])
+    everywhere = np.ones(gained.errors.shape, bool)
+    assert 2.0 < gained.of(everywhere) < 3.2
+    alone = gain(accumulate(found[1], []), found[1])
+    assert alone.of(everywhere) == pytest.approx(1.0)
+    assert np.allclose(alone.blocks[np.isfinite(alone.blocks)], 1.0)
+
+
+@pytest.mark.parametrize("most", [1, 2, 4])
+def test_rectangles_cover_what_is_marked(most: int) -> None:
+    blocks = np.zeros((12, 20), bool)
+    blocks[1:3, 2:4] = blocks[8, 15:19] = blocks[11, 0] = True
+    found = rectangles(blocks, most)
+    covered = np.zeros_like(blocks)
+    for area in found:
+        assert not covered[area].any()  # nothing is rendered twice
+        covered[area] = True
+    assert covered[blocks].all()
+    assert len(found) <= most
+    if most == 4:
+        assert covered.sum() == blocks.sum()
+
+
+def test_nothing_marked_is_no_rectangle() -> None:
+    assert rectangles(np.zeros((3, 4), bool)) == []
+
+
+def extra(samples: Array, value: float) -> ExtraSamples:
+    light = np.full((*samples.shape, 3), value, np.float32)
+    return ExtraSamples(light, light, light, np.ones_like(samples), samples)
+
+
+def test_extra_samples_count_by_their_number() -> None:
+    found, accumulated = frames()
+    samples = np.zeros(found[1].shape, np.float32)
+    samples[:BLOCK] = 3.0
+    alone = accumulate(found[1], [])
+    result = with_extra(accumulated, alone, extra(samples, 7.0))
+    assert result.radiance is not None
+    assert accumulated.radiance is not None
+    share = 3.0 / (accumulated.samples[:BLOCK] + 3.0)
+    before = accumulated.radiance[:BLOCK]
+    expected = before + (7.0 - before) * share[..., None]
+    assert np.allclose(result.radiance[:BLOCK], expected, atol=1e-5)
+    assert np.array_equal(result.radiance[BLOCK:], accumulated.radiance[BLOCK:])
+    assert np.array_equal(result.samples, accumulated.samples + samples)
+
+
+def test_extra_samples_that_are_not_finite_are_left_out() -> None:
+    found, accumulated = frames()
+    samples = np.ones(accumulated.samples.shape, np.float32)
+    more = extra(samples, 7.0)
+    more.radiance[5, 6] = np.nan
+    result = with_extra(accumulated, accumulate(found[1], []), more)
+    assert result.radiance is not None
+    assert accumulated.radiance is not None
+    assert np.array_equal(result.radiance[5, 6], accumulated.radiance[5, 6])
+    assert np.isfinite(result.radiance).all()
+
+
+@pytest.mark.parametrize("worth", [0.0, 0.5])
+def test_neighbours_count_by_their_worth_beside_extra_samples(worth: float) -> None:
+    found, accumulated = frames(moved=False)
+    alone = accumulate(found[1], [])
+    more = replace(extra(np.full(found[1].shape, 3.0, np.float32), 7.0), worth=worth)
+    result = with_extra(accumulated, alone, more)
+    assert result.albedo is not None
+    counts = 1.0, worth * (accumulated.samples - 1.0), 3.0
+    beside = accumulated.samples[..., None]
+    neighbours = (accumulated.albedo * beside - alone.albedo) / (beside - 1.0)
+    parts = alone.albedo, neighbours, more.albedo
+    expected = (
+        sum(x * np.asarray(n)[..., None] for x, n in zip(parts, counts, strict=True))
+        / (sum(counts)[..., None])
+    )
+    assert np.allclose(result.albedo, expected, atol=1e-4)

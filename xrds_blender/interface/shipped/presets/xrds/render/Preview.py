@@ -1,0 +1,17 @@
+"""The quickest look at an animation: 2 samples a frame."""
+
+import bpy
+
+scene = bpy.context.scene
+
+scene.xrds.mode = "full_size"
+scene.xrds.use_time_budget = False
+scene.xrds.time_budget = 60.0
+scene.xrds.denoise = "fast"
+scene.xrds.temporal_radius = 4
+scene.xrds.animation = "same_time"
+scene.xrds.preset = "fast"
+scene.xrds.guide_samples = 4
+scene.xrds.use_exposure = False
+scene.xrds.exposure = 1.0
+scene.cycles.samples = 2

@@ -1,0 +1,378 @@
+"""The picture of the file's own settings from fewer samples, where neighbours help.
+
+The first frame of a shot is rendered both ways, with a share of the file's samples and
+with all of them, and the error of both is measured by halves. From there on what
+neighbours add to a frame says how many samples the next ones need. A frame that lacks
+samples, or a part of it that does, gets more before it is finished: up to all that the
+file asks for, where neighbours add nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xrds_core.arrays import Array
+from xrds_core.sequence.extra_samples import ExtraSamples
+from xrds_core.sequence.same_picture import (
+    BLOCK,
+    FALL,
+    Gain,
+    Rendered,
+    error_ratio,
+    gain,
+    rectangles,
+)
+from xrds_core.temporal.accumulate import Accumulated
+from xrds_core.temporal.half_floats import floats
+from xrds_core.temporal.sample_subsets import SampleSubset
+
+from ..cycles.low_camera import Region
+from ..cycles.more_samples import more_samples
+from ..cycles.samples import Samples
+from ..cycles.settings import has_subsets
+from ..frame import stages
+from ..frame.picture import Picture
+from ..planning.plan import SAME_PICTURE, Decision
+from ..planning.request import Request
+from ..planning.settings import Mode
+from .sampling import (
+    LARGEST_SEED,
+    Gathered,
+    Sampled,
+    has_neighbours,
+    is_even,
+    sampling_of,
+)
+
+FEWEST_SAMPLES = 8
+"""Samples of the file from which it pays."""
+FEWEST_FRAMES = 16
+"""Frames of a shot from which it pays: the first costs more than the file asks for."""
+_FIRST = 0.25  # share that the first frames have; less was not tried by then
+_LEAST = 2  # samples of a frame, which has halves then
+# Blocks with less than this share of what they need get more samples, and frames.
+_LACKING, _ENOUGH = 0.75, 0.9
+_MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
+# The share of the next frames stays as it is as long as it is off by no more: Cycles
+# syncs the scene again for another number of samples.
+_TOO_MUCH, _TOO_LITTLE = 0.8, 1.1
+_OTHER = 1_299_709  # seeds apart; no frame's is near those of another
+
+
+@dataclass(frozen=True)
+class Part:
+    """More samples of a frame: `length` of its sequence, from `offset` on.
+
+    Where the file has a noise threshold, pixels stop at `share` of what it asks for.
+    `region` is a part of the picture, None all of it. `other` sequences have seeds of
+    their own.
+    """
+
+    offset: int
+    length: int
+    share: float
+    region: Region | None = None
+    other: int = 0
+
+
+More = Callable[[Part], tuple[dict[str, ExtraSamples], dict[str, float]]]
+"""Renders more samples of a frame, by view, and says in how many seconds."""
+
+
+_More = Callable[[Part], dict[str, ExtraSamples]]
+
+
+class Finishing(Protocol):
+    """What makes pictures of frames: `FullSize`."""
+
+    def accumulate(
+        self, own: Sampled, others: Sequence[Sampled], view: str
+    ) -> Accumulated:
+        """One view with the samples of its neighbours."""
+
+    def finish(self, own: Sampled, others: Sequence[Sampled], view: str) -> Picture:
+        """The picture of one view."""
+
+    def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
+        """Samples by themselves, denoised."""
+
+
+def can_save(scene: Any, request: Request, frames: int) -> bool:
+    """Whether a shot of so many frames may have fewer samples than the file's."""
+    settings, cycles = request.settings, scene.cycles
+    return (
+        request.same_picture
+        and request.goal is None
+        and settings.mode is Mode.FULL_SIZE
+        and settings.samples is None
+        and frames >= FEWEST_FRAMES
+        and cycles.samples >= FEWEST_SAMPLES
+        and has_subsets(scene)
+        and not (cycles.use_sample_subset or cycles.time_limit)
+        and has_neighbours(scene, request)
+    )
+
+
+def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | None:
+    """What chooses the samples of a shot of so many frames.
+
+    None where frames have what the request says.
+    """
+    if not can_save(scene, request, frames):
+        return None
+    found = SamePicture(scene.cycles.samples)
+    found.share = found.possible(_FIRST)
+    return found
+
+
+def render_more(
+    engine: Any, depsgraph: Any, request: Request, place: int | None, part: Part
+) -> tuple[dict[str, ExtraSamples], dict[str, float]]:
+    """Render more samples of the frame that the dependency graph is at.
+
+    `place` is as in `sampling_of`. The result has the passes afterwards that it had
+    before. Raises Cancelled when the user stops it.
+    """
+    how = sampling_of(engine, depsgraph, request, place)
+    subset = how.sequence
+    if part.other:
+        seed = (subset.seed + part.other * _OTHER) % LARGEST_SEED
+        subset = SampleSubset(seed, part.length, 0, part.length)
+    else:
+        offset = subset.offset + part.offset
+        subset = replace(subset, offset=offset, length=part.length)
+    even = is_even(depsgraph.scene_eval, request)
+    parts = [subset] if even or subset.length < 2 else subset.halves()
+    share = None if even else part.share
+    stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
+    try:
+        found, seconds = more_samples(
+            engine, depsgraph, parts, region=part.region, share=share
+        )
+    finally:
+        stages.end()
+    return {view: _mean([each[view] for each in found]) for view in found[0]}, seconds
+
+
+@dataclass
+class SamePicture:
+    """How many samples the frames of a shot take, from the first that is finished.
+
+    `samples` are the file's, with a noise threshold the most that a pixel takes. The
+    next frame to be sampled takes a `share` of them. `_worth` is what a sample of a
+    neighbour is worth beside one of the frame's own.
+    """
+
+    samples: int
+    share: float = _FIRST
+    _worth: float | None = None
+    _first: int = 0
+    _tried: float = 1.0
+    _ratio: float = 1.0
+    _shares: dict[int, float] = field(default_factory=dict)
+
+    def request(self, request: Request) -> Request:
+        """The request of the next frame that is sampled."""
+        return request.with_settings(share=self.share)
+
+    def sampled(self, number: int) -> None:
+        """Note that a frame was sampled with the present share."""
+        self._shares[number] = self.share
+
+    def complete(
+        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: More
+    ) -> Sampled:
+        """A frame with all that it is finished from, more samples where it lacks them.
+
+        Raises Cancelled when the user stops their render.
+        """
+        view = next(iter(own.views))
+        accumulated = {v: method.accumulate(own, others, v) for v in own.views}
+        own = replace(own, gathered={v: Gathered(x) for v, x in accumulated.items()})
+        share = self._shares.get(own.number, 1.0)
+        gained, spent = gain(accumulated[view], own.views[view]), _Seconds()
+        if self._worth is None:
+            ratio = self._measured(method, own, others, spent.of(more))
+            self._first, self._tried, self._ratio = own.number, share, ratio
+            alone = ratio ** (-1.0 / FALL)  # share that is as good without neighbours
+            added = share * (gained.of(gained.errors > 0.0) - 1.0)
+            self._worth = float(np.clip((alone - share) / max(added, 1e-9), 0.0, 1.0))
+        lacks = self._lacks(share, gained)
+        shape = own.views[view].shape
+        extra = self._top_up(shape, share, gained, lacks, spent.of(more))
+        rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
+        self._choose_next(share, gained.of(rest), [x.number for x in others])
+        gathered = {v: Gathered(x, extra.get(v)) for v, x in accumulated.items()}
+        if extra:
+            added = float(extra[view].samples.mean()) / own.views[view].samples
+            share = min(share * (1.0 + added), 1.0)
+        return replace(
+            own,
+            gathered=gathered,
+            seconds=spent.added_to(own.seconds),
+            share=share,
+            decisions=(self._decision(share),),
+        )
+
+    def _decision(self, share: float) -> Decision:
+        """What a frame was sampled with, and why."""
+        value = f"{share:.0%} of the file's samples"
+        reason = (
+            f"measured in frame {self._first}: with neighbours, {self._tried:.0%} of "
+            f"them had {self._ratio:.2f} times the error of all"
+        )
+        return Decision(SAME_PICTURE, value, reason)
+
+    def _equal(self, share: float, gain: Any) -> Any:
+        """The share of all samples that is as good without neighbours.
+
+        `gain` is how many times its own samples the frame has with them.
+        """
+        assert self._worth is not None
+        return share * (1.0 + (gain - 1.0) * self._worth)
+
+    def _lacks(self, share: float, gained: Gain) -> NDArray[np.bool_]:
+        """Which blocks are to get more samples."""
+        whole = np.ones(gained.errors.shape, bool)
+        if share == 1.0:
+            return ~whole
+        lacks = self._equal(share, gained.blocks) < _LACKING
+        enough = self._equal(share, gained.of(whole)) >= _ENOUGH
+        return lacks if enough and lacks.mean() < _MOST_LACKING else whole
+
+    def _measured(
+        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: _More
+    ) -> float:
+        """The squared error of a frame with its neighbours over that of all samples.
+
+        By two renders of half of the file's samples, of two seeds: halves of one
+        sequence would not be independent.
+        """
+        view, length = next(iter(own.views)), max(1, self.samples // 2)
+        parts = []
+        for other in (1, 2):
+            found = more(Part(0, length, 0.5, other=other))[view]
+            denoised = method.denoised(found.radiance, found.albedo, found.normal)
+            parts.append(Rendered(found.radiance, denoised))
+        together = method.finish(own, others, view).radiance
+        frame = own.views[view]
+        samples = floats(frame.picture[:, :3]).reshape(*frame.shape, 3)
+        return error_ratio(together, samples, (parts[0], parts[1]))
+
+    def _top_up(
+        self,
+        shape: tuple[int, int],
+        share: float,
+        gained: Gain,
+        lacks: NDArray[np.bool_],
+        more: _More,
+    ) -> dict[str, ExtraSamples]:
+        """Render more samples where a frame lacks them, up to all of the file's."""
+        extra: dict[str, ExtraSamples] = {}
+        for rows, columns in rectangles(lacks):
+            there = np.zeros_like(lacks)
+            there[rows, columns] = lacks[rows, columns]
+            missing = min(
+                1.0 - float(self._equal(share, gained.of(there))), 1.0 - share
+            )
+            first = round(self.samples * share)
+            length = min(round(self.samples * missing), self.samples - first)
+            if length < 1:
+                continue
+            region = _region(rows, columns, shape)
+            for view, samples in more(Part(first, length, missing, region)).items():
+                whole = extra.setdefault(view, _nothing(shape, self._worth))
+                _put(whole, region, samples)
+        return extra
+
+    def _choose_next(self, share: float, gain: float, others: Sequence[int]) -> None:
+        """Let the next frames have about the share that is enough if all have it.
+
+        `gain` is what a frame of `share` has from `others`, which may have another.
+        """
+        beside = [self._shares.get(number, 1.0) for number in others]
+        if beside:
+            gain = 1.0 + (gain - 1.0) * share / float(np.mean(beside))
+        needed = self.possible(max(1.0 / float(self._equal(1.0, gain)), _FIRST))
+        if not _TOO_MUCH <= needed / self.share <= _TOO_LITTLE:
+            self.share = needed
+
+    def possible(self, share: float) -> float:
+        """The nearest share of whole samples."""
+        if not share < 1.0:
+            return 1.0
+        return max(_LEAST, np.ceil(self.samples * share)) / self.samples
+
+
+@dataclass
+class _Seconds:
+    """What more samples have taken, by stage."""
+
+    stages: dict[str, float] = field(default_factory=dict)
+
+    def of(self, more: More) -> _More:
+        """The same without the seconds, which are noted here."""
+
+        def noted(part: Part) -> dict[str, ExtraSamples]:
+            found, seconds = more(part)
+            self.stages = self.added_to(seconds)
+            return found
+
+        return noted
+
+    def added_to(self, seconds: Mapping[str, float]) -> dict[str, float]:
+        """Together with others."""
+        names = self.stages.keys() | seconds.keys()
+        return {x: self.stages.get(x, 0.0) + seconds.get(x, 0.0) for x in names}
+
+
+def _mean(parts: Sequence[Samples]) -> ExtraSamples:
+    """The mean of several renders of one region, weighted by their samples."""
+    counts = [x.counts for x in parts]
+    total = np.sum(counts, axis=0)
+    weights = [x / np.maximum(total, 1e-9) for x in counts]
+
+    def mean(name: str) -> Array:
+        values = (getattr(x, name) for x in parts)
+        return sum(
+            value * weight[..., None]
+            for value, weight in zip(values, weights, strict=True)
+        )
+
+    picture = mean("picture")
+    return ExtraSamples(
+        np.ascontiguousarray(picture[..., :3]),
+        mean("albedo"),
+        mean("normal"),
+        picture[..., 3],
+        total,
+    )
+
+
+def _nothing(shape: tuple[int, int], worth: float | None) -> ExtraSamples:
+    """No samples anywhere."""
+    assert worth is not None
+    radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
+    alpha, samples = np.zeros((2, *shape), np.float32)
+    return ExtraSamples(radiance, albedo, normal, alpha, samples, worth)
+
+
+def _put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:
+    """Write the samples of a region into those of the whole picture."""
+    rows = slice(region.y, region.y + region.height)
+    columns = slice(region.x, region.x + region.width)
+    for name in ("radiance", "albedo", "normal", "alpha", "samples"):
+        getattr(whole, name)[rows, columns] = getattr(part, name)
+
+
+def _region(rows: slice, columns: slice, shape: tuple[int, int]) -> Region:
+    """A rectangle of blocks, in pixels of the picture."""
+    top, left = rows.start * BLOCK, columns.start * BLOCK
+    bottom = min(rows.stop * BLOCK, shape[0])
+    right = min(columns.stop * BLOCK, shape[1])
+    return Region(left, top, right - left, bottom - top)

@@ -1,0 +1,202 @@
+"""How many samples a frame needs beside its neighbours' for the error of more.
+
+A frame of few samples, accumulated and denoised, is as good as a frame alone of more.
+How many more is measured without a reference: for two independent renders a, b that a
+picture was not made of, the mean of (picture - a)(picture - b) is its squared error,
+without bias. From there on it is enough to count what neighbours add, where there is
+noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..temporal.half_floats import floats
+from ..temporal.local_filters import box
+from ..temporal.noise import luminance
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..arrays import Array
+    from ..temporal.accumulate import Accumulated
+    from ..temporal.frame import Stored
+
+BLOCK = 32  # pixels across
+# The error of a denoised picture falls with this power of its samples.
+FALL = 0.7
+# Share of the blocks, those with most noise, that an error is not measured in.
+_NOISIEST = 0.01
+_DARKEST = 0.02  # of the mean luminance; darker pixels count as if they were as bright
+_SMOOTH = 7  # pixels across
+_TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """One frame's samples as rendered (H, W, 3), and denoised by themselves."""
+
+    noisy: Array
+    denoised: Array
+
+
+def error_ratio(picture: Array, own: Array, parts: tuple[Rendered, Rendered]) -> float:
+    """Return the squared error of a picture over that of a frame of all samples.
+
+    `parts` are half of all samples each, of seeds of their own; `picture` (H, W, 3) was
+    made without them, and of `own` samples among others. All are radiance. Errors count
+    relative to the local luminance, as they do to the eye. The ratio is taken with its
+    standard error, so it is too high rather than too low; it is infinite where noise
+    hides the error of all samples.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
+        return _ratio(*_errors(picture, own, parts))
+
+
+def _errors(
+    picture: Array, own: Array, parts: tuple[Rendered, Rendered]
+) -> tuple[Array, Array]:
+    """Return the errors of the picture and of all samples, by blocks."""
+    one, two = parts
+    bright = box(luminance((picture + one.denoised + two.denoised) / 3), _SMOOTH)
+    bright += max(float(bright.mean()) * _DARKEST, _TINY)
+    scale = np.nan_to_num(1.0 / bright, posinf=0.0)[..., None]
+
+    def product(first: Array, second: Array) -> Array:
+        light = (first * second * scale).mean(-1)
+        return block_means(np.nan_to_num(light, posinf=0.0, neginf=0.0))
+
+    def error(made: Array, first: Array, second: Array) -> Array:
+        return product(made - first, made - second)
+
+    noise = product(one.noisy - two.noisy, one.noisy - two.noisy)
+    kept = noise <= np.quantile(noise, 1.0 - _NOISIEST)
+    half = error(one.denoised, two.noisy, own) + error(two.denoised, one.noisy, own)
+    ours = error(picture, one.noisy, two.noisy)
+    return ours[kept], (half * (0.5 * 0.5**FALL))[kept]
+
+
+def _ratio(one: Array, two: Array) -> float:
+    """Return the ratio of two sums over blocks, plus its standard error."""
+    sums = float(one.sum()), float(two.sum())
+    if sums[1] <= 2.0 * _spread(two):
+        return float("inf")
+    spread = np.hypot(_spread(one), sums[0] / sums[1] * _spread(two)) / sums[1]
+    return max(sums[0], 0.0) / sums[1] + float(spread)
+
+
+def _spread(errors: Array) -> float:
+    """Return the standard error of a sum over blocks."""
+    return float(errors.std() * np.sqrt(max(errors.size, 1)))
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What neighbours bring to a frame, by blocks.
+
+    `errors` are what is left of each block's error, 1 where they bring nothing;
+    `noise` is the noise of its own samples.
+    """
+
+    errors: Array
+    noise: Array
+
+    @property
+    def blocks(self) -> Array:
+        """How many times its own samples a block is worth; infinite without noise."""
+        with np.errstate(divide="ignore"):
+            worth = self.errors ** (-1.0 / FALL)
+        return np.where(self.noise > 2.0 * _TINY, worth, np.inf)
+
+    def of(self, blocks: NDArray[np.bool_]) -> float:
+        """How many times their own samples some blocks are worth together."""
+        error = float(np.average(self.errors[blocks], weights=self.noise[blocks]))
+        return float(max(error, _TINY) ** (-1.0 / FALL))
+
+
+def gain(accumulated: Accumulated, own: Stored) -> Gain:
+    """Return what a frame of its own samples has gained by accumulation.
+
+    Errors fall with `FALL`; the noise of a pixel is its weight.
+    """
+    assert own.noise is not None
+    noise = np.square(floats(own.noise.difference)).reshape(own.shape)
+    noise = box(noise, _SMOOTH) + np.float32(_TINY)  # halves may agree by chance
+    alone = np.full(own.shape, own.samples, np.float32)
+    if own.counts is not None:
+        alone = floats(own.counts).reshape(own.shape)
+    share = np.clip(alone / np.maximum(accumulated.samples, _TINY), 0.0, 1.0)
+    weights, weighted = block_means(noise), block_means(noise * share**FALL)
+    return Gain(np.maximum(weighted / weights, _TINY), weights)
+
+
+def block_means(plane: Array) -> Array:
+    """Return means of blocks from the top left; those at the edges may be smaller."""
+    starts = [np.arange(0, side, BLOCK) for side in plane.shape]
+    sums, counts = (
+        np.add.reduceat(np.add.reduceat(x, starts[0], axis=0), starts[1], axis=1)
+        for x in (plane.astype(np.float64), np.ones(plane.shape))
+    )
+    return np.asarray(sums / counts)
+
+
+Rectangle = tuple[slice, slice]
+"""Rows and columns."""
+
+
+def rectangles(blocks: NDArray[np.bool_], most: int = 4) -> list[Rectangle]:
+    """Return up to `most` rectangles of blocks that cover all that are marked.
+
+    The rectangle that gains most by it is divided in two, as long as that leaves out
+    a quarter of it: each one costs a render.
+    """
+    found = [x for x in (_bounds(blocks),) if x is not None]
+    while found and len(found) < most:
+        splits = [(_split(blocks, each), each) for each in found]
+        (parts, gain), divided = max(splits, key=lambda x: x[0][1])
+        if not parts or gain < 0.25 * _area(divided):
+            break
+        found.remove(divided)
+        found += parts
+    return found
+
+
+def _bounds(blocks: NDArray[np.bool_]) -> Rectangle | None:
+    rows, columns = (np.flatnonzero(blocks.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return None
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+
+
+def _split(blocks: NDArray[np.bool_], area: Rectangle) -> tuple[list[Rectangle], float]:
+    """Return the two bounds that cover the least, and how much they leave out."""
+    best: list[Rectangle] = []
+    gain = 0.0
+    for axis in (0, 1):
+        for place in range(area[axis].start + 1, area[axis].stop):
+            parts = []
+            for part in (slice(area[axis].start, place), slice(place, area[axis].stop)):
+                cut = (part, area[1]) if axis == 0 else (area[0], part)
+                inside = _bounds(blocks[cut])
+                if inside is not None:
+                    parts.append(_moved(inside, cut))
+            left_out = _area(area) - sum(map(_area, parts))
+            if len(parts) == 2 and left_out > gain:
+                best, gain = parts, left_out
+    return best, gain
+
+
+def _moved(inside: Rectangle, start: Rectangle) -> Rectangle:
+    rows, columns = (
+        slice(x.start + s.start, x.stop + s.start)
+        for x, s in zip(inside, start, strict=True)
+    )
+    return rows, columns
+
+
+def _area(rectangle: Rectangle) -> int:
+    rows, columns = rectangle
+    return int((rows.stop - rows.start) * (columns.stop - columns.start))
