@@ -29,6 +29,22 @@ def add_render(commands: Any) -> argparse.ArgumentParser:
         help="folder for frames' samples, which are not rendered again then; without "
         "-o for xrds denoise to finish",
     )
+    _add_frames(command)
+    command.set_defaults(work=_render, lines=_lines)
+    return command
+
+
+def add_plan(commands: Any) -> argparse.ArgumentParser:
+    """Add `xrds plan`."""
+    command = commands.add_parser("plan", help="show what a render would do and skip")
+    add_request(command)
+    _add_frames(command)
+    command.set_defaults(work=_plan, lines=_plan_lines)
+    return command
+
+
+def _add_frames(command: argparse.ArgumentParser) -> None:
+    """Add which frames: several are a shot."""
     which = command.add_mutually_exclusive_group()
     which.add_argument(
         "--frame",
@@ -43,16 +59,6 @@ def add_render(commands: Any) -> argparse.ArgumentParser:
         help="such as 1-24, 1-100x4 (every fourth) or 1-24,30",
         metavar="A-B",
     )
-    command.set_defaults(work=_render, lines=_lines)
-    return command
-
-
-def add_plan(commands: Any) -> argparse.ArgumentParser:
-    """Add `xrds plan`."""
-    command = commands.add_parser("plan", help="show what a render would do and skip")
-    add_request(command)
-    command.set_defaults(work=_plan, lines=_plan_lines)
-    return command
 
 
 def _render(options: argparse.Namespace) -> dict[str, Any]:
@@ -80,7 +86,7 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
     from ..shot.explain import explain
     from .scene_file import open_scene
 
-    request, frames = request_of(options), getattr(options, "frames", None)
+    request, frames = request_of(options), options.frames
     return explain(open_scene(options.scene, choice_of(options)), request, frames)
 
 

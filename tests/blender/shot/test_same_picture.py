@@ -180,3 +180,11 @@ def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
             for out in ("command", "engine")
         ]
         assert np.allclose(*pair, rtol=1e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize(("frames", "is_said"), [("1-5", True), ("1-4", False)])
+def test_the_plan_of_a_shot_says_so(
+    frames: str, is_said: bool, shot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main.main(["plan", str(shot), "--scale", "1", "--frames", frames]) == 0
+    assert ("same picture: as few samples" in capsys.readouterr().out) == is_said
