@@ -30,19 +30,11 @@ def add_request(command: argparse.ArgumentParser) -> None:
         help="samples per pixel of the low-resolution render, or at scale 1, in place "
         "of the file's; without its noise threshold and its time limit",
     )
-    share = command.add_mutually_exclusive_group()
-    share.add_argument(
+    add(
         "--same-picture",
         action="store_true",
-        default=None,
         help="frames of a shot as the file's own samples make them, from fewer where "
-        "neighbours help (default at scale 1, without --samples)",
-    )
-    share.add_argument(
-        "--same-time",
-        action="store_false",
-        dest="same_picture",
-        help="all of the file's samples, and better frames",
+        "neighbours help; at scale 1",
     )
     add(
         "--denoise",
@@ -237,7 +229,6 @@ def _temporal_radius(options: argparse.Namespace) -> int:
 
 def _same_picture(options: argparse.Namespace) -> bool:
     """Whether frames of a shot may have fewer samples than the file's."""
-    requested: bool | None = options.same_picture
     others = {
         "--samples": options.samples,
         "--scale above 1": options.scale > 1,
@@ -247,9 +238,9 @@ def _same_picture(options: argparse.Namespace) -> bool:
         "--sample-cache": getattr(options, "sample_cache", None),
     }
     found = [name for name, value in others.items() if value]
-    if requested and found:
+    if options.same_picture and found:
         raise UsageError(f"--same-picture cannot be had with {found[0]}")
-    return not found if requested is None else requested
+    return bool(options.same_picture)
 
 
 def _incompatible(options: argparse.Namespace) -> str:

@@ -160,7 +160,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Animation",
         translation_context=CONTEXT,
         items=_ANIMATIONS,
-        default=SAME_PICTURE,
+        default=SAME_TIME,
         description="What neighbouring frames' samples are used for in an animation: "
         "fewer samples for each frame, or better frames",
     )

@@ -301,7 +301,7 @@ def same_picture(samples: int) -> Decision:
     """The decision of a shot that may have fewer samples than the file's."""
     reason = (
         f"each frame takes as many of {samples} samples as it needs beside its "
-        "neighbours', as the first frame shows; --same-time takes all"
+        "neighbours', as the first frame shows"
     )
     return Decision(SAME_PICTURE, "as few samples as it needs", reason)
 

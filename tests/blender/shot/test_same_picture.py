@@ -169,7 +169,8 @@ def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     scene = bpy.context.scene
     scene.render.engine, scene.xrds.mode = "XRDS", "full_size"
-    assert scene.xrds.animation == "same_picture"
+    assert scene.xrds.animation == "same_time"
+    scene.xrds.animation = "same_picture"
     scene.render.filepath = str(shot.parent / "engine" / "#")
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
@@ -186,5 +187,6 @@ def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
 def test_the_plan_of_a_shot_says_so(
     frames: str, is_said: bool, shot: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main.main(["plan", str(shot), "--scale", "1", "--frames", frames]) == 0
+    words = ["plan", str(shot), "--scale", "1", "--same-picture", "--frames", frames]
+    assert main.main(words) == 0
     assert ("same picture: as few samples" in capsys.readouterr().out) == is_said
