@@ -9,6 +9,7 @@ file asks for, where neighbours add nothing.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -61,6 +62,7 @@ _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
 # The share of the next frames stays as it is as long as it is off by no more: Cycles
 # syncs the scene again for another number of samples.
 _TOO_MUCH, _TOO_LITTLE = 0.8, 1.1
+_TINY = 1e-6
 _OTHER = 1_299_709  # seeds apart; no frame's is near those of another
 
 
@@ -191,15 +193,17 @@ class SamePicture:
 
         Raises Cancelled when the user stops their render.
         """
-        view = next(iter(own.views))
+        view, started = next(iter(own.views)), time.perf_counter()
         accumulated = {v: method.accumulate(own, others, v) for v in own.views}
         own = replace(own, gathered={v: Gathered(x) for v, x in accumulated.items()})
         share = self._shares.get(own.number, 1.0)
-        gained, spent = gain(accumulated[view], own.views[view]), _Seconds()
+        gained = gain(accumulated[view], own.views[view])
+        spent = _Seconds({"accumulate": time.perf_counter() - started})
         if self._worth is None:
             ratio = self._measured(method, own, others, spent.of(more))
             self._first, self._tried, self._ratio = own.number, share, ratio
-            alone = ratio ** (-1.0 / FALL)  # share that is as good without neighbours
+            # the share of all samples that is as good without neighbours
+            alone = max(ratio, _TINY) ** (-1.0 / FALL)
             added = share * (gained.of(gained.errors > 0.0) - 1.0)
             self._worth = float(np.clip((alone - share) / max(added, 1e-9), 0.0, 1.0))
         lacks = self._lacks(share, gained)
@@ -241,7 +245,8 @@ class SamePicture:
         whole = np.ones(gained.errors.shape, bool)
         if share == 1.0:
             return ~whole
-        lacks = self._equal(share, gained.blocks) < _LACKING
+        with np.errstate(invalid="ignore"):  # blocks without noise lack nothing
+            lacks = self._equal(share, gained.blocks) < _LACKING
         enough = self._equal(share, gained.of(whole)) >= _ENOUGH
         return lacks if enough and lacks.mean() < _MOST_LACKING else whole
 
