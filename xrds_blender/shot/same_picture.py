@@ -62,6 +62,8 @@ _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
 # The share of the next frames stays as it is as long as it is off by no more: Cycles
 # syncs the scene again for another number of samples.
 _TOO_MUCH, _TOO_LITTLE = 0.8, 1.1
+# Neighbours' samples of less worth count less beside more of the frame's own.
+_USEFUL = 0.25
 _TINY = 1e-6
 _OTHER = 1_299_709  # seeds apart; no frame's is near those of another
 
@@ -240,6 +242,12 @@ class SamePicture:
         assert self._worth is not None
         return share * (1.0 + (gain - 1.0) * self._worth)
 
+    @property
+    def _weight(self) -> float:
+        """What neighbours' samples count beside more of the frame's own."""
+        assert self._worth is not None
+        return min(self._worth / _USEFUL, 1.0)
+
     def _lacks(self, share: float, gained: Gain) -> NDArray[np.bool_]:
         """Which blocks are to get more samples."""
         whole = np.ones(gained.errors.shape, bool)
@@ -291,7 +299,7 @@ class SamePicture:
                 continue
             region = _region(rows, columns, shape)
             for view, samples in more(Part(first, length, missing, region)).items():
-                whole = extra.setdefault(view, _nothing(shape, self._worth))
+                whole = extra.setdefault(view, _nothing(shape, self._weight))
                 _put(whole, region, samples)
         return extra
 
@@ -359,9 +367,8 @@ def _mean(parts: Sequence[Samples]) -> ExtraSamples:
     )
 
 
-def _nothing(shape: tuple[int, int], worth: float | None) -> ExtraSamples:
+def _nothing(shape: tuple[int, int], worth: float) -> ExtraSamples:
     """No samples anywhere."""
-    assert worth is not None
     radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
     alpha, samples = np.zeros((2, *shape), np.float32)
     return ExtraSamples(radiance, albedo, normal, alpha, samples, worth)
