@@ -59,7 +59,7 @@ def sample_halves(
             for view, first in parts[0].items()
         }
         layer.put_back(_merged(*passes, shares, found))
-    return found, _seconds(clocks)
+    return found, seconds_of(clocks)
 
 
 def counted(samples: Samples, part: SampleSubset, clock: StageClock) -> Samples:
@@ -89,10 +89,11 @@ def sample_motion(
             )
         finally:
             session.free(engine)
-    return samples, _seconds([clock])
+    return samples, seconds_of([clock])
 
 
-def _seconds(clocks: Sequence[StageClock]) -> dict[str, float]:
+def seconds_of(clocks: Sequence[StageClock]) -> dict[str, float]:
+    """By stage, of several renders."""
     return {
         "sync": sum(clock.sync for clock in clocks),
         "beauty": sum(clock.render for clock in clocks),

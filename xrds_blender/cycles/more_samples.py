@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals.borrowed import Borrowed
 from . import session
-from .halves import counted
+from .halves import counted, seconds_of
 from .low_camera import Region
 from .passes import CyclesPasses
 from .samples import COUNTS, Samples
@@ -33,9 +34,8 @@ def more_samples(
     All samples have counts. The result has the passes afterwards that it had before.
     Raises Cancelled when the user stops it.
     """
-    seconds = dict.fromkeys(("sync", "beauty"), 0.0)
     geometry = [] if share is None else [COUNTS]
-    found = []
+    found, clocks = [], []
     with CyclesPasses(engine, depsgraph, geometry=geometry) as passes:
         whole, before = passes.region, passes.all_passes()
         region = region or Region(0, 0, whole.width, whole.height)
@@ -50,11 +50,10 @@ def more_samples(
                 rendered, clock = passes.part_samples(
                     place, part, is_even=share is None
                 )
-                seconds["sync"] += clock.sync
-                seconds["beauty"] += clock.render
+                clocks.append(clock)
                 found.append({v: _counted(x, part, clock) for v, x in rendered.items()})
         passes.put_back(before)
-    return found, seconds
+    return found, seconds_of(clocks)
 
 
 def _counted(
@@ -65,4 +64,4 @@ def _counted(
     if found.counts is not None:
         return found
     counts = np.full(samples.picture.shape[:2], part.length, np.float32)
-    return Samples(samples.picture, samples.albedo, samples.normal, counts=counts)
+    return replace(samples, counts=counts)

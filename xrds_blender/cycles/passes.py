@@ -7,11 +7,9 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import replace
 
 import numpy as np
 
-from xrds_core.arrays import Array
 from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals.borrowed import Borrowed
@@ -22,7 +20,7 @@ from .guide_settings import guide_settings
 from .layer_session import LayerSession
 from .low_camera import LowGrid, Region
 from .low_samples import LowPlace, LowSamples
-from .pass_names import ALBEDO, DEPTH, NOISY, NORMAL, SAMPLE_COUNT
+from .pass_names import ALBEDO, DEPTH, NOISY, NORMAL
 from .rendered import Beauty, Guides, InProcess, Probe
 from .samples import Samples, read_samples
 from .settings import (
@@ -139,17 +137,11 @@ class CyclesPasses(LayerSession):
             size = self.width, self.height
             is_part = region != self.region
             clock = self._run(size, region, exact=True, is_part=is_part)
-        found = {}
-        for view in self.views:
-            samples = read_samples(self._corner_reader(view, region), ())
-            found[view] = replace(samples, counts=self._counts(view, region))
+        found = {
+            view: read_samples(self._corner_reader(view, region), self._geometry)
+            for view in self.views
+        }
         return found, clock
-
-    def _counts(self, view: str, region: Region) -> Array | None:
-        if SAMPLE_COUNT not in self._geometry:
-            return None
-        counts = self._corner_reader(view, region)(SAMPLE_COUNT)
-        return None if counts is None else np.ascontiguousarray(counts[..., 0])
 
     def stopped_samples(self, scale: int) -> dict[str, LowSamples]:
         """What `low_samples` has left in the result when the user stopped it."""

@@ -112,7 +112,8 @@ def read_samples(read: Reader, wanted: Collection[str]) -> Samples:
     noisy = read(NOISY)
     picture = read(COMBINED) if noisy is None else noisy
     passes = [picture, read(ALBEDO), read(NORMAL)]
-    depth, vector = read_geometry(read, wanted) if wanted else (None, None)
+    geometry = {*wanted} - {SAMPLE_COUNT}
+    depth, vector = read_geometry(read, geometry) if geometry else (None, None)
     counts = read(SAMPLE_COUNT) if SAMPLE_COUNT in wanted else None
     if counts is not None:  # all 0 where this Blender's pass has another name
         counts = np.ascontiguousarray(counts[..., 0]) if counts.any() else None

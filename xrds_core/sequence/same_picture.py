@@ -133,9 +133,9 @@ def gain(accumulated: Accumulated, own: Stored) -> Gain:
     return Gain(np.maximum(weighted / weights, _TINY), weights)
 
 
-def block_means(plane: Array) -> Array:
+def block_means(plane: Array, size: int = BLOCK) -> Array:
     """Return means of blocks from the top left; those at the edges may be smaller."""
-    starts = [np.arange(0, side, BLOCK) for side in plane.shape]
+    starts = [np.arange(0, side, size) for side in plane.shape]
     sums, counts = (
         np.add.reduceat(np.add.reduceat(x, starts[0], axis=0), starts[1], axis=1)
         for x in (plane.astype(np.float64), np.ones(plane.shape))

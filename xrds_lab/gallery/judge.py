@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.sequence.same_picture import block_means
 
 from ..metrics import to_srgb
 
@@ -79,17 +80,7 @@ def squared_error(picture: Array, references: Sequence[Array]) -> Array:
 
 def block_gains(ours: Array, theirs: Array, unseen: float) -> Array:
     """Gain in dB of each block, from squared errors (H, W) of both pictures."""
-    return _decibels(block_means(theirs), block_means(ours), unseen)
-
-
-def block_means(plane: Array) -> Array:
-    """Means of blocks from the top left; those at the edges may be smaller."""
-    starts = [np.arange(0, side, BLOCK) for side in plane.shape]
-    sums, counts = (
-        np.add.reduceat(np.add.reduceat(x, starts[0], axis=0), starts[1], axis=1)
-        for x in (plane, np.ones(plane.shape))
-    )
-    return np.asarray(sums / counts)
+    return _decibels(*(block_means(x, BLOCK) for x in (theirs, ours)), unseen)
 
 
 def _decibels(before: Any, after: Any, unseen: float) -> Any:
