@@ -118,6 +118,7 @@ def can_save(scene: Any, request: Request, frames: int) -> bool:
         and cycles.samples >= FEWEST_SAMPLES
         and has_subsets(scene)
         and not (cycles.use_sample_subset or cycles.time_limit)
+        and not any(layer.samples for layer in scene.view_layers)
         and has_neighbours(scene, request)
     )
 

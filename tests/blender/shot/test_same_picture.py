@@ -159,9 +159,10 @@ def test_elsewhere_frames_have_the_samples_of_the_file(
     request = {"scale": 1, "temporal_radius": 2, "same_picture": True} | job
     scene = bpy.context.scene
     assert not same_picture.can_save(scene, render_request(**request), frames)
-    assert same_picture.can_save(
-        scene, render_request(1, temporal_radius=2, same_picture=True), 5
-    )
+    possible = render_request(1, temporal_radius=2, same_picture=True)
+    assert same_picture.can_save(scene, possible, 5)
+    scene.view_layers[0].samples = 32  # a layer's own
+    assert not same_picture.can_save(scene, possible, 5)
 
 
 def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
