@@ -45,7 +45,8 @@ def in_mode(request: Request, mode: Mode, scene: Any) -> Request:
     if request.goal is not None:
         return request
     if mode is Mode.AUTOMATIC:
-        mode = best_mode(scene, request)
+        paced = request.deadline is not None
+        mode = Mode.FULL_SIZE if paced else best_mode(scene, request)
         request = request.with_settings(denoising=BEST)
     if mode is Mode.CYCLES_ONLY:
         return request.with_settings(mode=mode, temporal_radius=0)

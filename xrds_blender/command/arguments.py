@@ -43,6 +43,20 @@ def factor(text: str) -> float:
     return value
 
 
+def seconds(text: str) -> float:
+    """A time above 0, such as 8h, 1h30m, 90m or 45s; a number alone is of seconds."""
+    number = r"(\d+(?:\.\d+)?)"
+    parts = re.fullmatch(f"(?:{number}h)?(?:{number}m)?(?:{number}s?)?", text.lower())
+    units = (3600.0, 60.0, 1.0)
+    found = parts.groups() if parts else ()
+    value = sum(
+        float(part or 0) * unit for part, unit in zip(found, units, strict=False)
+    )
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time such as 8h or 1h30m")
+    return value
+
+
 def pair(text: str) -> tuple[float, float]:
     """Two numbers, such as 1,-1."""
     first, second = (float(part) for part in text.split(","))

@@ -37,6 +37,13 @@ def add_request(command: argparse.ArgumentParser) -> None:
         "neighbours help; at scale 1",
     )
     add(
+        "--deadline",
+        type=arguments.seconds,
+        metavar="TIME",
+        help="time for all frames together, such as 8h or 1h30m: each takes as many "
+        "samples as fit; at scale 1",
+    )
+    add(
         "--denoise",
         choices=QUALITIES,
         default="high",
@@ -191,6 +198,7 @@ def choice_of(options: argparse.Namespace) -> SceneChoice:
 
 def request_of(options: argparse.Namespace) -> Request:
     """What the options of `add_request` ask for; raises UsageError."""
+    _check_pace(options)
     return render_request(
         scale=options.scale,
         samples=options.samples,
@@ -207,7 +215,8 @@ def request_of(options: argparse.Namespace) -> Request:
         threads=options.threads,
         denoise=options.denoise,
         temporal_radius=_temporal_radius(options),
-        same_picture=_same_picture(options),
+        same_picture=options.same_picture,
+        deadline=options.deadline,
         savings=() if options.skip_nothing else SAVINGS,
         guide_cache=options.guide_cache,
         guide_limit=options.guide_limit,
@@ -227,8 +236,9 @@ def _temporal_radius(options: argparse.Namespace) -> int:
     return RADIUS if several and not incompatible else 0
 
 
-def _same_picture(options: argparse.Namespace) -> bool:
-    """Whether frames of a shot may have fewer samples than the file's."""
+def _check_pace(options: argparse.Namespace) -> None:
+    """Raise UsageError where samples are to be found, and something rules that out."""
+    paces = {"--same-picture": options.same_picture, "--deadline": options.deadline}
     others = {
         "--samples": options.samples,
         "--scale above 1": options.scale > 1,
@@ -237,10 +247,10 @@ def _same_picture(options: argparse.Namespace) -> bool:
         "--quality": options.quality,
         "--sample-cache": getattr(options, "sample_cache", None),
     }
-    found = [name for name, value in others.items() if value]
-    if options.same_picture and found:
-        raise UsageError(f"--same-picture cannot be had with {found[0]}")
-    return bool(options.same_picture)
+    chosen = [name for name, value in paces.items() if value]
+    ruled_out = chosen[1:] + [name for name, value in others.items() if value]
+    if chosen and ruled_out:
+        raise UsageError(f"{chosen[0]} cannot be had with {ruled_out[0]}")
 
 
 def _incompatible(options: argparse.Namespace) -> str:

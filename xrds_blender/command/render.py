@@ -8,7 +8,7 @@ from typing import Any
 
 from xrds_core.errors import UsageError
 
-from ..planning.plan import GUIDE_CACHE, SAME_PICTURE
+from ..planning.plan import DEADLINE, GUIDE_CACHE, SAME_PICTURE
 from . import arguments
 from .deferred import need_blender
 from .options import add_output, add_request, choice_of, encoding_of, request_of
@@ -119,5 +119,5 @@ def _lines(result: dict[str, Any]) -> list[str]:
 def _outcome(decision: dict[str, Any]) -> str:
     """A decision after a render: with its reason where this says what was found."""
     line = _decision(decision)
-    found = decision["decision"] in (GUIDE_CACHE, SAME_PICTURE)
+    found = decision["decision"] in (GUIDE_CACHE, SAME_PICTURE, DEADLINE)
     return f"{line}: {decision['reason']}" if found else line

@@ -21,7 +21,7 @@ from ..frame.denoisers import load_denoiser
 from ..frame.networks import is_ready, load_upscaler
 from ..frame.picture import NetworkFailed, Picture
 from ..planning.request import Request
-from ..planning.settings import Mode
+from ..planning.settings import Mode, share_of
 from ..shot.cache import SampleCache, cache_of
 from ..shot.render import render_scene
 from ..shot.sampling import has_neighbours
@@ -125,7 +125,9 @@ def _pictures(
 ) -> Iterator[tuple[int, Picture]]:
     """Number and picture of every frame that is not done."""
     is_shot = len(numbers) > 1 and has_neighbours(scene, request)
-    if is_shot or cache:
+    if request.deadline is not None and not is_shot:
+        request = request.with_settings(temporal_radius=0)
+    if is_shot or cache or request.deadline is not None:
         try:
             yield from render_shot(scene, request, numbers, is_done, cache)
         except NetworkFailed as error:
@@ -221,6 +223,7 @@ def _write(
         "output": str(target),
         "seconds": seconds,
         "temporal": picture.temporal and dataclasses.asdict(picture.temporal),
+        "samples": share_of(settings.samples or scene.cycles.samples, settings.share),
         "share": settings.share,
         "peak_memory": picture.peak_memory,
     }

@@ -13,7 +13,7 @@ from ..planning.settings import Mode
 from .machine import machine
 from .translations import CONTEXT
 
-SAME_PICTURE, SAME_TIME = "same_picture", "same_time"
+SAME_PICTURE, SAME_TIME, DEADLINE = "same_picture", "same_time", "deadline"
 _MODES = [
     (
         Mode.AUTOMATIC,
@@ -116,6 +116,12 @@ _ANIMATIONS = [
         "Same Samples",
         "Each frame takes the file's own samples, and the neighbours' make it better",
     ),
+    (
+        DEADLINE,
+        "Deadline",
+        "All frames together take the time that is given: each has as many samples as "
+        "fit. Every frame that is finished corrects how many that are",
+    ),
 ]
 
 
@@ -164,6 +170,16 @@ class XRDSSettings(bpy.types.PropertyGroup):
         description="What neighbouring frames' samples are used for in an animation: "
         "fewer samples for each frame, or better frames",
     )
+    deadline: FloatProperty(
+        name="Time of All Frames",
+        translation_context=CONTEXT,
+        default=8 * 3600.0,
+        min=1.0,
+        soft_max=7 * 24 * 3600.0,
+        subtype="TIME_ABSOLUTE",
+        description="Seconds that the whole animation may take, from its first frame "
+        "to its last",
+    )
     guide_samples: IntProperty(
         name="Samples per Pixel",
         translation_context=CONTEXT,
@@ -210,7 +226,8 @@ class XRDSSettings(bpy.types.PropertyGroup):
     @property
     def is_timed(self) -> bool:
         """Whether a time budget chooses mode and samples."""
-        return self.mode == Mode.AUTOMATIC and self.use_time_budget
+        budget = self.use_time_budget and self.animation != DEADLINE
+        return self.mode == Mode.AUTOMATIC and budget
 
 
 def request_of(settings: XRDSSettings) -> Request:
@@ -230,5 +247,6 @@ def request_of(settings: XRDSSettings) -> Request:
         finish_stopped=here.finish_stopped,
         temporal_radius=settings.temporal_radius,
         same_picture=settings.animation == SAME_PICTURE,
+        deadline=settings.deadline if settings.animation == DEADLINE else None,
     )
     return modes.in_mode(wanted, Mode(settings.mode), settings.id_data)

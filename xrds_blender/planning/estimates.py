@@ -9,7 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from .budget import Curve, Model
-from .settings import DEFAULT_DENOISING, MODES, Denoising, Mode, Network, Settings
+from .settings import (
+    DEFAULT_DENOISING,
+    MODES,
+    Denoising,
+    Mode,
+    Network,
+    Settings,
+    share_of,
+)
 
 # Differences in dB that nobody sees.
 ALIKE = 0.1
@@ -73,7 +81,7 @@ def resolved(settings: Settings, scene: SceneSettings) -> Settings:
         denoising = Denoising.ours(settings.quality)
     family = replace(settings, denoising=denoising).family
     samples = settings.samples or scene.samples
-    return replace(family, samples=max(1, round(samples * settings.share)))
+    return replace(family, samples=share_of(samples, settings.share))
 
 
 def missing(settings: Settings, here: Capabilities) -> str:

@@ -14,6 +14,7 @@ from .facts import Facts, SceneFacts
 from .forecast import low_size
 
 __all__ = [
+    "DEADLINE",
     "GUIDE_CACHE",
     "SAME_PICTURE",
     "SAVINGS",
@@ -35,7 +36,7 @@ __all__ = [
 # Mirrors and glass show other things' albedo and normals; four bounces hold them.
 GUIDE_BOUNCES = 4
 GUIDE_CACHE = "guide cache"
-SAME_PICTURE = "same picture"
+SAME_PICTURE, DEADLINE = "same picture", "deadline"
 # What may be left out where a scene does not need it, by the names of the decisions.
 SAVINGS = (
     "denoise",

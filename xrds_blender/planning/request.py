@@ -11,11 +11,12 @@ from xrds_core.errors import UsageError
 from .plan import SAVINGS, Facts, Plan, cycles_only, decide, full_size
 from .settings import CYCLES_DENOISING, QUALITIES, SCALES, Denoising, Mode, Settings
 
-_SAMPLES = 1 << 24  # the most that Cycles takes
+MOST_SAMPLES = 1 << 24
+"""That Cycles takes."""
 _RANGES = {
-    "samples": (1, _SAMPLES),
-    "guide_samples": (1, _SAMPLES),
-    "guide_limit": (0, _SAMPLES),
+    "samples": (1, MOST_SAMPLES),
+    "guide_samples": (1, MOST_SAMPLES),
+    "guide_limit": (0, MOST_SAMPLES),
     "seed": (0, 2**31 - 1),
     "threads": (1, 1024),
     "temporal_radius": (0, 1000),
@@ -61,7 +62,8 @@ class Request:
     a folder for guides beside those in memory; each render of the same view adds its
     samples to them until they are `guide_limit`. `finish_stopped` leaves what there is
     in the result when the user stops the render. A shot that is to have the
-    `same_picture` as the file's own settings takes fewer samples where it can.
+    `same_picture` as the file's own settings takes fewer samples where it can; one
+    with a `deadline` takes as many as fit into these seconds.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -74,6 +76,7 @@ class Request:
     guide_limit: int = 0
     finish_stopped: bool = False
     same_picture: bool = False
+    deadline: float | None = None
 
     def __post_init__(self) -> None:
         unknown = set(self.savings) - set(SAVINGS)
@@ -82,6 +85,8 @@ class Request:
             raise UsageError(
                 f"unknown savings {', '.join(sorted(unknown))}; choose from {known}"
             )
+        if self.deadline is not None and not self.deadline > 0:
+            raise UsageError(f"deadline {self.deadline} s must be above 0")
         for record in (self, self.settings, self.machine):
             for name in _RANGES.keys() & vars(record).keys():
                 _check_range(name, getattr(record, name))

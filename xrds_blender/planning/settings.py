@@ -100,6 +100,11 @@ LOW_DENOISING = (
 """Those worth trying on the low-resolution picture."""
 
 
+def share_of(samples: int, share: float) -> int:
+    """A share of some samples per pixel, one at least."""
+    return max(1, round(samples * share))
+
+
 @dataclass(frozen=True)
 class Settings:
     """How a frame is rendered.
@@ -124,6 +129,11 @@ class Settings:
     def scale(self) -> int:
         """Enlargement along each side."""
         return self.mode.scale
+
+    @property
+    def own_samples(self) -> int | None:
+        """Samples per pixel of its own; None where it takes the file's."""
+        return None if self.samples is None else share_of(self.samples, self.share)
 
     @property
     def is_enlarged(self) -> bool:

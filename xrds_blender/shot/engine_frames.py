@@ -18,9 +18,9 @@ from ..cycles.passes import CyclesPasses
 from ..frame import stages
 from ..scene.contents import requested_passes
 from ..scene.cuts import cuts
-from .full_size import FullSize
 from .methods import Method
-from .same_picture import Part, render_more, same_picture
+from .pace import pace_of
+from .same_picture import Part, render_more
 from .sampling import Sampled, can_continue, first_sample
 from .visiting import go_to
 
@@ -69,9 +69,9 @@ class EngineFrames:
         found = cls(method)
         numbers = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
         radius, begins = method.request.settings.temporal_radius, cuts(scene, numbers)
-        if isinstance(method, FullSize):
-            method.same_picture = same_picture(scene, method.request, len(numbers))
-        found.window = Window(Shot(tuple(numbers), radius, begins), found._load)
+        shot = Shot(tuple(numbers), radius, begins)
+        method.pace = pace_of(scene, method.request, shot)
+        found.window = Window(shot, found._load)
         return found
 
     def neighbourhood(self, engine: Any, depsgraph: Any) -> Neighbourhood[Sampled]:
@@ -101,9 +101,9 @@ class EngineFrames:
     def _completed(
         self, engine: Any, depsgraph: Any, found: Neighbourhood[Sampled]
     ) -> Neighbourhood[Sampled]:
-        """The frame with more samples where it is to have the same picture."""
+        """The frame with more samples where it lacks them."""
         method = self.method
-        if not isinstance(method, FullSize) or method.same_picture is None:
+        if method.pace is None:
             return found
 
         def more(part: Part) -> Any:
@@ -112,7 +112,7 @@ class EngineFrames:
             return render_more(engine, depsgraph, method.request, place, part)
 
         others = list(found.neighbours.values())
-        own = method.same_picture.complete(method, found.own, others, more)
+        own = method.pace.complete(method, found.own, others, more)
         return replace(found, own=own)
 
     def _whole(self, number: int) -> Neighbourhood[Sampled]:

@@ -19,7 +19,6 @@ from ..planning.plan import Decision, full_size
 from ..planning.request import Request
 from ..planning.settings import Denoising, Settings
 from .methods import Method, Report
-from .same_picture import SamePicture
 from .sampling import Gathered, OnSampled, Sampled, sample_frame
 
 if TYPE_CHECKING:
@@ -41,7 +40,6 @@ class FullSize(Method):
         denoise_in_time: Callable[[], str] | None = None,
     ) -> None:
         super().__init__(request)
-        self.same_picture: SamePicture | None = None
         self._on_sampled, self._denoise_in_time = on_sampled, denoise_in_time
         self._quality = self.settings.quality
         self._denoiser = load_denoiser(self._quality, request.machine)
@@ -54,13 +52,16 @@ class FullSize(Method):
         place: int | None = None,
         between: bool = False,
     ) -> Sampled:
-        same = self.same_picture
-        if same is None:
+        pace = self.pace
+        if pace is None:
             return sample_frame(
                 engine, depsgraph, self.request, place, self._on_sampled
             )
-        same.sampled(depsgraph.scene_eval.frame_current)
-        return sample_frame(engine, depsgraph, same.request(self.request), place)
+        while True:
+            request = pace.request(self.request)
+            sampled = sample_frame(engine, depsgraph, request, place)
+            if pace.takes(self, sampled):
+                return sampled
 
     def begin_finishing(self, engine: Any) -> Report:
         if self._denoise_in_time is not None:
@@ -77,12 +78,15 @@ class FullSize(Method):
     ) -> Picture:
         frame = own.views[view]
         if isinstance(frame, Samples):
-            return self._alone(frame, report)
-        neighbours = own.neighbours(view, others)
-        gathered = own.gathered.get(view)
-        picture = self.finish_stored(frame, neighbours, report, gathered)
-        assert picture.settings is not None
-        settings = replace(picture.settings, share=own.share)
+            picture = self._alone(frame, report)
+        else:
+            neighbours = own.neighbours(view, others)
+            gathered = own.gathered.get(view)
+            picture = self.finish_stored(frame, neighbours, report, gathered)
+        settings = picture.settings
+        assert settings is not None
+        samples = own.samples or settings.samples
+        settings = replace(settings, share=own.share, samples=samples)
         plan = (*picture.plan, *own.decisions)
         return replace(picture, settings=settings, plan=plan)
 

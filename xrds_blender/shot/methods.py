@@ -14,6 +14,7 @@ from xrds_core.arrays import Array
 from ..frame import stages
 from ..frame.picture import Picture
 from ..planning.request import Request
+from .pace import Pace
 from .sampling import Sampled
 
 Report = Callable[[float], bool]
@@ -31,6 +32,7 @@ class Method:
 
     def __init__(self, request: Request) -> None:
         self.request, self.settings = request, request.settings
+        self.pace: Pace | None = None
 
     def sample(
         self,

@@ -87,8 +87,12 @@ def render_frame(engine: Any, depsgraph: Any, request: Request) -> Picture:
         scene = depsgraph.scene_eval
         left = (scene.frame_end - scene.frame_current) // scene.frame_step
         stages.begin_frame(scene.frame_current, left)
-        if not _renders_single_frames() and has_neighbours(scene, request):
-            return _render_in_animation(engine, depsgraph, request)
+        if not _renders_single_frames():
+            if has_neighbours(scene, request):
+                return _render_in_animation(engine, depsgraph, request)
+            if request.deadline is not None:
+                alone = request.with_settings(temporal_radius=0)
+                return _render_in_animation(engine, depsgraph, alone)
     return render_alone(engine, depsgraph, request)
 
 

@@ -170,13 +170,15 @@ class SamePicture:
 
     `samples` are the file's, with a noise threshold the most that a pixel takes. The
     next frame to be sampled takes a `share` of them. `_worth` is what a sample of a
-    neighbour is worth beside one of the frame's own.
+    neighbour is worth beside one of the frame's own. It is measured in the first frame,
+    and again in one with twice as many neighbours: those of one side are worth less.
     """
 
     samples: int
     share: float = _FIRST
     _worth: float | None = None
-    _first: int = 0
+    _measured_in: int = 0
+    _beside: int = 0
     _tried: float = 1.0
     _ratio: float = 1.0
     _shares: dict[int, float] = field(default_factory=dict)
@@ -185,9 +187,10 @@ class SamePicture:
         """The request of the next frame that is sampled."""
         return request.with_settings(share=self.share)
 
-    def sampled(self, number: int) -> None:
+    def takes(self, method: Finishing, frame: Sampled) -> bool:
         """Note that a frame was sampled with the present share."""
-        self._shares[number] = self.share
+        self._shares[frame.number] = self.share
+        return True
 
     def complete(
         self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: More
@@ -202,9 +205,10 @@ class SamePicture:
         share = self._shares.get(own.number, 1.0)
         gained = gain(accumulated[view], own.views[view])
         spent = _Seconds({"accumulate": time.perf_counter() - started})
-        if self._worth is None:
+        if self._worth is None or len(others) >= 2 * max(self._beside, 1):
             ratio = self._measured(method, own, others, spent.of(more))
-            self._first, self._tried, self._ratio = own.number, share, ratio
+            self._measured_in, self._beside = own.number, len(others)
+            self._tried, self._ratio = share, ratio
             # the share of all samples that is as good without neighbours
             alone = max(ratio, _TINY) ** (-1.0 / FALL)
             added = share * (gained.of(gained.errors > 0.0) - 1.0)
@@ -230,8 +234,8 @@ class SamePicture:
         """What a frame was sampled with, and why."""
         value = f"{share:.0%} of the file's samples"
         reason = (
-            f"measured in frame {self._first}: with neighbours, {self._tried:.0%} of "
-            f"them had {self._ratio:.2f} times the error of all"
+            f"measured in frame {self._measured_in}: with neighbours, "
+            f"{self._tried:.0%} of them had {self._ratio:.2f} times the error of all"
         )
         return Decision(SAME_PICTURE, value, reason)
 

@@ -30,6 +30,7 @@ from ..frame import denoisers, stages
 from ..internals.borrowed import Borrowed
 from ..planning.plan import Decision
 from ..planning.request import Request
+from ..planning.settings import share_of
 from ..scene.contents import scene_facts, shapes_move, stands_still
 from .stopping import finish_samples
 
@@ -57,14 +58,16 @@ class Sampled:
 
     At full size views are `Stored`, of a still `Samples`; above scale 1 they are a
     `View` or `Inputs` of `super_resolution`; of Cycles alone finished pictures.
-    `gathered` is what is known already of a view with its neighbours; `share` is how
-    much of the samples requested it has, decided for the reasons in `decisions`.
+    `gathered` is what is known already of a view with its neighbours. Where `samples`
+    per pixel were requested it has these; else `share` is how much of the file's.
+    `decisions` say why.
     """
 
     number: int
     views: dict[str, Any]
     seconds: dict[str, float]
     gathered: Mapping[str, Gathered] = field(default_factory=dict)
+    samples: int | None = None
     share: float = 1.0
     decisions: tuple[Decision, ...] = ()
 
@@ -172,7 +175,7 @@ def sampling_of(
     facts = scene_facts(depsgraph)
     geometry = [*_geometry(depsgraph), *([] if even else [COUNTS])]
     whole = request.settings.samples or session.samples_of(depsgraph)
-    count = max(1, round(whole * request.settings.share))
+    count = share_of(whole, request.settings.share)
     seed = scene.cycles.seed if request.seed is None else request.seed
     blurred = scene.render.use_motion_blur
     if place is not None:
@@ -223,15 +226,15 @@ def sample_frame(
     A frame with neighbours is rendered as `noisy_frame` does it and packed for the
     window; `on_sampled` takes its views before that. Raises what `noisy_frame` does.
     """
-    number = depsgraph.scene_eval.frame_current
+    number, count = depsgraph.scene_eval.frame_current, request.settings.own_samples
     if not request.settings.temporal_radius:
         samples, seconds = _alone(engine, depsgraph, request)
-        return Sampled(number, dict(samples), seconds)
+        return Sampled(number, dict(samples), seconds, samples=count)
     frames, seconds = noisy_frame(engine, depsgraph, request, place)
     if on_sampled is not None:
         on_sampled(frames)
     views = {view: store(frame, np.float16) for view, frame in frames.items()}
-    return Sampled(number, views, seconds)
+    return Sampled(number, views, seconds, samples=count)
 
 
 def _alone(

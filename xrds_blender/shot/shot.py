@@ -19,10 +19,10 @@ from ..frame.rendering import call_engine
 from ..planning.request import Request
 from ..scene.cuts import cuts
 from .cache import SampleCache
-from .full_size import FullSize
 from .methods import Method
+from .pace import pace_of
 from .render import method_of
-from .same_picture import Part, render_more, same_picture
+from .same_picture import Part, render_more
 from .sampling import Sampled
 
 
@@ -58,8 +58,8 @@ def render_shot(
             return None
         return _sample(scene, method, frames, number, shot.is_between(number))
 
-    if isinstance(method, FullSize) and not cache:
-        method.same_picture = same_picture(scene, request, len(frames))
+    if not cache:
+        method.pace = pace_of(scene, request, shot)
     for found in Window(shot, load):
         number, own = found.number, found.own
         if is_done(number):  # another machine was quicker
@@ -81,8 +81,8 @@ def _completed(
     own: Sampled,
     others: Sequence[Sampled],
 ) -> Sampled:
-    """The frame with more samples where it is to have the same picture."""
-    if not isinstance(method, FullSize) or method.same_picture is None:
+    """The frame with more samples where it lacks them."""
+    if method.pace is None:
         return own
 
     def more(part: Part) -> Any:
@@ -95,7 +95,7 @@ def _completed(
 
         return call_engine(scene, work)
 
-    return method.same_picture.complete(method, own, others, more)
+    return method.pace.complete(method, own, others, more)
 
 
 def _chosen(scene: Any, request: Request, todo: Sequence[int]) -> Chosen:

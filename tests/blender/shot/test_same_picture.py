@@ -81,9 +81,11 @@ def test_all_samples_are_taken_where_neighbours_are_of_no_use(
     lengths = measured(monkeypatch, float("inf"))
     frames = render(shot, "same")
     assert [frame["share"] for frame in frames] == pytest.approx([1.0] * len(FRAMES))
-    # two halves in the first frame, then the rest of those sampled before it was done
+    # two halves in the first frame, and where neighbours lie on both sides; then the
+    # rest of those sampled before it was done
     assert lengths[:2] == [SAMPLES // 2, SAMPLES // 2]
-    assert set(lengths[2:]) == {SAMPLES - SAMPLES // 4}
+    assert lengths.count(SAMPLES // 2) == 4
+    assert {*lengths} == {SAMPLES // 2, SAMPLES - SAMPLES // 4}
 
 
 def test_the_rest_of_a_sequence_is_the_picture_of_all(

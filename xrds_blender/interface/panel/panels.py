@@ -16,7 +16,7 @@ from ...planning.estimates import Capabilities
 from ...planning.request import Request
 from ...planning.settings import PRESETS, Mode
 from .. import presets, status_bar, translations
-from ..properties import request_of
+from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
 from . import cycles_panels, mode_table, paragraph, summary
 from .remarks import remarks
@@ -80,6 +80,8 @@ def _draw_choices(
         layout.prop(settings, "temporal_radius")
     if request.settings.mode is Mode.FULL_SIZE and request.settings.temporal_radius:
         layout.prop(settings, "animation")
+        if settings.animation == DEADLINE:
+            layout.prop(settings, "deadline")
 
 
 class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):

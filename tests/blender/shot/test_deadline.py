@@ -1,0 +1,162 @@
+"""Shots that end at a time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy")
+pytest.importorskip("mitsuba_oidn")
+
+from xrds_blender.command import main
+from xrds_blender.command.render_file import render_file
+from xrds_blender.cycles.settings import has_subsets
+from xrds_blender.planning.request import render_request
+from xrds_blender.shot import deadline as deadline_module
+from xrds_blender.shot.deadline import Deadline
+from xrds_blender.shot.sampling import Sampled
+from xrds_core.errors import UsageError
+from xrds_core.temporal.window import Shot, Window
+
+RADIUS = 2
+
+
+@dataclass
+class Farm:
+    """Renders frames in seconds of its own: no clock is waited for.
+
+    A frame takes `start` and `sample` for each of its samples, times its `cost`, and
+    `finish` beside that.
+    """
+
+    monkeypatch: pytest.MonkeyPatch
+    start: float = 0.4
+    sample: float = 0.25
+    finish_seconds: float = 3.0
+    now: float = 100.0
+    counts: list[int] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        clock = SimpleNamespace(perf_counter=lambda: self.now)
+        self.monkeypatch.setattr(deadline_module, "time", clock)
+
+    def finish(self, *_: Any) -> None:
+        self.now += self.finish_seconds
+
+    def render(
+        self, seconds: float, cost: Any = lambda _: 1.0, frames: int = 40
+    ) -> float:
+        """Return the seconds that a shot took; `counts` are the samples of frames."""
+        began = self.now
+        pace = Deadline(seconds, frames, frames, _began=began)
+        request = render_request(1, temporal_radius=RADIUS)
+
+        def load(number: int) -> Sampled:
+            while True:
+                count = pace.request(request).settings.own_samples
+                took = (self.start + count * self.sample) * cost(number)
+                self.now += took
+                views: dict[str, Any] = {"": None}
+                frame = Sampled(number, views, {"beauty": took}, samples=count)
+                if pace.takes(self, frame):
+                    self.counts.append(count)
+                    return frame
+
+        for found in Window(Shot(tuple(range(frames)), RADIUS), load):
+            frame = pace.complete(self, found.own, (), lambda _: ({}, {}))
+            assert frame.decisions[0].decision == "deadline"
+            self.finish()
+        return self.now - began
+
+
+@pytest.mark.parametrize("seconds", [300.0, 1000.0, 20000.0])
+def test_a_shot_ends_within_five_percent_and_looks_even(
+    seconds: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    farm = Farm(monkeypatch)
+    assert farm.render(seconds) == pytest.approx(seconds, rel=0.05)
+    even = np.asarray(farm.counts[:-4])
+    assert even.std() <= 0.1 * even.mean() + 0.5, farm.counts
+
+
+def test_frames_that_grow_dear_take_fewer_samples(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    farm = Farm(monkeypatch)
+    took = farm.render(2000.0, cost=lambda number: 1.0 + number / 20)
+    assert took == pytest.approx(2000.0, rel=0.05)
+    assert farm.counts[-1] < farm.counts[0]
+
+
+def test_frames_a_hundred_times_as_dear_are_late_by_one_of_them(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    farm = Farm(monkeypatch)
+    farm.render(1000.0, cost=lambda number: 100.0 if number > 30 else 1.0)
+    assert farm.counts[31] > 50  # nothing tells of it beforehand
+    assert set(farm.counts[32:]) == {1}
+    assert capsys.readouterr().err.count("less than one sample") == 1
+
+
+def test_no_time_is_one_sample_a_frame_and_a_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    farm = Farm(monkeypatch)
+    farm.render(1.0)
+    assert set(farm.counts) == {1}
+    said = capsys.readouterr().err
+    assert said.count("less than one sample for each of 40 frames") == 1
+    assert "about 2 min" in said
+
+
+def test_one_frame_takes_what_fits(monkeypatch: pytest.MonkeyPatch) -> None:
+    farm = Farm(monkeypatch)
+    assert farm.render(60.0, frames=1) == pytest.approx(60.0, rel=0.05)
+
+
+@pytest.mark.skipif(
+    not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
+)
+def test_the_command_and_the_engine_keep_it(blend: Path) -> None:
+    """Rendered: the samples fill the time, whatever the file's are."""
+    numbers, seconds = list(range(1, 7)), 12.0
+    request = render_request(1, temporal_radius=RADIUS, deadline=seconds)
+    pattern = str(blend.parent / "command" / "#.exr")
+    frames = render_file(blend, pattern, request, frames=numbers)["frames"]
+    samples = [frame["samples"] for frame in frames]
+    assert min(samples) > bpy.context.scene.cycles.samples, samples
+    assert sum(frame["seconds"]["total"] for frame in frames) < 1.3 * seconds
+
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    own = scene.cycles.samples
+    scene.render.engine, scene.xrds.animation = "XRDS", "deadline"
+    scene.xrds.deadline = seconds
+    scene.frame_start, scene.frame_end = numbers[0], numbers[-1]
+    scene.render.filepath = str(blend.parent / "engine" / "#")
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    bpy.ops.render.render(animation=True)
+    assert scene.cycles.samples == own
+    assert len(list((blend.parent / "engine").iterdir())) == len(numbers)
+
+
+@pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--time-budget 3"])
+def test_what_rules_it_out_is_said(
+    what: str, blend: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["render", str(blend), "-o", str(blend.parent / "#.exr"), "--deadline"]
+    words += ["8h", "--frames", "1-5", *what.split()]
+    if what == "--samples 4":
+        words += ["--scale", "1"]
+    assert main.main(words) == 2
+    assert "--deadline cannot be had with" in capsys.readouterr().err
+
+
+def test_a_deadline_must_be_ahead() -> None:
+    with pytest.raises(UsageError, match=r"deadline 0\.0 s must be above 0"):
+        render_request(1, deadline=0.0)
