@@ -35,14 +35,15 @@ _NEWEST = 0.3  # weight of the newest frame in what is expected of the next
 class Deadline:
     """Samples of the frames of a shot that ends `seconds` from now.
 
-    `to_sample` frames are still to be sampled and `to_finish` to be finished, in each
-    of `layers` that render in turn. Where frames continue one sequence each has room
-    for `room` samples.
+    `to_sample` frames are still to be sampled and `to_finish` to be finished, with up
+    to `neighbours`, in each of `layers` that render in turn. Where frames continue one
+    sequence each has room for `room` samples.
     """
 
     seconds: float
     to_sample: int
     to_finish: int
+    neighbours: int = 0
     layers: int = 1
     continues: bool = False
     samples: int = 0
@@ -50,7 +51,8 @@ class Deadline:
     _began: float = field(default_factory=time.perf_counter)
     _try: int = _FIRST_TRY  # samples of the next one
     _tried_before: tuple[int, float] = (0, 0.0)  # samples and seconds
-    _start: float = 0.0  # seconds of a frame's render beside its samples
+    _sync: float = 0.0  # seconds until Cycles has a frame's scene
+    _start: float = 0.0  # seconds of a render beside that and its samples
     _sample: float = 0.0  # seconds of a sample
     _beside: float = 0.0  # seconds of a frame beside its render
     _completed: float | None = None  # when the last frame was
@@ -68,12 +70,15 @@ class Deadline:
 
     def takes(self, method: Finishing, frame: Sampled) -> bool:
         """Note a frame that was sampled; False where that was to find out alone."""
-        seconds = frame.seconds.get("beauty", 0.0)
+        seconds, sync = (frame.seconds.get(x, 0.0) for x in ("beauty", "sync"))
         if not self.samples:
             self._tried(method, frame, seconds)
             return False
         self.to_sample -= 1
-        self._rendered += seconds
+        self._rendered += sync + seconds
+        # the scene of the tries is there already; from then on it is another frame's
+        first = not self._sync
+        self._sync += (1.0 if first else _NEWEST) * (sync - self._sync)
         # one that is quicker than its start is a change of scene like any other
         sample = max(seconds - self._start, 0.1 * seconds) / self.samples
         self._sample += _NEWEST * (sample - self._sample)
@@ -90,8 +95,9 @@ class Deadline:
             self._beside += _NEWEST * (beside - self._beside)
         self._completed, self._rendered = now, 0.0
         left = duration(max(self._left, 0.0))
-        reason = f"{left} were left for {self.to_finish} frames"
-        decided = Decision(DEADLINE, f"{own.samples} samples", reason)
+        reason = f"{left} were left for {_counted(self.to_finish, 'frame')}"
+        value = _counted(own.samples or self.samples, "sample")
+        decided = Decision(DEADLINE, value, reason)
         self.to_finish -= 1
         self._choose()
         return replace(own, decisions=(decided,), share=1.0)
@@ -105,7 +111,7 @@ class Deadline:
         if self._try == _FIRST_TRY:
             started = time.perf_counter()
             for view in frame.views:
-                method.finish(frame, (), view)
+                method.finish(frame, [frame] * self.neighbours, view)
             self._beside = time.perf_counter() - started
         few, least = self._tried_before
         self._tried_before = many, most = self._try, seconds
@@ -120,7 +126,8 @@ class Deadline:
         """Samples that spend the time that is left, if all layers take as many."""
         others = self._completed is None  # else their time is beside this one's
         left = self._left / (self.layers if others else 1)
-        left -= self.to_finish * self._beside + self.to_sample * self._start
+        left -= self.to_finish * self._beside
+        left -= self.to_sample * (self._sync + self._start)
         return left / max(self.to_sample * self._sample, 1e-9)
 
     def _choose(self) -> None:
@@ -136,15 +143,19 @@ class Deadline:
     def _take(self, wanted: float) -> None:
         if wanted < 1.0 and not self._is_late:
             self._is_late = True
-            each = self._beside + self._start + self._sample
+            each = self._beside + self._sync + self._start + self._sample
             needed = duration(self.to_finish * self.layers * each)
             warn(
-                "the deadline leaves less than one sample for each of "
-                f"{self.to_finish} frames; with one they take about {needed}"
+                "the deadline leaves less than one sample for a frame; with one, "
+                f"{_counted(self.to_finish, 'frame')} take about {needed}"
             )
         self.samples = int(min(max(round(wanted), 1), MOST_SAMPLES))
         if self.samples > self.room:
             self.room = min(round(_ROOM * self.samples), MOST_SAMPLES)
+
+
+def _counted(number: int, what: str) -> str:
+    return f"1 {what}" if number == 1 else f"{number} {what}s"
 
 
 def deadline(scene: Any, request: Request, shot: Shot) -> Deadline:
@@ -157,6 +168,7 @@ def deadline(scene: Any, request: Request, shot: Shot) -> Deadline:
         request.deadline,
         to_sample=len(sampled),
         to_finish=len(shot.frames),
+        neighbours=2 * shot.radius,
         layers=max(1, sum(layer.use for layer in scene.view_layers)),
         continues=bool(request.settings.temporal_radius)
         and can_continue(scene, request.with_settings(samples=1)),

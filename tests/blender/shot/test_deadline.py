@@ -30,12 +30,13 @@ RADIUS = 2
 class Farm:
     """Renders frames in seconds of its own: no clock is waited for.
 
-    A frame takes `start` and `sample` for each of its samples, times its `cost`, and
-    `finish` beside that.
+    A frame takes `sync`, `start` and `sample` for each of its samples, the latter two
+    times its `cost`, and `finish` beside that.
     """
 
     monkeypatch: pytest.MonkeyPatch
     start: float = 0.4
+    sync: float = 1.0
     sample: float = 0.25
     finish_seconds: float = 3.0
     now: float = 100.0
@@ -49,20 +50,22 @@ class Farm:
         self.now += self.finish_seconds
 
     def render(
-        self, seconds: float, cost: Any = lambda _: 1.0, frames: int = 40
+        self, limit: float, cost: Any = lambda _: 1.0, frames: int = 40
     ) -> float:
         """Return the seconds that a shot took; `counts` are the samples of frames."""
         began = self.now
-        pace = Deadline(seconds, frames, frames, _began=began)
+        pace = Deadline(limit, frames, frames, _began=began)
         request = render_request(1, temporal_radius=RADIUS)
 
         def load(number: int) -> Sampled:
             while True:
                 count = pace.request(request).settings.own_samples
                 took = (self.start + count * self.sample) * cost(number)
-                self.now += took
+                sync = self.sync if number else 0.0
+                self.now += took + sync
                 views: dict[str, Any] = {"": None}
-                frame = Sampled(number, views, {"beauty": took}, samples=count)
+                seconds = {"beauty": took, "sync": sync}
+                frame = Sampled(number, views, seconds, samples=count)
                 if pace.takes(self, frame):
                     self.counts.append(count)
                     return frame
@@ -110,7 +113,7 @@ def test_no_time_is_one_sample_a_frame_and_a_line(
     farm.render(1.0)
     assert set(farm.counts) == {1}
     said = capsys.readouterr().err
-    assert said.count("less than one sample for each of 40 frames") == 1
+    assert said.count("less than one sample for a frame; with one, 40 frames") == 1
     assert "about 2 min" in said
 
 
