@@ -142,17 +142,20 @@ def select(
 
 
 def foresee(
-    scene: Any, request: Request, networks: Sequence[Network]
+    scene: Any, request: Request, networks: Sequence[Network], shot: bool = False
 ) -> Selection | None:
     """What will about be chosen, by the scene's last renders; None without any.
 
-    `networks` are those whose weights are there.
+    `networks` are those whose weights are there; `shot` is as in `select`.
     """
     costs = history.costs(scene)
     if costs is None:
         return None
     known = [n for n in networks if n in costs.network]
     errors = budget.shipped().errors.limited(_denoising())
+    if shot:
+        radius = request.settings.temporal_radius
+        costs, errors = costs.in_shot(radius), errors.in_shot(radius)
     return _choose(request, costs, errors, known)
 
 

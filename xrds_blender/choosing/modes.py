@@ -17,14 +17,20 @@ BEST = Denoising.XRDS_HIGH
 """What automatic takes: `best` doubles the seconds for a tenth of a decibel."""
 
 
-def estimates(scene: Any, settings: Settings, here: Capabilities) -> list[Estimate]:
-    """What to expect of each mode that can work, at the scene's present samples."""
+def estimates(
+    scene: Any, settings: Settings, here: Capabilities, shot: bool = False
+) -> list[Estimate]:
+    """What to expect of each mode that can work, at the scene's present samples.
+
+    In a `shot` frames have the samples of their neighbours.
+    """
 
     def seconds(resolved: Settings) -> float | None:
         return history.seconds(scene, resolved)
 
-    known = history.scene_settings(scene)
-    return estimating.estimates(settings, known, here, budget.shipped(), seconds)
+    known, model = history.scene_settings(scene), budget.shipped()
+    radius = settings.temporal_radius if shot else 0
+    return estimating.estimates(settings, known, here, model, seconds, radius)
 
 
 def best_mode(scene: Any, request: Request) -> Mode:

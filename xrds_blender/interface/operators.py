@@ -50,8 +50,13 @@ class XRDS_OT_render(bpy.types.Operator):
 def menu(self: bpy.types.Menu, context: bpy.types.Context) -> None:
     """Draw the entries of the Render menu."""
     self.layout.separator()
-    self.layout.operator(XRDS_OT_render.bl_idname, icon="RENDER_STILL")
-    animation = self.layout.operator(
+    draw(self.layout)
+
+
+def draw(layout: bpy.types.UILayout) -> None:
+    """Draw a button for a still, and one for the animation."""
+    layout.operator(XRDS_OT_render.bl_idname, icon="RENDER_STILL")
+    animation = layout.operator(
         XRDS_OT_render.bl_idname,
         text="Render Animation with XRDS",
         icon="RENDER_ANIMATION",

@@ -104,7 +104,7 @@ class Curve:
     psnr: tuple[float, ...]
     worth: float = 1.0
 
-    def at(self, count: int) -> float:
+    def at(self, count: float) -> float:
         """PSNR at a count of at least the first."""
         samples = count * self.worth
         after = bisect_right(self.samples, samples)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from .budget import Curve, Model
+from .budget import Curve, ErrorModel, Model
 from .settings import (
     DEFAULT_DENOISING,
     MODES,
@@ -101,12 +101,22 @@ def estimates(
     here: Capabilities,
     model: Model,
     seconds: Callable[[Settings], float | None] = lambda _: None,
+    radius: int = 0,
 ) -> list[Estimate]:
-    """What to expect of each mode that can work, in the order of MODES."""
+    """What to expect of each mode that can work, in the order of MODES.
+
+    `radius` frames to each side give a frame their samples.
+    """
     in_mode = {m: resolved(replace(settings, mode=m), scene) for m in MODES}
     able = {mode: each for mode, each in in_mode.items() if not missing(each, here)}
     samples = settings.samples or scene.samples
-    below = _decibels({m: _curve(s, here, model) for m, s in able.items()}, samples)
+    alone = model.errors
+    errors = alone.in_shot(radius) if radius else alone
+    curves = {
+        m: _curve(s, here, alone if m is Mode.CYCLES_ONLY else errors)
+        for m, s in able.items()
+    }
+    below = _decibels(curves, samples)
     return [Estimate(m, below[m], seconds(each)) for m, each in able.items()]
 
 
@@ -118,17 +128,17 @@ def best(found: Sequence[Estimate]) -> Mode:
     return Mode.CYCLES_ONLY
 
 
-def _curve(settings: Settings, here: Capabilities, model: Model) -> Curve | None:
+def _curve(settings: Settings, here: Capabilities, errors: ErrorModel) -> Curve | None:
     """Expected PSNR over samples; None where none was measured."""
     wanted = settings.family
     if not wanted.is_enlarged:
-        return model.errors.curves.get(wanted)
+        return errors.curves.get(wanted)
     if not here.any_denoiser:
         return None  # measured with a denoised low-resolution picture
     wanted = replace(wanted, denoising=DEFAULT_DENOISING)
     alike = {
         family.guide_samples: curve
-        for family, curve in model.errors.curves.items()
+        for family, curve in errors.curves.items()
         if replace(family, guide_samples=wanted.guide_samples) == wanted
     }
     enough = [n for n in alike if n <= wanted.guide_samples]
@@ -158,5 +168,6 @@ def _decibels(
 
 
 def _difference(curve: Curve, other: Curve, samples: int) -> float:
-    count = min(samples, curve.samples[-1], other.samples[-1])
+    last = (each.samples[-1] / each.worth for each in (curve, other))
+    count = min(samples, *last)
     return curve.at(count) - other.at(count)

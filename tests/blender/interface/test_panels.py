@@ -14,6 +14,7 @@ import pytest
 
 import xrds_blender
 from xrds_blender.choosing import history
+from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame import stages
 from xrds_blender.interface import (
     machine,
@@ -25,6 +26,7 @@ from xrds_blender.interface import (
     translations,
 )
 from xrds_blender.interface.panel import (
+    animation,
     cycles_panels,
     panels,
     paragraph,
@@ -124,6 +126,10 @@ class Layout:
     def label(self, text: str, **_: object) -> None:
         self.drawn.append(text)
 
+    def operator(self, name: str, text: str = "", **_: object) -> SimpleNamespace:
+        self.drawn.append(text or name)
+        return SimpleNamespace()
+
     def separator(self, **_: object) -> None: ...
 
     def column(self, **_: object) -> Layout:
@@ -156,18 +162,18 @@ def test_a_new_scene_says_which_way_it_takes() -> None:
     assert told[0] == "Automatic (Full Size)"
     names = ["Full Size", "Super-Resolution", "2×", "4×", "8×", "Cycles Only"]
     assert [text for text in told if text in names] == names
-    assert "best" in told
+    assert {"same", "much softer", "as set"} <= set(told)
     assert "About" not in told  # no seconds are known before the first render
-    assert {"use_time_budget", "Samples", "temporal_radius"} <= set(told)
+    assert {"use_time_budget", "Max Samples", "temporal_radius"} <= set(told)
     assert not {"denoise", "guide_samples", "use_exposure"} & set(drawn())
 
 
 @pytest.mark.parametrize(
     ("way", "named"),
     [
-        ("full_size", {"denoise", "temporal_radius", "animation", "Samples"}),
+        ("full_size", {"denoise", "temporal_radius", "animation", "Max Samples"}),
         ("x2", {"Low-Resolution Samples", "guide_samples", "use_exposure"}),
-        ("cycles_only", {"Samples", "Cycles Only"}),
+        ("cycles_only", {"Max Samples", "Cycles Only"}),
     ],
 )
 def test_each_way_shows_its_own_settings(way: str, named: set[str]) -> None:
@@ -254,6 +260,82 @@ def test_no_way_takes_more_than_five_rows() -> None:
         scene.xrds.mode = mode
         assert 2 <= len(rows(scene)) <= summary.MOST_ROWS
     assert "DEFAULT_CLOSED" in panels.XRDS_PT_forecast.bl_options
+
+
+def moving(scene: bpy.types.Scene) -> None:
+    """Let the cube move in the range of frames 1 to 20."""
+    scene.frame_start, scene.frame_end = 1, 20
+    cube = scene.objects["Cube"]
+    for frame in (1, 20):
+        cube.location.x = frame
+        cube.keyframe_insert("location", frame=frame)
+    bpy.context.view_layer.update()
+    summary.forget()
+
+
+def test_a_file_where_nothing_moves_speaks_of_no_animation() -> None:
+    scene = bpy.context.scene
+    assert scene.frame_end > scene.frame_start
+    assert "XRDS" not in drawn(panels.XRDS_PT_settings)
+    assert "Neighbouring Frames" not in rows(scene)
+
+
+def test_an_animation_comes_first() -> None:
+    pytest.importorskip("mitsuba_oidn")
+    scene = bpy.context.scene
+    moving(scene)
+    told = drawn(panels.XRDS_PT_settings)
+    assert told[:4] == ["20 frames", "a frame", "all", "picture"]
+    assert told[4:12] == ["Cycles", "?", "?", "as set", "XRDS", "?", "?", "cleaner"]
+    said = " ".join(told)
+    assert animation.UNKNOWN in said
+    assert animation.STILLS in said
+    assert "Neighbouring Frames" in rows(scene)
+    scene.camera.data.type = "PANO"
+    told = drawn(panels.XRDS_PT_settings)
+    assert told[told.index("XRDS") + 3] == "same"
+    assert animation.ALONE in " ".join(told)
+    assert "Neighbouring Frames" not in rows(scene)
+
+
+def test_seconds_of_an_animation_are_those_of_its_frames() -> None:
+    pytest.importorskip("mitsuba_oidn")
+    scene = bpy.context.scene
+    moving(scene)
+    scene.render.resolution_x, scene.render.resolution_y = 64, 48
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 16, False
+    request = properties.request_of(scene.xrds)
+    layer = history.Layer(
+        scene.name, "ViewLayer", 64 * 48, history.scene_settings(scene)
+    )
+    seconds = {"sync": 1.0, "beauty": 32.0, "denoise": 2.0}
+    history.remember(layer, request.settings, seconds)
+    found = animation.expected(scene, request, ALL)
+    assert found.cycles is not None
+    assert found.cycles > 33.0  # and Blender's denoiser
+    assert found.ours is not None
+    assert found.ours > 35.0  # and neighbours
+    assert not found.at_most
+    scene.xrds.mode, scene.xrds.animation = "full_size", "same_picture"
+    same = animation.expected(scene, properties.request_of(scene.xrds), ALL)
+    assert (same.picture, same.at_most) == ("same", has_subsets(scene))
+    scene.xrds.animation, scene.xrds.deadline = "deadline", 600.0
+    late = animation.expected(scene, properties.request_of(scene.xrds), ALL)
+    assert late.ours == pytest.approx(30.0)
+    FILE.end()
+
+
+def test_cycles_users_see_it_too() -> None:
+    pytest.importorskip("mitsuba_oidn")
+    moving(bpy.context.scene)
+    context = Context()
+    assert not panels.XRDS_PT_under_cycles.poll(context)
+    context.engine = "CYCLES"
+    assert panels.XRDS_PT_under_cycles.poll(context)
+    layout = Layout()
+    panels.XRDS_PT_under_cycles.draw(SimpleNamespace(layout=layout), context)
+    assert "20 frames" in layout.drawn
+    assert layout.drawn[-2:] == ["xrds.render", "Render Animation with XRDS"]
 
 
 def remarks_of(at_hand: Capabilities) -> list[tuple[str, str]]:

@@ -19,7 +19,7 @@ FOLDER = Path(interface.__file__).parent
 SOURCES = [*sorted(FOLDER.rglob("*.py")), Path(str(estimates.__file__))]
 WORDS = translations.read()
 # Shown as they are in every language.
-NAMES = {"XRDS", "CPU", "Metal", "Error: "}
+NAMES = {"XRDS", "Cycles", "CPU", "Metal", "Error: "}
 Text = tuple[str | None, str]  # context, None where the source does not tell; English
 
 

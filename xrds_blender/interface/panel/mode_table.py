@@ -9,6 +9,7 @@ from xrds_core.time_left import duration
 from ...planning.estimates import Estimate
 from ...planning.settings import MODES, Mode
 from ..translations import CONTEXT
+from . import words
 from .paragraph import translated
 
 NAMES = {
@@ -19,11 +20,11 @@ NAMES = {
     Mode.X8: "Super-Resolution 8×",
     Mode.CYCLES_ONLY: "Cycles Only",
 }
-SAME = 0.05  # dB: what is shown as one decimal of zero
 
 
-def draw(layout: Any, settings: Any, best: Mode, estimates: list[Estimate]) -> None:
+def draw(layout: Any, scene: Any, best: Mode, estimates: list[Estimate]) -> None:
     """Draw one button for each mode that can work, and the chosen one in any case."""
+    settings = scene.xrds
     column = layout.column(align=True)
     text = f"{translated('Automatic')} ({_automatic(settings, best)})"
     column.prop_enum(settings, "mode", Mode.AUTOMATIC.value, text=text, translate=False)
@@ -32,7 +33,7 @@ def draw(layout: Any, settings: Any, best: Mode, estimates: list[Estimate]) -> N
     mode.label(text="")
     if timed:
         seconds.label(text="Estimated Time", text_ctxt=CONTEXT)
-    quality.label(text="Quality", text_ctxt=CONTEXT)
+    quality.label(text="Picture", text_ctxt=CONTEXT)
     found = {each.mode: each for each in estimates}
     shown = [mode for mode in MODES if mode in found or settings.mode == mode]
     enlarged = [mode for mode in shown if mode.is_enlarged]
@@ -41,10 +42,13 @@ def draw(layout: Any, settings: Any, best: Mode, estimates: list[Estimate]) -> N
             column.separator(factor=0.5)
         if each in enlarged[:1]:
             column.label(text="Super-Resolution", text_ctxt=CONTEXT)
-        _draw_mode(column, settings, found.get(each, Estimate(each)), timed)
+        word = words.of(each, estimates, scene)
+        _draw_mode(column, settings, found.get(each, Estimate(each)), word, timed)
 
 
-def _draw_mode(column: Any, settings: Any, estimate: Estimate, timed: bool) -> None:
+def _draw_mode(
+    column: Any, settings: Any, estimate: Estimate, word: str, timed: bool
+) -> None:
     cell, seconds, quality = _cells(column, timed)
     mode = estimate.mode
     # Short: in a narrow panel three buttons would else read the same.
@@ -54,7 +58,7 @@ def _draw_mode(column: Any, settings: Any, estimate: Estimate, timed: bool) -> N
         spent = estimate.seconds
         text = "" if spent is None else duration(spent)
         seconds.label(text=text, translate=False)
-    quality.label(text=_quality(estimate), translate=False)
+    quality.label(text=word, translate=False)
 
 
 def _cells(layout: Any, timed: bool) -> tuple[Any, Any, Any]:
@@ -72,12 +76,3 @@ def _automatic(settings: Any, best: Mode) -> str:
     if settings.is_timed:
         return translated("within {time}", time=duration(settings.time_budget))
     return translated(NAMES[best])
-
-
-def _quality(estimate: Estimate) -> str:
-    if estimate.decibels is None:
-        return translated("noisy") if estimate.mode is Mode.CYCLES_ONLY else "?"
-    if estimate.decibels > -SAME:
-        return translated("best")
-    digits = 1 if estimate.decibels > -1 else 0
-    return f"{estimate.decibels:.{digits}f} dB".replace("-", "−")

@@ -15,10 +15,11 @@ from ...internals.lifetimes import FILE
 from ...planning.estimates import Capabilities
 from ...planning.request import Request
 from ...planning.settings import PRESETS, Mode
-from .. import presets, status_bar, translations
+from ...shot.sampling import has_neighbours
+from .. import operators, presets, status_bar, translations
 from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
-from . import cycles_panels, mode_table, paragraph, summary
+from . import animation, cycles_panels, mode_table, paragraph, summary
 from .remarks import remarks
 
 
@@ -48,10 +49,15 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         layout, scene = self.layout, context.scene
-        settings, request = scene.xrds, request_of(scene.xrds)
+        request = request_of(scene.xrds)
         here = capabilities(request.machine.weights)
-        found = estimates(scene, request.settings, here)
-        mode_table.draw(layout, settings, best_mode(scene, request), found)
+        moves = summary.is_animation(scene)
+        if moves:
+            animation.draw(layout, context, animation.expected(scene, request, here))
+            layout.separator()
+        shot = moves and has_neighbours(scene, request)
+        found = estimates(scene, request.settings, here, shot)
+        mode_table.draw(layout, scene, best_mode(scene, request), found)
         layout.use_property_split = True
         layout.use_property_decorate = False
         _draw_choices(layout, scene, request, here)
@@ -68,7 +74,9 @@ def _draw_choices(
         _switched(layout, settings, "use_time_budget", "time_budget")
     column = layout.column()
     column.active = not settings.is_timed
-    name = "Low-Resolution Samples" if request.settings.is_enlarged else "Samples"
+    name = "Max Samples" if scene.cycles.use_adaptive_sampling else "Samples"
+    if request.settings.is_enlarged:
+        name = "Low-Resolution Samples"
     column.prop(scene.cycles, "samples", text=name, text_ctxt=CONTEXT)
     if settings.mode == Mode.FULL_SIZE:
         column.prop(settings, "denoise")
@@ -82,6 +90,29 @@ def _draw_choices(
         layout.prop(settings, "animation")
         if settings.animation == DEADLINE:
             layout.prop(settings, "deadline")
+
+
+class XRDS_PT_under_cycles(bpy.types.Panel):
+    """What XRDS would make of the scene, under Cycles."""
+
+    bl_label = "XRDS"
+    bl_space_type = _RenderPanel.bl_space_type
+    bl_region_type = _RenderPanel.bl_region_type
+    bl_context = _RenderPanel.bl_context
+    bl_translation_context = CONTEXT
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.engine == cycles_panels.CYCLES
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, scene = self.layout, context.scene
+        if summary.is_animation(scene):
+            request = request_of(scene.xrds)
+            here = capabilities(request.machine.weights)
+            animation.draw(layout, context, animation.expected(scene, request, here))
+        operators.draw(layout.column(align=True))
 
 
 class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):
@@ -190,6 +221,7 @@ CLASSES = (
     XRDS_PT_advanced,
     XRDS_PT_forecast,
     XRDS_PT_last_render,
+    XRDS_PT_under_cycles,
 )
 
 

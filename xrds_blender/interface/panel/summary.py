@@ -14,8 +14,9 @@ from ...planning.estimates import Capabilities
 from ...planning.plan import Plan
 from ...planning.request import Request
 from ...planning.settings import Mode, Settings
+from ...shot.sampling import has_neighbours
 from ..machine import machine
-from ..properties import DENOISE
+from ..properties import DENOISE, request_of
 from .mode_table import NAMES
 from .paragraph import translated
 
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from .facts_cache import FactsCache
 
 Row = tuple[str, str]
-MOST_ROWS = 5
+MOST_ROWS = 6
 _STAGES = {
     "sync": "Scene",
     "beauty": "Samples",
@@ -51,15 +52,24 @@ def forget() -> None:
         _facts_cache().forget()
 
 
+def is_animation(scene: Any) -> bool:
+    """Whether the scene's range has several frames, and something changes in them."""
+    if scene.frame_end <= scene.frame_start:
+        return False
+    request = request_of(scene.xrds)
+    layer = scene.view_layers[0]
+    return bool(_facts_cache().facts(scene, layer, request.settings).scene.moving)
+
+
 def next_render(scene: Any, request: Request, here: Capabilities) -> list[Row]:
-    """Name and value of what the render will do, take and leave out; five at most."""
+    """Name and value of what the render will do, take and leave out; six at most."""
     size = frame_size(scene.render)
     if request.goal is not None:
         rows = [
             ("Picture", _size(*size)),
             ("Expected Settings", _foreseen(scene, request, here)),
         ]
-        return rows + _neighbours(size, request.settings)
+        return rows + _neighbours(scene, request)
     if request.settings.is_enlarged:
         return _enlarged(scene, request)
     rows = [("Picture", _sampled(*size, scene.cycles.samples))]
@@ -69,16 +79,18 @@ def next_render(scene: Any, request: Request, here: Capabilities) -> list[Row]:
         shown = named or translated("none")
         return [*rows, ("Denoising", shown)]
     rows.append(("Denoising", translated(_QUALITIES[request.settings.quality])))
-    return rows + _neighbours(size, request.settings)
+    if scene.cycles.use_denoising:
+        rows.append(("Cycles' Denoise", translated("not used")))
+    return rows + _neighbours(scene, request)
 
 
-def _neighbours(size: tuple[int, int], settings: Settings) -> list[Row]:
+def _neighbours(scene: Any, request: Request) -> list[Row]:
     """How many frames an animation stores, and the memory that they take."""
-    radius = settings.temporal_radius
-    if not radius:
+    radius, size = request.settings.temporal_radius, frame_size(scene.render)
+    if not is_animation(scene) or not has_neighbours(scene, request):
         return []
     text = "{radius} before and after, {memory}"
-    taken = _amount(forecast.shot_memory(*size, radius, settings.scale))
+    taken = _amount(forecast.shot_memory(*size, radius, request.settings.scale))
     shown = translated(text, radius=radius, memory=taken)
     return [("Neighbouring Frames", shown)]
 
@@ -88,7 +100,8 @@ def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
     from ...choosing.chosen import foresee
 
     networks = sorted(here.networks) if here.torch else []
-    found = foresee(scene, request, networks) if here.any_denoiser else None
+    shot = is_animation(scene) and has_neighbours(scene, request)
+    found = foresee(scene, request, networks, shot) if here.any_denoiser else None
     if found is None:
         return translated("known after a first render")
     return _named(found.settings)
@@ -111,7 +124,7 @@ def _enlarged(scene: Any, request: Request) -> list[Row]:
         ("Low Resolution", _sampled(*small, scene.cycles.samples)),
         ("Guides", guides if chosen.render_guides else translated("none")),
         ("Memory", f"≤ {_amount(taken)}"),
-        *_neighbours(size, request.settings),
+        *_neighbours(scene, request),
     ]
     skipped = ", ".join(translated(each) for each in _skipped(chosen))
     return [*rows, ("Skipped", skipped)] if skipped else rows

@@ -1,0 +1,119 @@
+"""What an animation takes in Cycles and in XRDS: each frame, and all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from xrds_core.time_left import duration
+
+from ...choosing import history
+from ...choosing.modes import estimates
+from ...planning.estimates import Capabilities, resolved
+from ...planning.request import Request
+from ...planning.settings import Mode
+from ...shot.same_picture import can_save
+from ...shot.sampling import has_neighbours
+from . import paragraph, words
+from .paragraph import translated
+
+UNKNOWN = "Known after a first render of a frame"
+EXPECTED = "Expected from the renders of this file so far"
+ALONE = (
+    "Frames of this camera, or without a temporal radius, cannot use each other's "
+    "samples: each is rendered by itself"
+)
+STILLS = "A single image is rendered by itself: neighbours help in Render Animation"
+
+
+@dataclass(frozen=True)
+class Expected:
+    """An animation before it is rendered.
+
+    `cycles` and `ours` are the seconds of a frame, None where nothing is known; the
+    latter are `at_most` so many where samples are saved. `picture` is ours beside that
+    of Cycles. `is_shot` tells whether frames use each other's samples.
+    """
+
+    frames: int
+    cycles: float | None
+    ours: float | None
+    picture: str
+    at_most: bool = False
+    is_shot: bool = True
+
+
+def expected(scene: Any, request: Request, here: Capabilities) -> Expected:
+    """What to expect of the scene's range."""
+    frames = len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+    is_shot = has_neighbours(scene, request)
+    known = history.scene_settings(scene)
+    settings = request.settings
+    cycles = resolved(replace(settings, mode=Mode.CYCLES_ONLY, denoising=None), known)
+    found = estimates(scene, settings, here, is_shot)
+    saves = can_save(scene, request, frames)
+    ours = _seconds(scene, request, is_shot)
+    if request.deadline is not None:
+        ours = request.deadline / frames
+    picture = words.of(settings.mode, found, scene)
+    return Expected(
+        frames,
+        history.seconds(scene, cycles),
+        ours,
+        translated("same") if saves else picture,
+        saves,
+        is_shot,
+    )
+
+
+def _seconds(scene: Any, request: Request, is_shot: bool) -> float | None:
+    """What a frame will about take beside its neighbours."""
+    settings = resolved(request.settings, history.scene_settings(scene))
+    costs = history.costs(scene)
+    if not is_shot or costs is None:
+        return history.seconds(scene, settings)
+    return costs.in_shot(request.settings.temporal_radius).seconds(settings)
+
+
+def draw(layout: Any, context: Any, found: Expected) -> None:
+    """Draw a line for Cycles, one for XRDS, and where they are from."""
+    column = layout.column(align=True)
+    name, each, whole, picture = _cells(column)
+    name.label(text=translated("{count} frames", count=found.frames), translate=False)
+    each.label(text=translated("a frame"), translate=False)
+    whole.label(text=translated("all"), translate=False)
+    picture.label(text=translated("picture"), translate=False)
+    _line(column, "Cycles", found.cycles, found.frames, translated("as set"))
+    limit = "≤ " if found.at_most else ""
+    _line(column, "XRDS", found.ours, found.frames, found.picture, limit)
+    known = None not in (found.cycles, found.ours)
+    notes = [EXPECTED if known else UNKNOWN, STILLS if found.is_shot else ALONE]
+    for note in notes:
+        paragraph.draw(layout, context, translated(note))
+
+
+def _line(
+    column: Any,
+    who: str,
+    seconds: float | None,
+    frames: int,
+    picture: str,
+    limit: str = "",
+) -> None:
+    name, each, whole, quality = _cells(column)
+    name.label(text=who, translate=False)
+    for cell, count in ((each, 1), (whole, frames)):
+        text = "?" if seconds is None else limit + duration(seconds * count)
+        cell.label(text=text, translate=False)
+    quality.label(text=picture, translate=False)
+
+
+def _cells(layout: Any) -> tuple[Any, Any, Any, Any]:
+    """Four columns, the numbers to the right."""
+    first = layout.split(factor=0.28, align=True)
+    rest = first.split(factor=0.3, align=True)
+    last = rest.split(factor=0.45, align=True)
+    cells = [first.row(), rest.row(), last.row(), last.row()]
+    for cell in cells[1:]:
+        cell.alignment = "RIGHT"
+    return cells[0], cells[1], cells[2], cells[3]
