@@ -43,6 +43,14 @@ def factor(text: str) -> float:
     return value
 
 
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    value = float(text)
+    if not 0.0 <= value <= 1.0:
+        raise argparse.ArgumentTypeError(f"{text} must be from 0 to 1")
+    return value
+
+
 def seconds(text: str) -> float:
     """A time above 0, such as 8h, 1h30m, 90m or 45s; a number alone is of seconds."""
     number = r"(\d+(?:\.\d+)?)"

@@ -31,6 +31,13 @@ def add_request(command: argparse.ArgumentParser) -> None:
         "of the file's; without its noise threshold and its time limit",
     )
     add(
+        "--noise-threshold",
+        type=arguments.share,
+        metavar="T",
+        help="let pixels stop at this noise, such as 0.01; --samples, or the file's, "
+        "are then the most that they take; 0 lets Cycles choose",
+    )
+    add(
         "--same-picture",
         action="store_true",
         help="frames of a shot as the file's own samples make them, from fewer where "
@@ -192,7 +199,9 @@ def choice_of(options: argparse.Namespace) -> SceneChoice:
         options.camera,
         options.resolution,
         getattr(options, "threads", None),
-        options.enable_autoexec,
+        noise_threshold=getattr(options, "noise_threshold", None),
+        samples=getattr(options, "samples", None),
+        trusted=options.enable_autoexec,
     )
 
 
@@ -201,7 +210,7 @@ def request_of(options: argparse.Namespace) -> Request:
     _check_pace(options)
     return render_request(
         scale=options.scale,
-        samples=options.samples,
+        samples=options.samples if options.noise_threshold is None else None,
         guide_samples=options.guide_samples,
         preset=options.preset,
         device=options.device,
@@ -232,6 +241,7 @@ def _temporal_radius(options: argparse.Namespace) -> int:
             raise UsageError(f"--temporal-radius cannot be had with {incompatible}")
         return requested
     several = len(getattr(options, "frames", None) or ()) > 1
+    several |= getattr(options, "animation", False)
     several |= getattr(options, "sample_cache", None) is not None
     return RADIUS if several and not incompatible else 0
 

@@ -59,6 +59,9 @@ def _add_frames(command: argparse.ArgumentParser) -> None:
         help="such as 1-24, 1-100x4 (every fourth) or 1-24,30",
         metavar="A-B",
     )
+    which.add_argument(
+        "-a", "--animation", action="store_true", help="the frame range of the file"
+    )
 
 
 def _render(options: argparse.Namespace) -> dict[str, Any]:
@@ -74,6 +77,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
         options.out,
         request_of(options),
         frames=options.frames,
+        animation=options.animation,
         choice=choice_of(options),
         encoding=encoding_of(options),
         resume=options.resume,
@@ -83,11 +87,13 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("plan")
+    from ..scene.contents import frame_range
     from ..shot.explain import explain
     from .scene_file import open_scene
 
     request, frames = request_of(options), options.frames
-    return explain(open_scene(options.scene, choice_of(options)), request, frames)
+    scene = open_scene(options.scene, choice_of(options))
+    return explain(scene, request, frame_range(scene) if options.animation else frames)
 
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from xrds_core.errors import PictureError, UsageError, XRDSError
 from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
-from xrds_core.frames import frame_path
+from xrds_core.frames import frame_path, in_words
 from xrds_core.notices import warn
 from xrds_core.time_left import Clock
 
@@ -22,6 +22,7 @@ from ..frame.networks import is_ready, load_upscaler
 from ..frame.picture import NetworkFailed, Picture
 from ..planning.request import Request
 from ..planning.settings import Mode, share_of
+from ..scene.contents import frame_range, moves_in_time
 from ..shot.cache import SampleCache, cache_of
 from ..shot.render import render_scene
 from ..shot.sampling import has_neighbours
@@ -37,6 +38,7 @@ def render_file(
     request: Request,
     *,
     frames: Sequence[int] | None = None,
+    animation: bool = False,
     choice: SceneChoice = AS_SAVED,
     encoding: Encoding = FLOAT_ZIP,
     resume: bool = False,
@@ -50,6 +52,7 @@ def render_file(
             samples alone.
         request: scale, samples and the rest.
         frames: numbers of the frames; the file's current one by default.
+        animation: render the file's frame range.
         choice: what comes in the place of what the file was saved with.
         encoding: of .exr files.
         resume: leave frames as they are that lie there whole and of their size.
@@ -68,7 +71,9 @@ def render_file(
         picture_file.check_output(output, frames or [0])
     scene = open_scene(path, choice)
     _check_libraries(request)
-    numbers = list(frames or [scene.frame_current])
+    numbers = _numbers(scene, frames, animation)
+    if animation and output is not None:
+        picture_file.check_output(output, numbers)
     size = picture_size(scene.render)
     cache = sample_cache and _cache(scene, request, sample_cache)
 
@@ -91,6 +96,20 @@ def render_file(
         "kept": [n for n in numbers if n not in rendered] if output else [],
         "samples": cache and cache.report(numbers),
     }
+
+
+def _numbers(scene: Any, frames: Sequence[int] | None, animation: bool) -> list[int]:
+    """Numbers of the frames to render; says so where the file holds more."""
+    there = frame_range(scene)
+    if animation or frames:
+        return there if animation else list(frames or ())
+    current = scene.frame_current
+    if len(there) > 1 and moves_in_time(scene):
+        warn(
+            f"frame {current} alone: the file has {in_words(there)}; -a renders them, "
+            "--frames some of them"
+        )
+    return [current]
 
 
 def _described(last: Picture | None, request: Request) -> dict[str, Any]:

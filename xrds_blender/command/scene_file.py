@@ -16,7 +16,8 @@ class SceneChoice:
     """What comes in the place of what a file was saved with; None leaves it.
 
     `scene`, `view_layer` and `camera` are names; `resolution` is width and height in
-    pixels; `threads` are Cycles'. `trusted` lets drivers and scripts of the file run.
+    pixels; `threads` are Cycles'. With a `noise_threshold` pixels take `samples` at
+    most. `trusted` lets drivers and scripts of the file run.
     """
 
     scene: str | None = None
@@ -24,6 +25,8 @@ class SceneChoice:
     camera: str | None = None
     resolution: tuple[int, int] | None = None
     threads: int | None = None
+    noise_threshold: float | None = None
+    samples: int | None = None
     trusted: bool = False
 
 
@@ -72,6 +75,11 @@ def _apply(choice: SceneChoice, scene: Any, path: Path) -> None:
     if choice.resolution:
         scene.render.resolution_x, scene.render.resolution_y = choice.resolution
         scene.render.resolution_percentage = 100
+    if choice.noise_threshold is not None:
+        cycles = scene.cycles
+        cycles.use_adaptive_sampling = True
+        cycles.adaptive_threshold = choice.noise_threshold
+        cycles.samples = choice.samples or cycles.samples
     if choice.threads is not None:
         scene.render.threads_mode, scene.render.threads = "FIXED", choice.threads
 

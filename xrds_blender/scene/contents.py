@@ -200,6 +200,18 @@ def stands_still(camera: Any) -> bool:
     return not any(_is_animated(owner) for owner in owners)
 
 
+def frame_range(scene: Any) -> list[int]:
+    """Numbers of the frames that Blender would render as the animation."""
+    return list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+
+
+def moves_in_time(scene: Any) -> bool:
+    """Whether anything in the scene changes from frame to frame."""
+    layer = next((x for x in scene.view_layers if x.use), scene.view_layers[0])
+    layer.update()
+    return layer.depsgraph is not None and bool(scene_facts(layer.depsgraph).moving)
+
+
 def shapes_move(depsgraph: Any) -> bool:
     """Whether anything but camera and light may lie elsewhere in another frame."""
     import bpy

@@ -16,7 +16,7 @@ from xrds_core.temporal.window import Neighbourhood, Shot, Window
 from ..cycles import session
 from ..cycles.passes import CyclesPasses
 from ..frame import stages
-from ..scene.contents import requested_passes
+from ..scene.contents import frame_range, requested_passes
 from ..scene.cuts import cuts
 from .methods import Method
 from .pace import pace_of
@@ -67,7 +67,7 @@ class EngineFrames:
     def of(cls, scene: Any, method: Method) -> EngineFrames:
         """The frames of a scene's range."""
         found = cls(method)
-        numbers = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
+        numbers = frame_range(scene)
         radius, begins = method.request.settings.temporal_radius, cuts(scene, numbers)
         shot = Shot(tuple(numbers), radius, begins)
         method.pace = pace_of(scene, method.request, shot)

@@ -12,6 +12,7 @@ from ..choosing.plan_facts import find_facts
 from ..frame.rendering import call_engine
 from ..planning.plan import neighbours, same_picture
 from ..planning.request import Request
+from ..scene.contents import frame_range
 from ..scene.cuts import cuts
 from .same_picture import can_save
 from .sampling import has_neighbours
@@ -29,7 +30,7 @@ def explain(
     start = time.perf_counter()
     if frames:
         scene.frame_set(frames[0])
-    shot = frames or range(scene.frame_start, scene.frame_end + 1)
+    shot = frames or frame_range(scene)
 
     def look(engine: Any, depsgraph: Any) -> dict[str, Any]:
         is_shot = len(shot) > 1 and has_neighbours(scene, request)

@@ -148,3 +148,53 @@ def test_a_child_process_finds_blender() -> None:
     """Blender's own folders on `sys.path` hold half a module of that name."""
     done = run_python("-c", "import bpy, os; print(bpy.app.version); os._exit(0)")
     assert done.stdout.strip() == str(bpy.app.version), done.stderr
+
+
+def test_a_noise_threshold_lets_pixels_stop(blend: Path) -> None:
+    scene = open_scene(blend, SceneChoice(noise_threshold=0.05, samples=40))
+    cycles = scene.cycles
+    assert cycles.use_adaptive_sampling
+    assert cycles.adaptive_threshold == pytest.approx(0.05)
+    assert cycles.samples == 40
+
+
+@pytest.fixture
+def short_range(blend: Path) -> Path:
+    """Frames 2 to 6 in steps of 2, a cube that moves in them, few small samples."""
+    scene = bpy.data.scenes["Scene"]
+    scene.frame_start, scene.frame_end, scene.frame_step = 2, 6, 2
+    scene.render.resolution_x, scene.render.resolution_y = 16, 16
+    scene.cycles.samples = 1
+    cube = scene.objects["Cube"]
+    for frame in (2, 6):
+        cube.location.x = frame
+        cube.keyframe_insert("location", frame=frame)
+    scene.frame_set(4)
+    bpy.ops.wm.save_mainfile()
+    return blend
+
+
+def test_the_range_of_the_file_is_rendered(
+    short_range: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mitsuba_oidn")
+    out = short_range.parent / "out"
+    words = ["render", str(short_range), "--scale", "1", "-o", f"{out}/#.exr"]
+    assert main.main([*words, "-a"]) == 0
+    assert sorted(path.name for path in out.iterdir()) == ["2.exr", "4.exr", "6.exr"]
+    told = "frame 4 alone: the file has 2, 4, 6; -a renders them"
+    assert told not in capsys.readouterr().err
+    assert main.main(words) == 0
+    assert told in capsys.readouterr().err
+    assert main.main([*words[:-1], f"{out}/all.exr", "-a"]) == 2
+    assert "all 3 frames would be written" in capsys.readouterr().err
+
+
+def test_a_still_is_not_told_of_a_range(
+    blend: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("mitsuba_oidn")
+    words = ["render", str(blend), "--scale", "1", "--samples", "1"]
+    words += ["--resolution", "16x16", "-o", str(blend.parent / "out.exr")]
+    assert main.main(words) == 0
+    assert "alone" not in capsys.readouterr().err

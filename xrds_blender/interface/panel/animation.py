@@ -12,6 +12,7 @@ from ...choosing.modes import estimates
 from ...planning.estimates import Capabilities, resolved
 from ...planning.request import Request
 from ...planning.settings import Mode
+from ...scene.contents import frame_range
 from ...shot.same_picture import can_save
 from ...shot.sampling import has_neighbours
 from . import paragraph, words
@@ -45,7 +46,7 @@ class Expected:
 
 def expected(scene: Any, request: Request, here: Capabilities) -> Expected:
     """What to expect of the scene's range."""
-    frames = len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+    frames = len(frame_range(scene))
     is_shot = has_neighbours(scene, request)
     known = history.scene_settings(scene)
     settings = request.settings
