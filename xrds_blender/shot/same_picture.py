@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 
 from xrds_core.arrays import Array
 from xrds_core.sequence.extra_samples import ExtraSamples
+from xrds_core.sequence.history import History
 from xrds_core.sequence.same_picture import (
     BLOCK,
-    FALL,
     Gain,
     Rendered,
+    error_fall,
     error_ratio,
     gain,
     rectangles,
@@ -31,6 +32,7 @@ from xrds_core.sequence.same_picture import (
 from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.half_floats import floats
 from xrds_core.temporal.sample_subsets import SampleSubset
+from xrds_core.temporal.vectors import Movement
 
 from ..cycles.low_camera import Region
 from ..cycles.more_samples import more_samples
@@ -45,6 +47,7 @@ from .sampling import (
     LARGEST_SEED,
     Gathered,
     Sampled,
+    can_continue,
     has_neighbours,
     is_even,
     sampling_of,
@@ -55,6 +58,7 @@ FEWEST_SAMPLES = 8
 FEWEST_FRAMES = 16
 """Frames of a shot from which it pays: the first costs more than the file asks for."""
 _FIRST = 0.25  # share that the first frames have; less was not tried by then
+_FALL = 0.5  # the next share over the present one, at least, where frames add up
 _LEAST = 2  # samples of a frame, which has halves then
 # Blocks with less than this share of what they need get more samples, and frames.
 _LACKING, _ENOUGH = 0.75, 0.9
@@ -70,14 +74,14 @@ _OTHER = 1_299_709  # seeds apart; no frame's is near those of another
 
 @dataclass(frozen=True)
 class Part:
-    """More samples of a frame: `length` of its sequence, from `offset` on.
+    """More samples of a frame that has `taken` some: `length` of its sequence.
 
     Where the file has a noise threshold, pixels stop at `share` of what it asks for.
     `region` is a part of the picture, None all of it. `other` sequences have seeds of
     their own.
     """
 
-    offset: int
+    taken: int
     length: int
     share: float
     region: Region | None = None
@@ -130,7 +134,8 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     """
     if not can_save(scene, request, frames):
         return None
-    found = SamePicture(scene.cycles.samples)
+    history = History(Movement()) if can_continue(scene, request) else None
+    found = SamePicture(scene.cycles.samples, history)
     found.share = found.possible(_FIRST)
     return found
 
@@ -144,13 +149,11 @@ def render_more(
     before. Raises Cancelled when the user stops it.
     """
     how = sampling_of(engine, depsgraph, request, place)
-    subset = how.sequence
     if part.other:
-        seed = (subset.seed + part.other * _OTHER) % LARGEST_SEED
+        seed = (how.own_seed + part.other * _OTHER) % LARGEST_SEED
         subset = SampleSubset(seed, part.length, 0, part.length)
     else:
-        offset = subset.offset + part.offset
-        subset = replace(subset, offset=offset, length=part.length)
+        subset = how.further(part.taken, part.length)
     even = is_even(depsgraph.scene_eval, request)
     parts = [subset] if even or subset.length < 2 else subset.halves()
     share = None if even else part.share
@@ -168,13 +171,15 @@ def render_more(
 class SamePicture:
     """How many samples the frames of a shot take, from the first that is finished.
 
-    `samples` are the file's, with a noise threshold the most that a pixel takes. The
+    `samples` are the file's, with a noise threshold the most that a pixel takes. Under
+    a camera that stands still frames that have left the window count, as `history`. The
     next frame to be sampled takes a `share` of them. `_worth` is what a sample of a
     neighbour is worth beside one of the frame's own. It is measured in the first frame,
     and again in one with twice as many neighbours: those of one side are worth less.
     """
 
     samples: int
+    history: History | None = None
     share: float = _FIRST
     _worth: float | None = None
     _measured_in: int = 0
@@ -200,24 +205,26 @@ class SamePicture:
         Raises Cancelled when the user stops their render.
         """
         view, started = next(iter(own.views)), time.perf_counter()
+        beside = [x.number for x in others]
+        others = [*others, *self._before(own, others)]
         accumulated = {v: method.accumulate(own, others, v) for v in own.views}
         own = replace(own, gathered={v: Gathered(x) for v, x in accumulated.items()})
         share = self._shares.get(own.number, 1.0)
         gained = gain(accumulated[view], own.views[view])
         spent = _Seconds({"accumulate": time.perf_counter() - started})
-        if self._worth is None or len(others) >= 2 * max(self._beside, 1):
-            ratio = self._measured(method, own, others, spent.of(more))
-            self._measured_in, self._beside = own.number, len(others)
+        if self._worth is None or len(beside) >= 2 * max(self._beside, 1):
+            ratio, fall = self._measured(method, own, others, share, spent.of(more))
+            self._measured_in, self._beside = own.number, len(beside)
             self._tried, self._ratio = share, ratio
             # the share of all samples that is as good without neighbours
-            alone = max(ratio, _TINY) ** (-1.0 / FALL)
+            alone = max(ratio, _TINY) ** (-1.0 / fall)
             added = share * (gained.of(gained.errors > 0.0) - 1.0)
             self._worth = float(np.clip((alone - share) / max(added, 1e-9), 0.0, 1.0))
         lacks = self._lacks(share, gained)
         shape = own.views[view].shape
         extra = self._top_up(shape, share, gained, lacks, spent.of(more))
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
-        self._choose_next(share, gained.of(rest), [x.number for x in others])
+        self._choose_next(share, gained.of(rest), beside)
         gathered = {v: Gathered(x, extra.get(v)) for v, x in accumulated.items()}
         if extra:
             added = float(extra[view].samples.mean()) / own.views[view].samples
@@ -229,6 +236,14 @@ class SamePicture:
             share=share,
             decisions=(self._decision(share),),
         )
+
+    def _before(self, own: Sampled, others: Sequence[Sampled]) -> list[Sampled]:
+        """What frames before the window have left, as one that lies beside it."""
+        history = self.history
+        if history is None:
+            return []
+        history.advance({x.number: x.views for x in (own, *others)})
+        return [Sampled(history.number, history.views, {})] if history.views else []
 
     def _decision(self, share: float) -> Decision:
         """What a frame was sampled with, and why."""
@@ -264,12 +279,17 @@ class SamePicture:
         return lacks if enough and lacks.mean() < _MOST_LACKING else whole
 
     def _measured(
-        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: _More
-    ) -> float:
+        self,
+        method: Finishing,
+        own: Sampled,
+        others: Sequence[Sampled],
+        share: float,
+        more: _More,
+    ) -> tuple[float, float]:
         """The squared error of a frame with its neighbours over that of all samples.
 
-        By two renders of half of the file's samples, of two seeds: halves of one
-        sequence would not be independent.
+        And the power of samples with which errors fall. By two renders of half of the
+        file's samples, of two seeds: halves of one sequence would not be independent.
         """
         view, length = next(iter(own.views)), max(1, self.samples // 2)
         parts = []
@@ -280,7 +300,10 @@ class SamePicture:
         together = method.finish(own, others, view).radiance
         frame = own.views[view]
         samples = floats(frame.picture[:, :3]).reshape(*frame.shape, 3)
-        return error_ratio(together, samples, (parts[0], parts[1]))
+        pair = parts[0], parts[1]
+        alone = method.finish(replace(own, gathered={}), (), view).radiance
+        fall = error_fall(alone, share, samples, pair)
+        return error_ratio(together, samples, pair, fall), fall
 
     def _top_up(
         self,
@@ -316,7 +339,8 @@ class SamePicture:
         beside = [self._shares.get(number, 1.0) for number in others]
         if beside:
             gain = 1.0 + (gain - 1.0) * share / float(np.mean(beside))
-        needed = self.possible(max(1.0 / float(self._equal(1.0, gain)), _FIRST))
+        least = _FIRST if self.history is None else self.share * _FALL
+        needed = self.possible(max(1.0 / float(self._equal(1.0, gain)), least))
         if not _TOO_MUCH <= needed / self.share <= _TOO_LITTLE:
             self.share = needed
 

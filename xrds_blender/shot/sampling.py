@@ -12,7 +12,11 @@ from xrds_core.errors import Cancelled, SceneError
 from xrds_core.sequence.extra_samples import ExtraSamples
 from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.frame import Camera, Frame, store
-from xrds_core.temporal.sample_subsets import SampleSubset, consecutive_subset
+from xrds_core.temporal.sample_subsets import (
+    SampleSubset,
+    consecutive_subset,
+    further_subset,
+)
 
 from ..cycles import session
 from ..cycles.halves import sample_halves, sample_motion
@@ -109,20 +113,35 @@ class Sampling:
         """A stage's name in the status bar, with the frame's number in a shot."""
         return stage if self.is_alone else f"{stage} of frame {self.number}"
 
-    def subset(self, count: int, other: int = 0) -> SampleSubset | None:
-        """The frame's part, of `count` samples, of the sequence it continues.
+    def subset(self) -> SampleSubset | None:
+        """The frame's part of the sequence that it continues; None of one of its own.
 
-        `other` sequences have other seeds. None where each frame begins its own.
+        A part has fewer samples than all where the frame takes fewer: those of adjacent
+        frames are to lie side by side.
         """
         if self.place is None:
             return None
-        return consecutive_subset(self.place, count, self.radius, self.seed + other)
+        return consecutive_subset(
+            self.place, self.count, self.radius, self.seed, self.whole
+        )
+
+    def other_subset(self, count: int) -> SampleSubset | None:
+        """As `subset`, of `count` samples of a sequence with another seed."""
+        if self.place is None:
+            return None
+        return consecutive_subset(self.place, count, self.radius, self.seed + 1)
 
     @property
-    def sequence(self) -> SampleSubset:
-        """All samples that the file asks for; the frame takes the first of them."""
-        own = SampleSubset(self.own_seed, self.whole, 0, self.whole)
-        return self.subset(self.whole) or own
+    def first(self) -> SampleSubset:
+        """The samples that the frame takes."""
+        return self.subset() or SampleSubset(self.own_seed, self.whole, 0, self.count)
+
+    def further(self, taken: int, length: int) -> SampleSubset:
+        """More samples of a frame that has `taken` some."""
+        first = replace(self, count=taken).first
+        if self.place is None:
+            return replace(first, offset=taken, length=length)
+        return further_subset(first, self.radius, length)
 
     @property
     def own_seed(self) -> int:
@@ -278,7 +297,7 @@ def noisy_frame(
                 depsgraph,
                 samples=settings.samples,
                 seed=how.own_seed,
-                subset=how.subset(how.count),
+                subset=how.subset(),
                 geometry=how.geometry,
             )
     except Cancelled:
@@ -300,8 +319,7 @@ def _frames_of_halves(
     motion, seconds = {}, dict.fromkeys(("sync", "beauty"), 0.0)
     if how.needs_motion:
         motion, seconds = sample_motion(engine, depsgraph, how.own_seed)
-    subset = replace(how.sequence, length=how.count)
-    found, more = sample_halves(engine, depsgraph, subset, how.geometry)
+    found, more = sample_halves(engine, depsgraph, how.first, how.geometry)
     frames = {}
     for view, half in found.items():
         samples = half.whole
@@ -321,7 +339,7 @@ def first_sample(engine: Any, depsgraph: Any, request: Request, place: int) -> N
     The result then holds its passes. `place` is as in `sampling_of`.
     """
     how = sampling_of(engine, depsgraph, request, place)
-    subset = how.subset(how.count)
+    subset = how.subset()
     assert subset is not None
     sample_layer(engine, depsgraph, subset=replace(subset, offset=0, length=1))
 

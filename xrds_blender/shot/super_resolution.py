@@ -302,7 +302,7 @@ class _Renders:
         """The noisy low-resolution light by view."""
         self._begin(stages.LOW, 1)
         how, settings = self.how, self.settings
-        subset = how.subset(how.count)
+        subset = how.subset()
         return self.passes.low_samples(
             settings.scale, settings.samples, seed=how.own_seed, subset=subset
         )
@@ -367,7 +367,7 @@ class _Renders:
             self.chosen,
             self.facts,
             self.engine.report,
-            self.how.subset(samples, other=1),
+            self.how.other_subset(samples),
         )
 
     def _guides(

@@ -42,12 +42,25 @@ class SampleSubset:
 
 
 def consecutive_subset(
-    place: int, samples: int, radius: int, seed: int = 0
+    place: int, samples: int, radius: int, seed: int = 0, most: int = 0
 ) -> SampleSubset:
     """Return the subset of a frame under a still camera.
 
-    No other frame within `radius` has it. `place` is the frame's index in the shot.
+    No other frame within `radius` has it, if all take as many samples. `place` is the
+    frame's index in the shot; `most` are the samples that a frame may take, `samples`
+    by default.
     """
     frames = 2 * radius + 1
-    offset = samples * (place % frames)
-    return SampleSubset(seed % _SEEDS, samples * frames, offset, samples)
+    whole = max(samples, most) * frames
+    return SampleSubset(seed % _SEEDS, whole, samples * (place % frames), samples)
+
+
+def further_subset(own: SampleSubset, radius: int, length: int) -> SampleSubset:
+    """Return more samples for a frame that has a `consecutive_subset`.
+
+    They lie behind those of all frames within `radius`.
+    """
+    frames = 2 * radius + 1
+    place = own.offset // own.length
+    offset = frames * own.length + place * (own.whole // frames - own.length)
+    return replace(own, offset=offset, length=length)

@@ -285,8 +285,8 @@ def test_an_animation_comes_first() -> None:
     scene = bpy.context.scene
     moving(scene)
     told = drawn(panels.XRDS_PT_settings)
-    assert told[:4] == ["20 frames", "a frame", "all", "picture"]
-    assert told[4:12] == ["Cycles", "?", "?", "as set", "XRDS", "?", "?", "cleaner"]
+    assert told[:5] == ["Animation, 20 frames", "Cycles", "?", "XRDS", "?"]
+    assert told[5:7] == ["Picture", "cleaner"]
     said = " ".join(told)
     assert animation.UNKNOWN in said
     assert animation.STILLS in said
@@ -334,7 +334,7 @@ def test_cycles_users_see_it_too() -> None:
     assert panels.XRDS_PT_under_cycles.poll(context)
     layout = Layout()
     panels.XRDS_PT_under_cycles.draw(SimpleNamespace(layout=layout), context)
-    assert "20 frames" in layout.drawn
+    assert "Animation, 20 frames" in layout.drawn
     assert layout.drawn[-2:] == ["xrds.render", "Render Animation with XRDS"]
 
 

@@ -6,7 +6,11 @@ from itertools import combinations
 
 import pytest
 
-from xrds_core.temporal.sample_subsets import SampleSubset, consecutive_subset
+from xrds_core.temporal.sample_subsets import (
+    SampleSubset,
+    consecutive_subset,
+    further_subset,
+)
 
 FRAMES = range(12)
 
@@ -27,6 +31,17 @@ def test_no_two_frames_that_meet_take_the_same(radius: int, seed: int) -> None:
         assert part.length == 2
         assert 0 <= part.offset <= part.whole - part.length
         assert 0 <= part.seed < 2**31
+
+
+def test_further_samples_are_nobody_elses() -> None:
+    radius, most, few = 1, 16, 4
+    parts = [consecutive_subset(place, few, radius, 3, most) for place in range(3)]
+    more = [further_subset(part, radius, most - few) for part in parts]
+    assert {x.whole for x in (*parts, *more)} == {most * 3}
+    every = [taken(x) for x in (*parts, *more)]
+    assert len(set().union(*every)) == sum(map(len, every)) == most * 3
+    # those that all frames have lie side by side: together they are a sequence
+    assert set().union(*every[:3]) == {(3, n) for n in range(3 * few)}
 
 
 def test_a_still_camera_continues_one_sequence() -> None:

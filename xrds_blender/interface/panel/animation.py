@@ -24,7 +24,7 @@ ALONE = (
     "Frames of this camera, or without a temporal radius, cannot use each other's "
     "samples: each is rendered by itself"
 )
-STILLS = "A single image is rendered by itself: neighbours help in Render Animation"
+STILLS = "Frames help each other in animations, not in single images"
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ def expected(scene: Any, request: Request, here: Capabilities) -> Expected:
     known = history.scene_settings(scene)
     settings = request.settings
     cycles = resolved(replace(settings, mode=Mode.CYCLES_ONLY, denoising=None), known)
-    found = estimates(scene, settings, here, is_shot)
+    estimated = estimates(scene, settings, here, is_shot)
     saves = can_save(scene, request, frames)
     ours = _seconds(scene, request, is_shot)
     if request.deadline is not None:
         ours = request.deadline / frames
-    picture = words.of(settings.mode, found, scene)
+    picture = words.of(settings.mode, estimated, scene, here)
     return Expected(
         frames,
         history.seconds(scene, cycles),
@@ -77,44 +77,29 @@ def _seconds(scene: Any, request: Request, is_shot: bool) -> float | None:
 
 
 def draw(layout: Any, context: Any, found: Expected) -> None:
-    """Draw a line for Cycles, one for XRDS, and where they are from."""
+    """Draw what it takes in Cycles and in XRDS, and where that is from."""
     column = layout.column(align=True)
-    name, each, whole, picture = _cells(column)
-    name.label(text=translated("{count} frames", count=found.frames), translate=False)
-    each.label(text=translated("a frame"), translate=False)
-    whole.label(text=translated("all"), translate=False)
-    picture.label(text=translated("picture"), translate=False)
-    _line(column, "Cycles", found.cycles, found.frames, translated("as set"))
+    title = translated("Animation, {count} frames", count=found.frames)
+    column.label(text=title, translate=False)
     limit = "≤ " if found.at_most else ""
-    _line(column, "XRDS", found.ours, found.frames, found.picture, limit)
+    rows = [
+        ("Cycles", _both(found.cycles, found.frames)),
+        ("XRDS", _both(found.ours, found.frames, limit)),
+        (translated("Picture"), found.picture),
+    ]
+    for name, value in rows:
+        split = column.split(factor=0.3)
+        split.label(text=name, translate=False)
+        split.label(text=value, translate=False)
     known = None not in (found.cycles, found.ours)
     notes = [EXPECTED if known else UNKNOWN, STILLS if found.is_shot else ALONE]
     for note in notes:
         paragraph.draw(layout, context, translated(note))
 
 
-def _line(
-    column: Any,
-    who: str,
-    seconds: float | None,
-    frames: int,
-    picture: str,
-    limit: str = "",
-) -> None:
-    name, each, whole, quality = _cells(column)
-    name.label(text=who, translate=False)
-    for cell, count in ((each, 1), (whole, frames)):
-        text = "?" if seconds is None else limit + duration(seconds * count)
-        cell.label(text=text, translate=False)
-    quality.label(text=picture, translate=False)
-
-
-def _cells(layout: Any) -> tuple[Any, Any, Any, Any]:
-    """Four columns, the numbers to the right."""
-    first = layout.split(factor=0.28, align=True)
-    rest = first.split(factor=0.3, align=True)
-    last = rest.split(factor=0.45, align=True)
-    cells = [first.row(), rest.row(), last.row(), last.row()]
-    for cell in cells[1:]:
-        cell.alignment = "RIGHT"
-    return cells[0], cells[1], cells[2], cells[3]
+def _both(seconds: float | None, frames: int, limit: str = "") -> str:
+    """The time of all frames, and of one."""
+    if seconds is None:
+        return "?"
+    whole, each = limit + duration(seconds * frames), duration(seconds)
+    return translated("{whole}, a frame {each}", whole=whole, each=each)

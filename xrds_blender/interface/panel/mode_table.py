@@ -6,7 +6,7 @@ from typing import Any
 
 from xrds_core.time_left import duration
 
-from ...planning.estimates import Estimate
+from ...planning.estimates import Capabilities, Estimate
 from ...planning.settings import MODES, Mode
 from ..translations import CONTEXT
 from . import words
@@ -22,7 +22,9 @@ NAMES = {
 }
 
 
-def draw(layout: Any, scene: Any, best: Mode, estimates: list[Estimate]) -> None:
+def draw(
+    layout: Any, scene: Any, here: Capabilities, best: Mode, estimates: list[Estimate]
+) -> None:
     """Draw one button for each mode that can work, and the chosen one in any case."""
     settings = scene.xrds
     column = layout.column(align=True)
@@ -42,7 +44,7 @@ def draw(layout: Any, scene: Any, best: Mode, estimates: list[Estimate]) -> None
             column.separator(factor=0.5)
         if each in enlarged[:1]:
             column.label(text="Super-Resolution", text_ctxt=CONTEXT)
-        word = words.of(each, estimates, scene)
+        word = words.of(each, estimates, scene, here)
         _draw_mode(column, settings, found.get(each, Estimate(each)), word, timed)
 
 

@@ -57,7 +57,7 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
             layout.separator()
         shot = moves and has_neighbours(scene, request)
         found = estimates(scene, request.settings, here, shot)
-        mode_table.draw(layout, scene, best_mode(scene, request), found)
+        mode_table.draw(layout, scene, here, best_mode(scene, request), found)
         layout.use_property_split = True
         layout.use_property_decorate = False
         _draw_choices(layout, scene, request, here)
@@ -96,6 +96,7 @@ class XRDS_PT_under_cycles(bpy.types.Panel):
     """What XRDS would make of the scene, under Cycles."""
 
     bl_label = "XRDS"
+    bl_parent_id = "RENDER_PT_context"
     bl_space_type = _RenderPanel.bl_space_type
     bl_region_type = _RenderPanel.bl_region_type
     bl_context = _RenderPanel.bl_context

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ...planning.estimates import Estimate
+from ...planning.estimates import Capabilities, Estimate
 from ...planning.settings import Mode
 from .paragraph import translated
 
@@ -13,12 +13,14 @@ from .paragraph import translated
 _ALIKE, _SOFTER = 0.5, 2.0
 
 
-def of(mode: Mode, estimates: Sequence[Estimate], scene: Any) -> str:
+def of(
+    mode: Mode, estimates: Sequence[Estimate], scene: Any, here: Capabilities
+) -> str:
     """The word for a mode, of estimates as the scene is set."""
+    denoises = scene.cycles.use_denoising and here.cycles_denoiser
     if mode is Mode.CYCLES_ONLY:
-        denoises = scene.cycles.use_denoising
         return translated("as set") if denoises else translated("noisy")
-    if not scene.cycles.use_denoising:
+    if not denoises:
         return translated("cleaner")
     above = decibels(mode, estimates)
     if above is None:

@@ -1,0 +1,103 @@
+"""The history of a shot whose camera stands still: frames that have left its window.
+
+There every pixel shows the same surface for as long as nothing moves in front of it, so
+frames older than the temporal radius are still worth something. They are stored as one
+frame, the mean of their samples. A frame joins it as it takes neighbours itself: where
+it shows something else, or in other light, the pixel's history begins anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..temporal.accumulate import accumulate
+from ..temporal.frame import LARGEST_HALF
+from ..temporal.half_floats import floats
+from ..temporal.noise import Noise
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from ..arrays import Array
+    from ..temporal.accumulate import Accumulated
+    from ..temporal.frame import Stored
+    from ..temporal.vectors import Movement
+
+LONGEST = 32
+"""Frames that a history counts as at most: older ones fade, as light drifts."""
+
+
+class History:
+    """What is left of the frames before those in a window, by view."""
+
+    def __init__(self, movement: Movement) -> None:
+        self._movement = movement
+        self._window: dict[int, Mapping[str, Stored]] = {}
+        self.views: dict[str, Stored] = {}
+
+    @property
+    def number(self) -> int:
+        """Number of its newest frame."""
+        return next(iter(self.views.values())).number
+
+    def advance(self, window: Mapping[int, Mapping[str, Stored]]) -> None:
+        """Take in what was in the window before, and lies before all of it now.
+
+        `window` are frames by number, their views by name.
+        """
+        first = min(window)
+        for number in sorted(n for n in self._window if n < first):
+            for view, frame in self._window[number].items():
+                older = self.views.get(view)
+                self.views[view] = extended(older, frame, self._movement)
+        self._window = dict(window)
+
+
+def extended(history: Stored | None, frame: Stored, movement: Movement) -> Stored:
+    """Return a history with the samples of a frame that comes after it."""
+    if history is None:
+        return frame
+    found = accumulate(frame, [history], movement)
+    own = np.full(len(frame.picture), frame.samples, np.float32)
+    if frame.counts is not None:
+        own = floats(frame.counts)
+    total = found.samples.ravel()
+    counts = np.minimum(total, own * LONGEST)
+    picture = _packed(found, len(own))
+    invalid = ~np.isfinite(picture).all(axis=-1)
+    picture[invalid] = 0.0
+    np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
+    share = np.where(total > 0.0, own / np.maximum(total, 1e-9), 1.0)
+    return replace(
+        frame,
+        samples=max(float(counts.mean()), 1e-9),
+        counts=counts.astype(np.float16),
+        picture=picture.astype(frame.picture.dtype),
+        invalid=invalid if invalid.any() else None,
+        noise=_noise(history, frame, share),
+    )
+
+
+def _packed(found: Accumulated, pixels: int) -> Array:
+    """Return its passes as `Stored.picture` has them."""
+    parts = [found.albedo, found.normal]
+    if found.radiance is not None:
+        parts.insert(0, found.radiance)
+    if found.alpha is not None:
+        parts.append(found.alpha[..., None])
+    return np.concatenate(parts, axis=-1).reshape(pixels, -1)
+
+
+def _noise(history: Stored, frame: Stored, share: Array) -> Noise | None:
+    """Return the noise of a mean in which a frame's samples have a `share`."""
+    old, new = history.noise, frame.noise
+    if old is None or new is None:
+        return None
+    brightness, latest = (floats(x.brightness) for x in (old, new))
+    brightness = brightness + (latest - brightness) * share
+    root = np.sqrt(share)
+    parts = brightness, floats(new.difference) * root, floats(new.guides) * root
+    return Noise(*(x.astype(new.difference.dtype) for x in parts))
