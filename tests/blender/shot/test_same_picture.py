@@ -101,6 +101,7 @@ def test_the_rest_of_a_sequence_is_the_picture_of_all(
         data = bpy.data.cameras.new(str(number))
         camera = bpy.data.objects.new(str(number), data)
         camera.matrix_world = scene.camera.matrix_world
+        camera.keyframe_insert("location", frame=1)  # else frames share a sequence
         scene.collection.objects.link(camera)
         scene.timeline_markers.new(str(number), frame=number).camera = camera
     bpy.ops.wm.save_mainfile()
