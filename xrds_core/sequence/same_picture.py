@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 BLOCK = 32  # pixels across
 FALL = 0.7
 """The error of a denoised picture falls with about this power of its samples."""
-_LEAST_FALL, _MOST_FALL = 0.35, 1.0
+_LEAST_FALL, _MOST_FALL = 0.5, 0.9  # beyond, a small picture shows chance
 # The more samples, the slower errors fall: from 4 to 16 samples 0.69 to 0.98 times as
 # fast as from 2 to 4, in seven scenes, 0.84 on the mean.
 _SLOWER = 0.85
