@@ -36,7 +36,7 @@ class Deadline:
     """Samples of the frames of a shot that ends `seconds` from now.
 
     `to_sample` frames are still to be sampled and `to_finish` to be finished, with up
-    to `neighbours`, in each of `layers` that render in turn. Where frames continue one
+    to `neighbours`; a frame counts once for each view layer. Where frames continue one
     sequence each has room for `room` samples.
     """
 
@@ -44,7 +44,6 @@ class Deadline:
     to_sample: int
     to_finish: int
     neighbours: int = 0
-    layers: int = 1
     continues: bool = False
     samples: int = 0
     room: int = 0
@@ -55,6 +54,7 @@ class Deadline:
     _start: float = 0.0  # seconds of a render beside that and its samples
     _sample: float = 0.0  # seconds of a sample
     _beside: float = 0.0  # seconds of a frame beside its render
+    _measured: int = 0  # frames of which these are known
     _completed: float | None = None  # when the last frame was
     _rendered: float = 0.0  # seconds of renders since then
     _is_late: bool = False  # and that was said
@@ -92,7 +92,9 @@ class Deadline:
         now = time.perf_counter()
         if self._completed is not None:
             beside = max(now - self._completed - self._rendered, 0.0)
-            self._beside += _NEWEST * (beside - self._beside)
+            self._measured += 1
+            newest = max(_NEWEST, 1.0 / self._measured)
+            self._beside += newest * (beside - self._beside)
         self._completed, self._rendered = now, 0.0
         left = duration(max(self._left, 0.0))
         reason = f"{left} were left for {_counted(self.to_finish, 'frame')}"
@@ -123,10 +125,8 @@ class Deadline:
             self._take(self._wanted())
 
     def _wanted(self) -> float:
-        """Samples that spend the time that is left, if all layers take as many."""
-        others = self._completed is None  # else their time is beside this one's
-        left = self._left / (self.layers if others else 1)
-        left -= self.to_finish * self._beside
+        """Samples that spend the time that is left, if all frames take as many."""
+        left = self._left - self.to_finish * self._beside
         left -= self.to_sample * (self._sync + self._start)
         return left / max(self.to_sample * self._sample, 1e-9)
 
@@ -135,8 +135,6 @@ class Deadline:
         if not self.to_sample:
             return
         wanted = self._wanted()
-        if self._completed is not None:  # every layer does its part of the correction
-            wanted = self.samples + (wanted - self.samples) / self.layers
         if abs(wanted - self.samples) > max(_ALIKE * self.samples, 0.5):
             self._take(wanted)
 
@@ -144,7 +142,7 @@ class Deadline:
         if wanted < 1.0 and not self._is_late:
             self._is_late = True
             each = self._beside + self._sync + self._start + self._sample
-            needed = duration(self.to_finish * self.layers * each)
+            needed = duration(self.to_finish * each)
             warn(
                 "the deadline leaves less than one sample for a frame; with one, "
                 f"{_counted(self.to_finish, 'frame')} take about {needed}"
@@ -158,18 +156,17 @@ def _counted(number: int, what: str) -> str:
     return f"1 {what}" if number == 1 else f"{number} {what}s"
 
 
-def deadline(scene: Any, request: Request, shot: Shot) -> Deadline:
-    """What chooses the samples of a shot that has a deadline."""
+def deadline(scene: Any, request: Request, shot: Shot, layers: int = 1) -> Deadline:
+    """What chooses the samples of a shot that has a deadline, for all its layers."""
     assert request.deadline is not None
     sampled = set(shot.frames)
     for number in shot.frames:
         sampled.update(shot.neighbours(number))
     return Deadline(
         request.deadline,
-        to_sample=len(sampled),
-        to_finish=len(shot.frames),
+        to_sample=layers * len(sampled),
+        to_finish=layers * len(shot.frames),
         neighbours=2 * shot.radius,
-        layers=max(1, sum(layer.use for layer in scene.view_layers)),
         continues=bool(request.settings.temporal_radius)
         and can_continue(scene, request.with_settings(samples=1)),
     )

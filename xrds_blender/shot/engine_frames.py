@@ -64,13 +64,21 @@ class EngineFrames:
     _call: _Call | None = None
 
     @classmethod
-    def of(cls, scene: Any, method: Method) -> EngineFrames:
-        """The frames of a scene's range."""
+    def of(
+        cls, scene: Any, method: Method, beside: Method | None = None
+    ) -> EngineFrames:
+        """The frames of a scene's range; `beside` is another layer's method."""
         found = cls(method)
         numbers = frame_range(scene)
         radius, begins = method.request.settings.temporal_radius, cuts(scene, numbers)
         shot = Shot(tuple(numbers), radius, begins)
-        method.pace = pace_of(scene, method.request, shot)
+        method.pace = pace_of(
+            scene,
+            method.request,
+            shot,
+            layers=max(1, sum(layer.use for layer in scene.view_layers)),
+            beside=beside and beside.pace,
+        )
         found.window = Window(shot, found._load)
         return found
 

@@ -9,7 +9,7 @@ from xrds_core.temporal.window import Shot
 
 from ..planning.request import Request
 from ..planning.settings import Mode
-from .deadline import deadline
+from .deadline import Deadline, deadline
 from .same_picture import Finishing, More, same_picture
 from .sampling import Sampled
 
@@ -32,8 +32,21 @@ class Pace(Protocol):
         """
 
 
-def pace_of(scene: Any, request: Request, shot: Shot) -> Pace | None:
-    """What chooses the samples of a shot; None where frames have those requested."""
+def pace_of(
+    scene: Any,
+    request: Request,
+    shot: Shot,
+    *,
+    layers: int = 1,
+    beside: Pace | None = None,
+) -> Pace | None:
+    """What chooses the samples of a shot; None where frames have those requested.
+
+    Where several view `layers` render in turn, `beside` is that of another one: they
+    share a deadline.
+    """
     if request.deadline is not None and request.settings.mode is Mode.FULL_SIZE:
-        return deadline(scene, request, shot)
+        if isinstance(beside, Deadline):
+            return beside
+        return deadline(scene, request, shot, layers)
     return same_picture(scene, request, len(shot.order))

@@ -131,7 +131,10 @@ def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Pictu
         animation = animations.get(key)
         if animation is None or animation.request != request:
             choice = choose_for_shot(engine, depsgraph, request)
-            frames = EngineFrames.of(depsgraph.scene_eval, method_of(choice))
+            same = (a for k, a in animations.items() if k[0] == key[0])
+            beside = next((a.frames.method for a in same if a.request == request), None)
+            scene, method = depsgraph.scene_eval, method_of(choice)
+            frames = EngineFrames.of(scene, method, beside)
             animation = animations[key] = _Animation(request, choice, frames)
         frames = animation.frames
         try:

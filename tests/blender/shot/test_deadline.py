@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import SimpleNamespace
@@ -54,27 +55,35 @@ class Farm:
     ) -> float:
         """Return the seconds that a shot took; `counts` are the samples of frames."""
         began = self.now
-        pace = Deadline(limit, frames, frames, _began=began)
+        for _ in self.frames(Deadline(limit, frames, frames, _began=began), cost):
+            pass
+        return self.now - began
+
+    def frames(
+        self, pace: Deadline, cost: Any = lambda _: 1.0, count: int | None = None
+    ) -> Iterator[int]:
+        """Render the frames of one view layer, and yield after each."""
+        frames = count or pace.to_finish
         request = render_request(1, temporal_radius=RADIUS)
 
         def load(number: int) -> Sampled:
             while True:
-                count = pace.request(request).settings.own_samples
-                took = (self.start + count * self.sample) * cost(number)
+                samples = pace.request(request).settings.own_samples
+                took = (self.start + samples * self.sample) * cost(number)
                 sync = self.sync if number else 0.0
                 self.now += took + sync
                 views: dict[str, Any] = {"": None}
                 seconds = {"beauty": took, "sync": sync}
-                frame = Sampled(number, views, seconds, samples=count)
+                frame = Sampled(number, views, seconds, samples=samples)
                 if pace.takes(self, frame):
-                    self.counts.append(count)
+                    self.counts.append(samples)
                     return frame
 
         for found in Window(Shot(tuple(range(frames)), RADIUS), load):
             frame = pace.complete(self, found.own, (), lambda _: ({}, {}))
             assert frame.decisions[0].decision == "deadline"
             self.finish()
-        return self.now - began
+            yield found.number
 
 
 @pytest.mark.parametrize("seconds", [300.0, 1000.0, 20000.0])
@@ -85,6 +94,20 @@ def test_a_shot_ends_within_five_percent_and_looks_even(
     assert farm.render(seconds) == pytest.approx(seconds, rel=0.05)
     even = np.asarray(farm.counts[:-4])
     assert even.std() <= 0.1 * even.mean() + 0.5, farm.counts
+
+
+def test_layers_that_render_in_turn_share_the_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    farm, limit = Farm(monkeypatch), 2000.0
+    began = farm.now
+    pace = Deadline(limit, 80, 80, _began=began)
+    layers = [farm.frames(pace, count=40) for _ in range(2)]
+    for _ in zip(*layers, strict=True):
+        pass
+    assert farm.now - began == pytest.approx(limit, rel=0.05)
+    counts = np.asarray(farm.counts[20:-10])
+    assert counts.std() < 0.15 * counts.mean(), farm.counts
 
 
 def test_frames_that_grow_dear_take_fewer_samples(
