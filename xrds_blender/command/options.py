@@ -23,33 +23,8 @@ def add_request(command: argparse.ArgumentParser) -> None:
     """Add what a request holds."""
     add_scene(command)
     _add_mode(command)
+    _add_samples(command)
     add = command.add_argument
-    add(
-        "--samples",
-        type=arguments.positive,
-        help="samples per pixel of the low-resolution render, or at scale 1, in place "
-        "of the file's; without its noise threshold and its time limit",
-    )
-    add(
-        "--noise-threshold",
-        type=arguments.share,
-        metavar="T",
-        help="let pixels stop at this noise, such as 0.01; --samples, or the file's, "
-        "are then the most that they take; 0 lets Cycles choose",
-    )
-    add(
-        "--same-picture",
-        action="store_true",
-        help="frames of a shot as the file's own samples make them, from fewer where "
-        "neighbours help; at scale 1",
-    )
-    add(
-        "--deadline",
-        type=arguments.seconds,
-        metavar="TIME",
-        help="time for all frames together, such as 8h or 1h30m: each takes as many "
-        "samples as fit; at scale 1",
-    )
     add(
         "--denoise",
         choices=QUALITIES,
@@ -109,6 +84,37 @@ def _add_mode(command: argparse.ArgumentParser) -> None:
         type=arguments.factor,
         metavar="DB",
         help="expected PSNR; XRDS chooses the fastest settings that reach it",
+    )
+
+
+def _add_samples(command: argparse.ArgumentParser) -> None:
+    """Add what decides how many samples a frame takes."""
+    add = command.add_argument
+    add(
+        "--samples",
+        type=arguments.positive,
+        help="samples per pixel of the low-resolution render, or at scale 1, in place "
+        "of the file's; without its noise threshold and its time limit",
+    )
+    add(
+        "--noise-threshold",
+        type=arguments.share,
+        metavar="T",
+        help="let pixels stop at this noise, such as 0.01; --samples, or the file's, "
+        "are then the most that they take; 0 lets Cycles choose",
+    )
+    add(
+        "--same-picture",
+        action="store_true",
+        help="frames of a shot as the file's own samples make them, from fewer where "
+        "neighbours help; at scale 1",
+    )
+    add(
+        "--deadline",
+        type=arguments.seconds,
+        metavar="TIME",
+        help="time for all frames together, such as 8h or 1h30m: each takes as many "
+        "samples as fit; at scale 1",
     )
 
 

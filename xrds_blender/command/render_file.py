@@ -71,9 +71,7 @@ def render_file(
         picture_file.check_output(output, frames or [0])
     scene = open_scene(path, choice)
     _check_libraries(request)
-    numbers = _numbers(scene, frames, animation)
-    if animation and output is not None:
-        picture_file.check_output(output, numbers)
+    numbers = _numbers(scene, frames, animation, output)
     size = picture_size(scene.render)
     cache = sample_cache and _cache(scene, request, sample_cache)
 
@@ -87,22 +85,33 @@ def render_file(
             written.append(_write(scene, output, number, last, request, encoding))
     if cache:
         _cache_others(scene, request, numbers, cache)
-    rendered = {entry["frame"] for entry in written}
     return {
         "output": output,
         "resolution": list(size),
         **_described(last, request),
         "frames": written,
-        "kept": [n for n in numbers if n not in rendered] if output else [],
+        "kept": _kept(numbers, written) if output else [],
         "samples": cache and cache.report(numbers),
     }
 
 
-def _numbers(scene: Any, frames: Sequence[int] | None, animation: bool) -> list[int]:
+def _kept(numbers: Sequence[int], written: Sequence[dict[str, Any]]) -> list[int]:
+    """Numbers of the frames that were there already."""
+    rendered = {entry["frame"] for entry in written}
+    return [number for number in numbers if number not in rendered]
+
+
+def _numbers(
+    scene: Any, frames: Sequence[int] | None, animation: bool, output: str | None
+) -> list[int]:
     """Numbers of the frames to render; says so where the file holds more."""
     there = frame_range(scene)
-    if animation or frames:
-        return there if animation else list(frames or ())
+    if frames:
+        return list(frames)
+    if animation:
+        if output is not None:
+            picture_file.check_output(output, there)
+        return there
     current = scene.frame_current
     if len(there) > 1 and moves_in_time(scene):
         warn(
