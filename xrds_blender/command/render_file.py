@@ -51,8 +51,7 @@ def render_file(
         output: .exr or .png; # stands for digits of the frame number. None keeps
             samples alone.
         request: scale, samples and the rest.
-        frames: numbers of the frames; the file's current one by default.
-        animation: render the file's frame range.
+        frames: numbers; by default the file's current one, of an `animation` its range.
         choice: what comes in the place of what the file was saved with.
         encoding: of .exr files.
         resume: leave frames as they are that lie there whole and of their size.
