@@ -29,6 +29,7 @@ from xrds_core.sequence.same_picture import (
     gain,
     rectangles,
 )
+from xrds_core.sequence.worth import Ratio, Worth
 from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.half_floats import floats
 from xrds_core.temporal.sample_subsets import SampleSubset
@@ -68,7 +69,6 @@ _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
 _TOO_MUCH, _TOO_LITTLE = 0.8, 1.1
 # Neighbours' samples of less worth count less beside more of the frame's own.
 _USEFUL = 0.25
-_TINY = 1e-6
 _OTHER = 1_299_709  # seeds apart; no frame's is near those of another
 
 
@@ -173,17 +173,14 @@ class SamePicture:
 
     `samples` are the file's, with a noise threshold the most that a pixel takes. Under
     a camera that stands still frames that have left the window count, as `history`. The
-    next frame to be sampled takes a `share` of them. `_worth` is what a sample of a
-    neighbour is worth beside one of the frame's own. It is measured in the first frame,
-    and again in one with twice as many neighbours: those of one side are worth less.
+    next frame to be sampled takes a `share` of them.
     """
 
     samples: int
     history: History | None = None
     share: float = _FIRST
-    _worth: float | None = None
+    _worth: Worth = field(default_factory=Worth)
     _measured_in: int = 0
-    _beside: int = 0
     _tried: float = 1.0
     _ratio: float = 1.0
     _shares: dict[int, float] = field(default_factory=dict)
@@ -212,14 +209,12 @@ class SamePicture:
         share = self._shares.get(own.number, 1.0)
         gained = gain(accumulated[view], own.views[view])
         spent = _Seconds({"accumulate": time.perf_counter() - started})
-        if self._worth is None or len(beside) >= 2 * max(self._beside, 1):
-            ratio, fall = self._measured(method, own, others, share, spent.of(more))
-            self._measured_in, self._beside = own.number, len(beside)
-            self._tried, self._ratio = share, ratio
-            # the share of all samples that is as good without neighbours
-            alone = max(ratio, _TINY) ** (-1.0 / fall)
-            added = share * (gained.of(gained.errors > 0.0) - 1.0)
-            self._worth = float(np.clip((alone - share) / max(added, 1e-9), 0.0, 1.0))
+        if self._worth.is_due(len(beside)):
+            ratio = self._measured(method, own, others, share, spent.of(more))
+            whole = gained.of(gained.errors > 0.0)
+            self._worth.add(ratio, share, whole, len(beside))
+            self._measured_in = own.number
+            self._tried, self._ratio = share, ratio.value
         lacks = self._lacks(share, gained)
         shape = own.views[view].shape
         extra = self._top_up(shape, share, gained, lacks, spent.of(more))
@@ -259,14 +254,12 @@ class SamePicture:
 
         `gain` is how many times its own samples the frame has with them.
         """
-        assert self._worth is not None
-        return share * (1.0 + (gain - 1.0) * self._worth)
+        return share * (1.0 + (gain - 1.0) * self._worth.value)
 
     @property
     def _weight(self) -> float:
         """What neighbours' samples count beside more of the frame's own."""
-        assert self._worth is not None
-        return min(self._worth / _USEFUL, 1.0)
+        return min(self._worth.value / _USEFUL, 1.0)
 
     def _lacks(self, share: float, gained: Gain) -> NDArray[np.bool_]:
         """Which blocks are to get more samples."""
@@ -285,11 +278,11 @@ class SamePicture:
         others: Sequence[Sampled],
         share: float,
         more: _More,
-    ) -> tuple[float, float]:
+    ) -> Ratio:
         """The squared error of a frame with its neighbours over that of all samples.
 
-        And the power of samples with which errors fall. By two renders of half of the
-        file's samples, of two seeds: halves of one sequence would not be independent.
+        By two renders of half of the file's samples, of two seeds: halves of one
+        sequence would not be independent.
         """
         view, length = next(iter(own.views)), max(1, self.samples // 2)
         parts = []
@@ -303,7 +296,7 @@ class SamePicture:
         pair = parts[0], parts[1]
         alone = method.finish(replace(own, gathered={}), (), view).radiance
         fall = error_fall(alone, share, samples, pair)
-        return error_ratio(together, samples, pair, fall), fall
+        return error_ratio(together, samples, pair, fall)
 
     def _top_up(
         self,

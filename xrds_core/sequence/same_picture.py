@@ -17,6 +17,7 @@ import numpy as np
 from ..temporal.half_floats import floats
 from ..temporal.local_filters import box
 from ..temporal.noise import luminance
+from .worth import Ratio
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -51,18 +52,17 @@ class Rendered:
 
 def error_ratio(
     picture: Array, own: Array, parts: tuple[Rendered, Rendered], fall: float = FALL
-) -> float:
+) -> Ratio:
     """Return the squared error of a picture over that of a frame of all samples.
 
     `parts` are half of all samples each, of seeds of their own; `picture` (H, W, 3) was
     made without them, and of `own` samples among others. All are radiance. Errors count
-    relative to the local luminance, as they do to the eye. The ratio is taken with its
-    standard error, so it is too high rather than too low; it is infinite where noise
-    hides the error of all samples.
+    relative to the local luminance, as they do to the eye. The ratio is infinite where
+    noise hides the error of all samples; errors fall with their number's power `fall`.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
         ours, half = _errors(picture, own, parts)
-        return _ratio(ours, half * 0.5**fall)
+        return Ratio(*_ratio(ours, half * 0.5**fall), fall)
 
 
 def error_fall(
@@ -77,10 +77,10 @@ def error_fall(
     if apart < _APART:
         return FALL
     with np.errstate(over="ignore", invalid="ignore"):
-        ratio = _ratio(*_errors(alone, own, parts))
+        ratio, spread = _ratio(*_errors(alone, own, parts))
     if not 0.0 < ratio < float("inf"):
         return FALL
-    fall = _SLOWER * np.log(ratio) / np.log(apart)
+    fall = _SLOWER * np.log(ratio + spread) / np.log(apart)
     return float(np.clip(fall, _LEAST_FALL, _MOST_FALL))
 
 
@@ -107,13 +107,13 @@ def _errors(
     return ours[kept], 0.5 * half[kept]
 
 
-def _ratio(one: Array, two: Array) -> float:
-    """Return the ratio of two sums over blocks, plus its standard error."""
+def _ratio(one: Array, two: Array) -> tuple[float, float]:
+    """Return the ratio of two sums over blocks, and its standard error."""
     sums = float(one.sum()), float(two.sum())
     if sums[1] <= 2.0 * _spread(two):
-        return float("inf")
+        return float("inf"), 0.0
     spread = np.hypot(_spread(one), sums[0] / sums[1] * _spread(two)) / sums[1]
-    return max(sums[0], 0.0) / sums[1] + float(spread)
+    return max(sums[0], 0.0) / sums[1], float(spread)
 
 
 def _spread(errors: Array) -> float:

@@ -17,6 +17,7 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
 from xrds_blender.shot import same_picture, sampling
+from xrds_core.sequence.worth import Ratio
 from xrds_core.temporal.frame import Frame, Stored
 
 pytestmark = pytest.mark.skipif(
@@ -52,7 +53,7 @@ def picture(path: Path) -> np.ndarray:
 
 def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[float]:
     """Let the error of fewer samples be this; returns the counts that are rendered."""
-    monkeypatch.setattr(same_picture, "error_ratio", lambda *_: ratio)
+    monkeypatch.setattr(same_picture, "error_ratio", lambda *_: Ratio(ratio, 0.0, 0.7))
     lengths: list[float] = []
     inner = same_picture.more_samples
 

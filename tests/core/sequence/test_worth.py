@@ -1,0 +1,60 @@
+"""What neighbours' samples are worth, from what is measured in a shot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xrds_core.sequence.worth import Ratio, Worth
+
+FALL, SHARE, GAIN, NEIGHBOURS = 0.7, 0.25, 9.0, 8
+
+
+def ratio(worth: float, spread: float = 0.0, chance: float = 0.0) -> Ratio:
+    """What is measured if neighbours are worth so much."""
+    equal = SHARE * (1.0 + (GAIN - 1.0) * worth)
+    return Ratio(equal**-FALL * (1.0 + chance), spread, FALL)
+
+
+@pytest.mark.parametrize("worth", [0.0, 0.3, 1.0])
+def test_it_is_found_from_errors(worth: float) -> None:
+    found = Worth()
+    found.add(ratio(worth), SHARE, GAIN, NEIGHBOURS)
+    assert found.value == pytest.approx(worth, abs=1e-6)
+
+
+def test_what_noise_hides_is_worth_nothing() -> None:
+    found = Worth()
+    found.add(Ratio(float("inf"), 0.0, FALL), SHARE, GAIN, NEIGHBOURS)
+    assert found.value == 0.0
+
+
+def test_chance_counts_less_the_more_is_measured() -> None:
+    rng, found, values = np.random.default_rng(1), Worth(), []
+    for _ in range(12):
+        chance = rng.normal(0.0, 0.3)
+        found.add(ratio(0.4, 0.3, chance), SHARE, GAIN, NEIGHBOURS)
+        values.append(found.value)
+    assert values[0] < 0.4
+    assert 0.25 < values[-1] < 0.55
+    assert values[-1] > values[0]
+
+
+def test_neighbours_on_one_side_count_until_there_are_two() -> None:
+    found = Worth()
+    assert found.is_due(4)
+    found.add(ratio(0.1), SHARE, GAIN, 4)
+    found.add(ratio(0.6), SHARE, GAIN, NEIGHBOURS)
+    assert found.value == pytest.approx(0.6, abs=1e-6)
+
+
+def test_it_is_measured_ever_more_seldom() -> None:
+    found, due = Worth(), []
+    for frame in range(1, 101):
+        neighbours = min(3 + frame, NEIGHBOURS)
+        if found.is_due(neighbours):
+            found.add(ratio(0.5), SHARE, GAIN, neighbours)
+            due.append(frame)
+    assert due[0] == 1
+    assert due[-1] > 40
+    assert len(due) <= 8
