@@ -77,10 +77,10 @@ def error_fall(
     if apart < _APART:
         return FALL
     with np.errstate(over="ignore", invalid="ignore"):
-        ratio, spread = _ratio(*_errors(alone, own, parts))
+        ratio, _ = _ratio(*_errors(alone, own, parts))
     if not 0.0 < ratio < float("inf"):
         return FALL
-    fall = _SLOWER * np.log(ratio + spread) / np.log(apart)
+    fall = _SLOWER * np.log(ratio) / np.log(apart)
     return float(np.clip(fall, _LEAST_FALL, _MOST_FALL))
 
 
