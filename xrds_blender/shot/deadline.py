@@ -111,10 +111,11 @@ class Deadline:
     def _tried(self, method: Finishing, frame: Sampled, seconds: float) -> None:
         """Learn from a try; choose once there are enough of them."""
         if self._try == _FIRST_TRY:
-            started = time.perf_counter()
             for view in frame.views:
-                method.finish(frame, [frame] * self.neighbours, view)
-            self._beside = time.perf_counter() - started
+                picture = method.finish(frame, [frame] * self.neighbours, view)
+                self._beside += sum(picture.seconds.values())
+                if self.neighbours:  # most frames are denoised without them as well
+                    self._beside += picture.seconds["denoise"]
         few, least = self._tried_before
         self._tried_before = many, most = self._try, seconds
         self._sample = max((most - least) / (many - few), 0.1 * most / many)

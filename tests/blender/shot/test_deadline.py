@@ -47,8 +47,9 @@ class Farm:
         clock = SimpleNamespace(perf_counter=lambda: self.now)
         self.monkeypatch.setattr(deadline_module, "time", clock)
 
-    def finish(self, *_: Any) -> None:
+    def finish(self, *_: Any) -> Any:
         self.now += self.finish_seconds
+        return SimpleNamespace(seconds={"denoise": self.finish_seconds})
 
     def render(
         self, limit: float, cost: Any = lambda _: 1.0, frames: int = 40
