@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
+from xrds_core.time_left import duration
+
 from .facts import Facts, SceneFacts
 from .forecast import low_size
 
@@ -25,6 +27,7 @@ __all__ = [
     "SceneFacts",
     "after",
     "cycles_only",
+    "deadline",
     "decide",
     "full_size",
     "guide_bounces",
@@ -305,6 +308,13 @@ def same_picture(samples: int) -> Decision:
         "neighbours', as the first frame shows"
     )
     return Decision(SAME_PICTURE, "as few samples as it needs", reason)
+
+
+def deadline(seconds: float, frames: int) -> Decision:
+    """The decision of a shot that is to be finished in some seconds."""
+    reason = "each takes as many samples as fit, and what it took corrects the next"
+    counted = "1 frame" if frames == 1 else f"{frames} frames"
+    return Decision(DEADLINE, f"{duration(seconds)} for {counted}", reason)
 
 
 def _images(facts: Facts) -> Decision:

@@ -10,7 +10,7 @@ from typing import Any
 from ..choosing.chosen import Chosen, chosen
 from ..choosing.plan_facts import find_facts
 from ..frame.rendering import call_engine
-from ..planning.plan import neighbours, same_picture
+from ..planning.plan import deadline, neighbours, same_picture
 from ..planning.request import Request
 from ..scene.contents import frame_range
 from ..scene.cuts import cuts
@@ -50,5 +50,7 @@ def _described(
         decisions += neighbours(facts, radius, cuts(scene, shot))
     if can_save(scene, request, len(shot)):
         decisions += (same_picture(scene.cycles.samples),)
+    if request.deadline is not None:
+        decisions += (deadline(request.deadline, len(shot)),)
     decisions = choice.all_decisions(decisions)
     return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}

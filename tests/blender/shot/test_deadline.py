@@ -184,6 +184,14 @@ def test_what_rules_it_out_is_said(
     assert "--deadline cannot be had with" in capsys.readouterr().err
 
 
+def test_the_plan_of_a_shot_says_so(
+    blend: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["plan", str(blend), "--scale", "1", "--deadline", "1h30m"]
+    assert main.main([*words, "--frames", "1-5"]) == 0
+    assert "deadline: 90 min for 5 frames: each takes" in capsys.readouterr().out
+
+
 def test_a_deadline_must_be_ahead() -> None:
     with pytest.raises(UsageError, match=r"deadline 0\.0 s must be above 0"):
         render_request(1, deadline=0.0)
