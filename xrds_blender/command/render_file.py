@@ -21,7 +21,7 @@ from ..frame.denoisers import load_denoiser
 from ..frame.networks import is_ready, load_upscaler
 from ..frame.picture import NetworkFailed, Picture
 from ..planning.request import Request
-from ..planning.settings import Mode, share_of
+from ..planning.settings import Mode
 from ..scene.contents import frame_range, moves_in_time
 from ..shot.cache import SampleCache, cache_of
 from ..shot.render import render_scene
@@ -250,7 +250,7 @@ def _write(
         "output": str(target),
         "seconds": seconds,
         "temporal": picture.temporal and dataclasses.asdict(picture.temporal),
-        "samples": share_of(settings.samples or scene.cycles.samples, settings.share),
+        "samples": settings.count(scene.cycles.samples),
         "share": settings.share,
         "peak_memory": picture.peak_memory,
     }

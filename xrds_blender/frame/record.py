@@ -7,7 +7,7 @@ from typing import Any
 from xrds_core.version import package_version
 
 from ..planning.plan import GUIDE_CACHE, Decision
-from ..planning.settings import Settings, share_of
+from ..planning.settings import Settings
 from .picture import Picture
 
 PREFIX = "xrds"
@@ -31,7 +31,7 @@ def fields(picture: Picture, settings: Settings, samples: int) -> dict[str, str]
         entries["preset"] = settings.preset
     elif not settings.is_cycles_only:
         entries["preset"] = settings.quality
-    entries["samples"] = str(share_of(settings.samples or samples, settings.share))
+    entries["samples"] = str(settings.count(samples))
     if settings.is_enlarged:
         entries["guide_samples"] = _decided(picture.plan, "guide samples") or "0"
     if picture.temporal is not None:

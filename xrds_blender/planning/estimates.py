@@ -9,15 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from .budget import Curve, ErrorModel, Model
-from .settings import (
-    DEFAULT_DENOISING,
-    MODES,
-    Denoising,
-    Mode,
-    Network,
-    Settings,
-    share_of,
-)
+from .settings import DEFAULT_DENOISING, MODES, Denoising, Mode, Network, Settings
 
 # Differences in dB that nobody sees.
 ALIKE = 0.1
@@ -80,8 +72,7 @@ def resolved(settings: Settings, scene: SceneSettings) -> Settings:
     elif settings.mode is Mode.FULL_SIZE:
         denoising = Denoising.ours(settings.quality)
     family = replace(settings, denoising=denoising).family
-    samples = settings.samples or scene.samples
-    return replace(family, samples=share_of(samples, settings.share))
+    return replace(family, samples=settings.count(scene.samples))
 
 
 def missing(settings: Settings, here: Capabilities) -> str:

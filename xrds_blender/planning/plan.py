@@ -14,6 +14,7 @@ from xrds_core.time_left import duration
 
 from .facts import Facts, SceneFacts
 from .forecast import low_size
+from .settings import counted
 
 __all__ = [
     "DEADLINE",
@@ -313,8 +314,8 @@ def same_picture(samples: int) -> Decision:
 def deadline(seconds: float, frames: int) -> Decision:
     """The decision of a shot that is to be finished in some seconds."""
     reason = "each takes as many samples as fit, and what it took corrects the next"
-    counted = "1 frame" if frames == 1 else f"{frames} frames"
-    return Decision(DEADLINE, f"{duration(seconds)} for {counted}", reason)
+    value = f"{duration(seconds)} for {counted(frames, 'frame')}"
+    return Decision(DEADLINE, value, reason)
 
 
 def _images(facts: Facts) -> Decision:

@@ -100,9 +100,9 @@ LOW_DENOISING = (
 """Those worth trying on the low-resolution picture."""
 
 
-def share_of(samples: int, share: float) -> int:
-    """A share of some samples per pixel, one at least."""
-    return max(1, round(samples * share))
+def counted(number: int | None, what: str) -> str:
+    """A number of things, as 1 frame or 2 frames."""
+    return f"1 {what}" if number == 1 else f"{number} {what}s"
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,11 @@ class Settings:
     @property
     def own_samples(self) -> int | None:
         """Samples per pixel of its own; None where it takes the file's."""
-        return None if self.samples is None else share_of(self.samples, self.share)
+        return None if self.samples is None else self.count(self.samples)
+
+    def count(self, of_file: int) -> int:
+        """Samples per pixel, of a file that has so many."""
+        return max(1, round((self.samples or of_file) * self.share))
 
     @property
     def is_enlarged(self) -> bool:
@@ -178,7 +182,7 @@ class Settings:
     @property
     def label(self) -> str:
         """In a few words, as the panel and the command print it."""
-        samples = "1 sample" if self.samples == 1 else f"{self.samples} samples"
+        samples = counted(self.samples, "sample")
         if self.mode is Mode.FULL_SIZE:
             return f"full size, {samples}, {self.quality} denoising"
         if self.is_cycles_only:

@@ -18,6 +18,7 @@ from xrds_core.time_left import duration
 
 from ..planning.plan import DEADLINE, Decision
 from ..planning.request import MOST_SAMPLES, Request
+from ..planning.settings import counted
 from .same_picture import Finishing, More
 from .sampling import Sampled, can_continue
 
@@ -97,8 +98,8 @@ class Deadline:
             self._beside += newest * (beside - self._beside)
         self._completed, self._rendered = now, 0.0
         left = duration(max(self._left, 0.0))
-        reason = f"{left} were left for {_counted(self.to_finish, 'frame')}"
-        value = _counted(own.samples or self.samples, "sample")
+        reason = f"{left} were left for {counted(self.to_finish, 'frame')}"
+        value = counted(own.samples or self.samples, "sample")
         decided = Decision(DEADLINE, value, reason)
         self.to_finish -= 1
         self._choose()
@@ -146,15 +147,11 @@ class Deadline:
             needed = duration(self.to_finish * each)
             warn(
                 "the deadline leaves less than one sample for a frame; with one, "
-                f"{_counted(self.to_finish, 'frame')} take about {needed}"
+                f"{counted(self.to_finish, 'frame')} take about {needed}"
             )
         self.samples = int(min(max(round(wanted), 1), MOST_SAMPLES))
         if self.samples > self.room:
             self.room = min(round(_ROOM * self.samples), MOST_SAMPLES)
-
-
-def _counted(number: int, what: str) -> str:
-    return f"1 {what}" if number == 1 else f"{number} {what}s"
 
 
 def deadline(scene: Any, request: Request, shot: Shot, layers: int = 1) -> Deadline:

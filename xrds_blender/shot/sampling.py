@@ -34,7 +34,6 @@ from ..frame import denoisers, stages
 from ..internals.borrowed import Borrowed
 from ..planning.plan import Decision
 from ..planning.request import Request
-from ..planning.settings import share_of
 from ..scene.contents import scene_facts, shapes_move, stands_still
 from .stopping import finish_samples
 
@@ -193,8 +192,7 @@ def sampling_of(
         place = None
     facts = scene_facts(depsgraph)
     geometry = [*_geometry(depsgraph), *([] if even else [COUNTS])]
-    whole = request.settings.samples or session.samples_of(depsgraph)
-    count = share_of(whole, request.settings.share)
+    settings, of_file = request.settings, session.samples_of(depsgraph)
     seed = scene.cycles.seed if request.seed is None else request.seed
     blurred = scene.render.use_motion_blur
     if place is not None:
@@ -204,14 +202,14 @@ def sampling_of(
     return Sampling(
         number=scene.frame_current,
         cameras=cameras,
-        count=count,
-        whole=whole,
+        count=settings.count(of_file),
+        whole=settings.samples or of_file,
         seed=seed,
         geometry=geometry,
         place=place,
         radius=request.settings.temporal_radius,
         still=not facts.moving,
-        has_halves=_has_halves(scene, request, count),
+        has_halves=_has_halves(scene, request, settings.count(of_file)),
         needs_motion=blurred and shapes_move(depsgraph),
     )
 
@@ -288,8 +286,8 @@ def noisy_frame(
     try:
         with Borrowed() as borrowed:
             if settings.share < 1.0:
-                most = settings.samples or session.samples_of(depsgraph)
-                set_share(borrowed, depsgraph.scene_eval, most, settings.share)
+                scene = depsgraph.scene_eval
+                set_share(borrowed, scene, how.whole, settings.share)
             if how.has_halves:
                 return _frames_of_halves(engine, depsgraph, how)
             noisy, clock = sample_layer(

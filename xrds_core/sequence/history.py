@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..temporal.accumulate import accumulate
-from ..temporal.frame import LARGEST_HALF
+from ..temporal.accumulate import accumulate, sample_counts
+from ..temporal.frame import pack
 from ..temporal.half_floats import floats
 from ..temporal.noise import Noise
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from ..arrays import Array
-    from ..temporal.accumulate import Accumulated
     from ..temporal.frame import Stored
     from ..temporal.vectors import Movement
 
@@ -61,34 +60,20 @@ def extended(history: Stored | None, frame: Stored, movement: Movement) -> Store
     if history is None:
         return frame
     found = accumulate(frame, [history], movement)
-    own = np.full(len(frame.picture), frame.samples, np.float32)
-    if frame.counts is not None:
-        own = floats(frame.counts)
+    own = sample_counts(frame, slice(None), len(frame.picture))
     total = found.samples.ravel()
     counts = np.minimum(total, own * LONGEST)
-    picture = _packed(found, len(own))
-    invalid = ~np.isfinite(picture).all(axis=-1)
-    picture[invalid] = 0.0
-    np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
+    passes = found.radiance, found.albedo, found.normal, found.alpha
+    picture, invalid = pack(*passes, frame.picture.dtype)
     share = np.where(total > 0.0, own / np.maximum(total, 1e-9), 1.0)
     return replace(
         frame,
         samples=max(float(counts.mean()), 1e-9),
         counts=counts.astype(np.float16),
-        picture=picture.astype(frame.picture.dtype),
+        picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=_noise(history, frame, share),
     )
-
-
-def _packed(found: Accumulated, pixels: int) -> Array:
-    """Return its passes as `Stored.picture` has them."""
-    parts = [found.albedo, found.normal]
-    if found.radiance is not None:
-        parts.insert(0, found.radiance)
-    if found.alpha is not None:
-        parts.append(found.alpha[..., None])
-    return np.concatenate(parts, axis=-1).reshape(pixels, -1)
 
 
 def _noise(history: Stored, frame: Stored, share: Array) -> Noise | None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..temporal.accumulate import sample_counts
 from ..temporal.half_floats import floats
 from ..temporal.local_filters import box
 from ..temporal.noise import luminance
@@ -153,9 +154,7 @@ def gain(accumulated: Accumulated, own: Stored) -> Gain:
     assert own.noise is not None
     noise = np.square(floats(own.noise.difference)).reshape(own.shape)
     noise = box(noise, _SMOOTH) + np.float32(_TINY)  # halves may agree by chance
-    alone = np.full(own.shape, own.samples, np.float32)
-    if own.counts is not None:
-        alone = floats(own.counts).reshape(own.shape)
+    alone = sample_counts(own, slice(None), noise.size).reshape(own.shape)
     share = np.clip(alone / np.maximum(accumulated.samples, _TINY), 0.0, 1.0)
     weights, weighted = block_means(noise), block_means(noise * share**FALL)
     return Gain(np.maximum(weighted / weights, _TINY), weights)

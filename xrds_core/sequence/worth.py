@@ -65,11 +65,6 @@ class Worth:
         self._found.append((likely, likely - least))
 
     @property
-    def is_known(self) -> bool:
-        """Whether it was measured."""
-        return bool(self._found)
-
-    @property
     def value(self) -> float:
         """The mean of what was found, less its standard error."""
         likely, spread = np.array(self._found).T

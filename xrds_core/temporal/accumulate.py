@@ -271,7 +271,7 @@ class _Aligned:
     def add(self, block: _Block, sums: _Sums) -> None:
         """As `_Reprojected.add`."""
         other, pixels = self._other, block.wide.pixels
-        weight = _samples(other, pixels, len(block.own))
+        weight = sample_counts(other, pixels, len(block.own))
         if other.invalid is not None:
             weight[other.invalid[pixels]] = 0.0
         # a copy: NumPy's own float32 pictures are not to be changed
@@ -316,13 +316,15 @@ class _Reprojected:
             values[:, other.normals] = values[:, other.normals] @ turn.T
         weight = found.seen.astype(np.float32)
         weight *= tiles
-        weight *= _samples(other, found.pixel, len(weight))
+        weight *= sample_counts(other, found.pixel, len(weight))
         reused = weight.copy()
         weight *= np.exp(found.apart * self._fall)
         sums.add(values, weight, reused, _noise(other, found.pixel, block))
 
 
-def _samples(frame: Stored, pixels: slice | NDArray[np.integer], count: int) -> Array:
+def sample_counts(
+    frame: Stored, pixels: slice | NDArray[np.integer], count: int
+) -> Array:
     """Return the sample counts of flat pixels (n,) of a frame."""
     if frame.counts is None:
         return np.full(count, frame.samples, np.float32)
@@ -334,7 +336,7 @@ def _means(
 ) -> tuple[Array, Array]:
     """Return the means of the target's own and the reused samples, and their number."""
     own = block.own[block.inner]
-    samples = _samples(target, block.pixels, len(own))
+    samples = sample_counts(target, block.pixels, len(own))
     if target.invalid is not None:
         samples[target.invalid[block.pixels]] = 0.0
     if not groups:

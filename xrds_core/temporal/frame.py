@@ -237,24 +237,15 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
 
     `dtype` float16 halves the memory; values beyond +-65504 are clipped.
     """
-    parts = [frame.albedo, frame.normal]
-    if frame.radiance is not None:
-        parts.insert(0, frame.radiance)
-    if frame.alpha is not None:
-        parts.append(frame.alpha[..., None])
-    picture = np.concatenate(parts, axis=-1, dtype=np.float32)
-    picture = picture.reshape(-1, picture.shape[-1])
-    invalid = ~np.isfinite(picture).all(axis=-1)
-    picture[invalid] = 0.0
-    if np.dtype(dtype) == np.float16:
-        np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
+    passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
+    picture, invalid = pack(*passes, dtype)
     noise = None if frame.radiance is None else noise_in(frame, dtype)
     return Stored(
         number=frame.number,
         camera=frame.camera,
         shape=frame.shape,
         samples=frame.samples,
-        picture=picture.astype(dtype, copy=False),
+        picture=picture,
         inverse_depth=_inverse_depth(frame),
         invalid=invalid if invalid.any() else None,
         vector=_half(frame.vector),
@@ -263,6 +254,28 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         noise=None if noise is None else noise.without(invalid),
         image=_image(frame),
     )
+
+
+def pack(
+    radiance: Array | None,
+    albedo: Array,
+    normal: Array,
+    alpha: Array | None,
+    dtype: DTypeLike,
+) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return `Stored.picture` of passes as in `Frame`, and its invalid pixels (H W)."""
+    parts = [albedo, normal]
+    if radiance is not None:
+        parts.insert(0, radiance)
+    if alpha is not None:
+        parts.append(alpha[..., None])
+    picture = np.concatenate(parts, axis=-1, dtype=np.float32)
+    picture = picture.reshape(-1, picture.shape[-1])
+    invalid = ~np.isfinite(picture).all(axis=-1)
+    picture[invalid] = 0.0
+    if np.dtype(dtype) == np.float16:
+        np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
+    return picture.astype(dtype, copy=False), invalid
 
 
 def noise_in(frame: Frame, dtype: DTypeLike) -> Noise:

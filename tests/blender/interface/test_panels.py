@@ -14,6 +14,7 @@ import pytest
 
 import xrds_blender
 from xrds_blender.choosing import history
+from xrds_blender.choosing.modes import estimates as estimates_of
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.frame import stages
 from xrds_blender.interface import (
@@ -298,6 +299,12 @@ def test_an_animation_comes_first() -> None:
     assert "Neighbouring Frames" not in rows(scene)
 
 
+def expected(scene: bpy.types.Scene) -> animation.Expected:
+    request = properties.request_of(scene.xrds)
+    found = estimates_of(scene, request.settings, ALL, summary.is_shot(scene, request))
+    return animation.expected(scene, request, ALL, found)
+
+
 def test_seconds_of_an_animation_are_those_of_its_frames() -> None:
     pytest.importorskip("mitsuba_oidn")
     scene = bpy.context.scene
@@ -310,17 +317,17 @@ def test_seconds_of_an_animation_are_those_of_its_frames() -> None:
     )
     seconds = {"sync": 1.0, "beauty": 32.0, "denoise": 2.0}
     history.remember(layer, request.settings, seconds)
-    found = animation.expected(scene, request, ALL)
+    found = expected(scene)
     assert found.cycles is not None
     assert found.cycles > 33.0  # and Blender's denoiser
     assert found.ours is not None
     assert found.ours > 35.0  # and neighbours
     assert not found.at_most
     scene.xrds.mode, scene.xrds.animation = "full_size", "same_picture"
-    same = animation.expected(scene, properties.request_of(scene.xrds), ALL)
+    same = expected(scene)
     assert (same.picture, same.at_most) == ("same", has_subsets(scene))
     scene.xrds.animation, scene.xrds.deadline = "deadline", 600.0
-    late = animation.expected(scene, properties.request_of(scene.xrds), ALL)
+    late = expected(scene)
     assert late.ours == pytest.approx(30.0)
     FILE.end()
 

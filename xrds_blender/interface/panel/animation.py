@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from xrds_core.time_left import duration
 
 from ...choosing import history
-from ...choosing.modes import estimates
-from ...planning.estimates import Capabilities, resolved
+from ...planning.estimates import Capabilities, Estimate, resolved
 from ...planning.request import Request
 from ...planning.settings import Mode
 from ...scene.contents import frame_range
@@ -44,14 +44,18 @@ class Expected:
     is_shot: bool = True
 
 
-def expected(scene: Any, request: Request, here: Capabilities) -> Expected:
-    """What to expect of the scene's range."""
+def expected(
+    scene: Any,
+    request: Request,
+    here: Capabilities,
+    estimated: Sequence[Estimate],
+) -> Expected:
+    """What to expect of the scene's range, in modes as `estimated` for a shot."""
     frames = len(frame_range(scene))
     is_shot = has_neighbours(scene, request)
     known = history.scene_settings(scene)
     settings = request.settings
     cycles = resolved(replace(settings, mode=Mode.CYCLES_ONLY, denoising=None), known)
-    estimated = estimates(scene, settings, here, is_shot)
     saves = can_save(scene, request, frames)
     ours = _seconds(scene, request, is_shot)
     if request.deadline is not None:

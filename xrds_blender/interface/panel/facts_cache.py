@@ -22,10 +22,14 @@ class FactsCache:
 
     def facts(self, scene: Any, layer: Any, settings: Settings) -> Facts:
         """Facts of a scene as the viewport shows it."""
+        return join_facts(scene, settings, self.of_scene(scene, layer))
+
+    def of_scene(self, scene: Any, layer: Any) -> SceneFacts:
+        """Those of the scene alone, whatever it is rendered with."""
         graph = layer.depsgraph
         if graph is None:
-            return join_facts(scene, settings, SceneFacts())
+            return SceneFacts()
         name = f"{scene.name} {layer.name}"
         if name not in self._known:
             self._known[name] = scene_facts(graph)
-        return join_facts(scene, settings, self._known[name])
+        return self._known[name]

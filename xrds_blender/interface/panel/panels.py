@@ -15,7 +15,6 @@ from ...internals.lifetimes import FILE
 from ...planning.estimates import Capabilities
 from ...planning.request import Request
 from ...planning.settings import PRESETS, Mode
-from ...shot.sampling import has_neighbours
 from .. import operators, presets, status_bar, translations
 from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
@@ -51,12 +50,12 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
         layout, scene = self.layout, context.scene
         request = request_of(scene.xrds)
         here = capabilities(request.machine.weights)
-        moves = summary.is_animation(scene)
-        if moves:
-            animation.draw(layout, context, animation.expected(scene, request, here))
-            layout.separator()
-        shot = moves and has_neighbours(scene, request)
+        shot = summary.is_shot(scene, request)
         found = estimates(scene, request.settings, here, shot)
+        if summary.is_animation(scene):
+            expected = animation.expected(scene, request, here, found)
+            animation.draw(layout, context, expected)
+            layout.separator()
         mode_table.draw(layout, scene, here, best_mode(scene, request), found)
         layout.use_property_split = True
         layout.use_property_decorate = False
@@ -112,7 +111,10 @@ class XRDS_PT_under_cycles(bpy.types.Panel):
         if summary.is_animation(scene):
             request = request_of(scene.xrds)
             here = capabilities(request.machine.weights)
-            animation.draw(layout, context, animation.expected(scene, request, here))
+            shot = summary.is_shot(scene, request)
+            found = estimates(scene, request.settings, here, shot)
+            expected = animation.expected(scene, request, here, found)
+            animation.draw(layout, context, expected)
         operators.draw(layout.column(align=True))
 
 

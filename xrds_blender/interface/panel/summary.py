@@ -16,7 +16,7 @@ from ...planning.request import Request
 from ...planning.settings import Mode, Settings
 from ...shot.sampling import has_neighbours
 from ..machine import machine
-from ..properties import DENOISE, request_of
+from ..properties import DENOISE
 from .mode_table import NAMES
 from .paragraph import translated
 
@@ -56,9 +56,12 @@ def is_animation(scene: Any) -> bool:
     """Whether the scene's range has several frames, and something changes in them."""
     if scene.frame_end <= scene.frame_start:
         return False
-    request = request_of(scene.xrds)
-    layer = scene.view_layers[0]
-    return bool(_facts_cache().facts(scene, layer, request.settings).scene.moving)
+    return bool(_facts_cache().of_scene(scene, scene.view_layers[0]).moving)
+
+
+def is_shot(scene: Any, request: Request) -> bool:
+    """Whether it is an animation whose frames use each other's samples."""
+    return is_animation(scene) and has_neighbours(scene, request)
 
 
 def next_render(scene: Any, request: Request, here: Capabilities) -> list[Row]:
@@ -87,7 +90,7 @@ def next_render(scene: Any, request: Request, here: Capabilities) -> list[Row]:
 def _neighbours(scene: Any, request: Request) -> list[Row]:
     """How many frames an animation stores, and the memory that they take."""
     radius, size = request.settings.temporal_radius, frame_size(scene.render)
-    if not is_animation(scene) or not has_neighbours(scene, request):
+    if not is_shot(scene, request):
         return []
     text = "{radius} before and after, {memory}"
     taken = _amount(forecast.shot_memory(*size, radius, request.settings.scale))
@@ -100,7 +103,7 @@ def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
     from ...choosing.chosen import foresee
 
     networks = sorted(here.networks) if here.torch else []
-    shot = is_animation(scene) and has_neighbours(scene, request)
+    shot = is_shot(scene, request)
     found = foresee(scene, request, networks, shot) if here.any_denoiser else None
     if found is None:
         return translated("known after a first render")

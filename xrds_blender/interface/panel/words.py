@@ -22,7 +22,7 @@ def of(
         return translated("as set") if denoises else translated("noisy")
     if not denoises:
         return translated("cleaner")
-    above = decibels(mode, estimates)
+    above = _above(mode, estimates)
     if above is None:
         return translated("not measured")
     if above >= _ALIKE:
@@ -33,7 +33,7 @@ def of(
     return translated("softer") if soft else translated("much softer")
 
 
-def decibels(mode: Mode, estimates: Sequence[Estimate]) -> float | None:
+def _above(mode: Mode, estimates: Sequence[Estimate]) -> float | None:
     """How far above Cycles' picture a mode's is expected; None where unknown."""
     found = {each.mode: each.decibels for each in estimates}
     ours, cycles = found.get(mode), found.get(Mode.CYCLES_ONLY)
