@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..temporal.accumulate import accumulate, sample_counts
-from ..temporal.frame import pack
+from ..temporal.frame import pack, pack_counts
 from ..temporal.half_floats import floats
 from ..temporal.noise import Noise
 
@@ -69,7 +69,7 @@ def extended(history: Stored | None, frame: Stored, movement: Movement) -> Store
     return replace(
         frame,
         samples=max(float(counts.mean()), 1e-9),
-        counts=counts.astype(np.float16),
+        counts=pack_counts(counts),
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=_noise(history, frame, share),

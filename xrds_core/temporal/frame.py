@@ -250,7 +250,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         invalid=invalid if invalid.any() else None,
         vector=_half(frame.vector),
         still=frame.still,
-        counts=None if frame.counts is None else _counts(frame.counts),
+        counts=None if frame.counts is None else pack_counts(frame.counts),
         noise=None if noise is None else noise.without(invalid),
         image=_image(frame),
     )
@@ -288,7 +288,7 @@ def noise_in(frame: Frame, dtype: DTypeLike) -> Noise:
     return noise_of(frame.halves or frame.radiance, guides, frame.samples, dtype)
 
 
-def _counts(counts: Array) -> NDArray[Any]:
+def pack_counts(counts: Array) -> NDArray[Any]:
     """Flat, in half floats; what is no count becomes 0."""
     counts = np.nan_to_num(counts.ravel(), posinf=0.0, neginf=0.0)
     return np.clip(counts, 0.0, LARGEST_HALF).astype(np.float16)
