@@ -6,16 +6,16 @@ folder has measured is kept, and the report is written anew after every scene.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.command import streams
 from xrds_blender.planning.settings import Network
-from xrds_core.atomic import replacing, write_json
+from xrds_core.atomic import write_json
 from xrds_core.time_left import duration
 
+from ..csv_table import write_table
 from ..progress import report_line
 from . import analysis, machine, report, workload
 from .growth import growth as measure_growth
@@ -203,14 +203,7 @@ def write(out: Path, results: Report) -> None:
     """Write results.json and results.csv."""
     write_json(out / "results.json", results)
     rows = [_flat(point) for point in results["points"]]
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    with (
-        replacing(out / "results.csv") as part,
-        part.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.DictWriter(file, columns)
-        writer.writeheader()
-        writer.writerows(rows)
+    write_table(out / "results.csv", rows)
 
 
 def _flat(point: dict[str, Any]) -> dict[str, Any]:

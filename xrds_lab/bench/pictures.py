@@ -181,8 +181,15 @@ class Pictures:
         """The reference (H, W, 3): the shot's own, or the mean of two halves."""
         if self.shot.reference is not None:
             return _reference_file(self.shot.reference)
-        first, second = (self._read(half)["radiance"] for half in self.halves())
+        first, second = self.references()
         return (first + second) / 2
+
+    def references(self) -> tuple[Array, Array]:
+        """Two references of independent noise; the shot's own one twice."""
+        if self.shot.reference is not None:
+            return (self.reference(),) * 2
+        first, second = (self._read(half)["radiance"] for half in self.halves())
+        return first, second
 
     def floor(self) -> float | None:
         """PSNR (dB) of the reference itself, by how its halves differ."""

@@ -239,13 +239,18 @@ def _add_shots(group: Any) -> None:
     add(
         "--motions",
         type=arguments.names(MOTIONS),
-        default=MOTIONS,
-        help=f"of {', '.join(MOTIONS)}",
+        help=f"of {', '.join(MOTIONS)}; all, pan with --same-picture",
     )
     add(
         "--samples",
         type=arguments.integers,
-        help="per frame, as 2,16; 2, of the gallery 2,4,16",
+        help="per frame, as 2,16; 2, of the gallery 2,4,16, with --same-picture "
+        "16,64,256",
+    )
+    add(
+        "--same-picture",
+        action="store_true",
+        help="time the picture of the file's samples, with fewer; on a quiet machine",
     )
     add(
         "--radii",
@@ -287,6 +292,8 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         return _bench_gallery(options)
     if not options.scenes:
         raise UsageError("no scenes: give files, or --gallery")
+    if options.same_picture:
+        return _bench_same_picture(options)
     if options.shots:
         return _bench_shots(options)
     if options.low_budgets:
@@ -356,7 +363,7 @@ def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
         options.scenes,
         options.out,
         Measure(
-            options.motions,
+            options.motions or MOTIONS,
             options.samples or (2,),
             options.radii,
             options.pair_samples,
@@ -367,6 +374,20 @@ def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
         ),
         **_inputs(options),
     )
+
+
+def _bench_same_picture(options: argparse.Namespace) -> dict[str, Any]:
+    from ..shots.sooner import MOST_SAMPLES, SAMPLES, Case, bench_same_picture
+
+    cases = [
+        case
+        for motion in options.motions or ("pan",)
+        for case in (
+            *(Case(motion, samples) for samples in options.samples or SAMPLES),
+            *(Case(motion, MOST_SAMPLES, x) for x in options.noise_thresholds or ()),
+        )
+    ]
+    return bench_same_picture(options.scenes, options.out, cases, **_inputs(options))
 
 
 def _inputs(options: argparse.Namespace) -> dict[str, Any]:

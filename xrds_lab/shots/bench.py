@@ -6,12 +6,11 @@ measured is in the report too, so that a long measure can be made in parts.
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.command import streams
-from xrds_core.atomic import replacing, write_json
+from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
 
 from ..bench import machine, workload
@@ -19,6 +18,7 @@ from ..bench.inputs import Folder
 from ..bench.journal import Journal
 from ..bench.pictures import Networks, Pictures
 from ..bench.windows import find_shots
+from ..csv_table import write_table
 from ..progress import report_line
 from . import equal, film, report
 from .figures import REACH, Clip, SceneFigures
@@ -222,17 +222,6 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
         "failures": journal.failures,
     }
     write_json(out / "results.json", results)
-    _write_table(out / "results.csv", results["shots"])
+    write_table(out / "results.csv", results["shots"])
     report.write(out / "report.md", results)
     return results
-
-
-def _write_table(path: Path, points: Sequence[dict[str, Any]]) -> None:
-    columns = list(dict.fromkeys(key for point in points for key in point))
-    with (
-        replacing(path) as part,
-        part.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.DictWriter(file, columns)
-        writer.writeheader()
-        writer.writerows(points)

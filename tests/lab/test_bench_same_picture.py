@@ -1,0 +1,64 @@
+"""The measure of the same picture over one scene of a few pixels: made and resumed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bpy
+import pytest
+
+from xrds_core.errors import UsageError
+from xrds_lab.shots import sooner
+from xrds_lab.shots.sooner import CYCLES, SAME_PICTURE, SAME_SAMPLES, Case
+
+SIZE = (64, 48)
+
+
+@pytest.fixture
+def blend(tmp_path: Path, still_life: Callable[..., Any]) -> Path:
+    still_life()
+    path = tmp_path / "cubes.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def run(blend: Path, *cases: Case, frames: int = sooner.FRAMES) -> dict[str, Any]:
+    return sooner.bench_same_picture(
+        [blend],
+        blend.parent / "out",
+        cases,
+        frames=frames,
+        resolution=SIZE,
+        reference_samples=64,
+    )
+
+
+def test_each_method_has_a_row_that_is_measured_once(
+    blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = run(blend, Case("pan", 8))
+    assert first["failures"] == {}
+    rows = {row["method"]: row for row in first["shots"]}
+    assert list(rows) == [CYCLES, SAME_PICTURE, SAME_SAMPLES]
+    assert rows[CYCLES]["ratio"] == 1.0
+    assert rows[CYCLES]["gain"] == 0.0
+    assert len(rows[SAME_PICTURE]["shares"]) == sooner.FRAMES
+    assert rows[SAME_PICTURE]["mean_share"] <= 1.0
+    assert rows[SAME_SAMPLES]["gain"] > rows[SAME_PICTURE]["gain"] - 1.0
+    assert all(row["seconds"] > 0 and row["psnr"] > 15 for row in rows.values())
+    report = (blend.parent / "out" / "report.md").read_text()
+    assert report.count("| cubes | 8 |") == 3
+
+    def refuse(*_: Any, **__: Any) -> None:
+        raise AssertionError("measured again")
+
+    for name in ("_cycles", "_same_picture", "_same_samples"):
+        monkeypatch.setattr(sooner, name, refuse)
+    assert run(blend, Case("pan", 8))["shots"] == first["shots"]
+
+
+def test_a_shot_that_is_too_short_is_refused(blend: Path) -> None:
+    with pytest.raises(UsageError, match="8 frames"):
+        run(blend, Case("pan", 8), frames=8)

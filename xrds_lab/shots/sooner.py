@@ -1,0 +1,280 @@
+"""`xrds bench --same-picture`: in how many seconds the picture of a file's settings.
+
+Each scene is made a shot. Cycles + OIDN renders frames of it with all samples, XRDS the
+whole shot with as few as it chooses, and nine frames with all. Seconds are wall clock,
+so a quiet machine is needed; the three take turns within a case, never at once.
+"""
+
+from __future__ import annotations
+
+import statistics
+import time
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from xrds_blender.command import streams
+from xrds_blender.planning.settings import DEFAULT_DENOISING
+from xrds_core.atomic import read_json, write_json
+from xrds_core.errors import UsageError
+
+from .. import metrics
+from ..bench import machine
+from ..bench.inputs import Folder, open_scene, sample_adaptively
+from ..bench.journal import Journal
+from ..bench.pictures import Networks, Pictures
+from ..bench.windows import find_shots
+from ..csv_table import write_table
+from ..gallery.judge import compare
+from ..progress import report_line
+from .figures import REACH
+from .frames import MIDDLE
+from .motions import animate
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from xrds_core.arrays import Array
+
+    from ..bench.windows import Shot
+
+    Row = dict[str, Any]
+
+SAMPLES = (16, 64, 256)
+FRAMES = 17
+"""Frames of a shot: from 16 on it may have fewer samples."""
+MOST_SAMPLES = 4096
+"""Of a pixel under a noise threshold, as in a new file."""
+CYCLES, SAME_PICTURE, SAME_SAMPLES = "cycles_oidn", "same_picture", "same_samples"
+_IN_TURN = ((CYCLES, SAME_PICTURE), (SAME_SAMPLES,))  # what takes longest comes last
+_TIMED = 3  # frames of Cycles, around the middle one
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a file asks for: samples, or with a noise threshold at most so many."""
+
+    motion: str
+    samples: int
+    noise_threshold: float | None = None
+
+    @property
+    def label(self) -> str:
+        """Name in files and tables."""
+        adaptive = "" if self.noise_threshold is None else f"-{self.noise_threshold:g}"
+        return f"{self.motion}-{self.samples}{adaptive}"
+
+
+@dataclass(frozen=True)
+class Made:
+    """A method's middle frame (H, W, 3), seen at `stops`, and what it took.
+
+    `seconds` are of a frame, `shares` of the file's samples, one for each frame.
+    """
+
+    radiance: Array
+    seconds: float
+    stops: float
+    shares: tuple[float, ...] = ()
+
+
+def bench_same_picture(
+    scenes: Sequence[Path],
+    out: Path,
+    cases: Sequence[Case],
+    *,
+    frames: int = FRAMES,
+    windows: Path | None = None,
+    references: Path | None = None,
+    resolution: tuple[int, int] | None = None,
+    cache: Path | None = None,
+    reference_samples: int = 256,
+) -> dict[str, Any]:
+    """Measure what is missing, write the report into `out` and return it.
+
+    Errors are of the shot's middle frame, which is the file's own view, against two
+    renders of `reference_samples` each, without their noise; with `references` against
+    these. Raises UsageError for missing files and too short a shot.
+    """
+    if frames < 2 * REACH + 1:
+        raise UsageError(f"{frames} frames: give {2 * REACH + 1} or more")
+    out.mkdir(parents=True, exist_ok=True)
+    folder = Folder(cache or out / "cache")
+    journal = Journal(folder.directory / "journal-same-picture.json", report_line)
+    with streams.stdout_to(folder.directory / "blender.log"):
+        networks = Networks(None, "cpu")
+        parts = [
+            _Scene(shot, folder, Pictures(shot, folder, networks, reference_samples))
+            for shot in find_shots(scenes, windows, references, resolution)
+        ]
+        for methods in _IN_TURN:
+            for case, part in product(cases, parts):
+                with journal.attempt(f"{part.shot.name}: {case.label}"):
+                    part.measure(case, frames, methods, journal)
+                _write(parts, journal, out)
+        return _write(parts, journal, out)
+
+
+class _Scene:
+    """One scene: its rows, kept in a file."""
+
+    def __init__(self, shot: Shot, folder: Folder, pictures: Pictures) -> None:
+        self.shot, self.folder, self.pictures = shot, folder, pictures
+        name = f"{shot.identity}-{shot.window.label}-same-picture.json"
+        self._path = folder.directory / name
+        self.rows: dict[str, Row] = (
+            read_json(self._path) if self._path.is_file() else {}
+        )
+
+    def measure(
+        self, case: Case, frames: int, methods: Sequence[str], journal: Journal
+    ) -> None:
+        """Render and judge what is missing of one case."""
+        work = {
+            CYCLES: lambda: _cycles(self.shot, case, frames),
+            SAME_PICTURE: lambda: _same_picture(self.shot, case, frames),
+            SAME_SAMPLES: lambda: _same_samples(self.shot, case),
+        }
+        missing = [x for x in methods if f"{case.label}-{x}" not in self.rows]
+        if not missing:
+            return
+        self.pictures.render(self.pictures.missing([]), journal, lambda _: None)
+        for method in missing:
+            report_line(f"{self.shot.name}: {case.label}, {method}")
+            made = work[method]()
+            picture = {"radiance": made.radiance}
+            self.folder.write(self._picture(case, method), picture, {})
+            self.rows[f"{case.label}-{method}"] = self._judged(case, method, made)
+            write_json(self._path, self.rows)
+
+    def _judged(self, case: Case, method: str, made: Made) -> Row:
+        single = self.folder.read(self._picture(case, CYCLES))
+        assert single is not None  # Cycles comes first
+        pictures = made.radiance, single["radiance"], *self.pictures.references()
+        shown, alone, *truth = (metrics.to_srgb(x, made.stops) for x in pictures)
+        verdict = compare(shown, alone, truth)
+        error = metrics.flip(made.radiance, self.pictures.reference(), made.stops)
+        cycles = self.rows.get(f"{case.label}-{CYCLES}", {"seconds": made.seconds})
+        return {
+            "scene": self.shot.name,
+            "motion": case.motion,
+            "samples": case.samples,
+            "noise_threshold": case.noise_threshold,
+            "method": method,
+            "seconds": round(made.seconds, 3),
+            "ratio": round(made.seconds / cycles["seconds"], 3),
+            "mean_share": round(float(np.mean(made.shares or [1.0])), 3),
+            "shares": [round(x, 3) for x in made.shares],
+            "psnr": round(verdict.psnr, 3),
+            "gain": round(verdict.gain, 3),
+            "flip": round(error, 5),
+            "worst_block": round(verdict.worst, 2),
+            "share_of_blocks": round(verdict.share, 4),
+        }
+
+    def _picture(self, case: Case, method: str) -> str:
+        window = self.shot.window.label
+        return f"{self.shot.identity}-{window}-{case.label}-{method}.npz"
+
+
+def _opened(shot: Shot, case: Case, reach: int) -> Any:
+    scene = open_scene(shot.path, shot.window)
+    scene.cycles.samples = case.samples
+    if case.noise_threshold is not None:
+        sample_adaptively(scene, case.samples, case.noise_threshold)
+    animate(scene, shot.window, case.motion, MIDDLE, reach)
+    scene.render.use_persistent_data = True  # for all three: one sync of the scene
+    return scene
+
+
+def _cycles(shot: Shot, case: Case, frames: int) -> Made:
+    """Cycles and its denoiser, as a new file has it."""
+    from xrds_blender import render
+
+    scene = _opened(shot, case, frames // 2)
+    seconds, radiance = [], np.empty(0)
+    for number in range(MIDDLE - _TIMED // 2, MIDDLE + _TIMED // 2 + 1):
+        scene.frame_set(number)
+        started = time.perf_counter()
+        picture = render(scene, plain=True, denoiser=DEFAULT_DENOISING)
+        seconds.append(time.perf_counter() - started)
+        if number == MIDDLE:
+            radiance = np.asarray(picture.radiance, np.float32)
+    return Made(radiance, statistics.median(seconds), _stops(scene))
+
+
+def _same_picture(shot: Shot, case: Case, frames: int) -> Made:
+    """The whole shot; its first frames' measuring is in the seconds."""
+    return _shot(shot, case, frames, same_picture=True)
+
+
+def _same_samples(shot: Shot, case: Case) -> Made:
+    """The file's samples: a better picture."""
+    return _shot(shot, case, 2 * REACH + 1, same_picture=False)
+
+
+def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
+    from xrds_blender.planning.request import render_request
+    from xrds_blender.shot.shot import render_shot
+
+    reach = frames // 2
+    scene = _opened(shot, case, reach)
+    numbers = range(MIDDLE - reach, MIDDLE + reach + 1)
+    job = render_request(scale=1, temporal_radius=REACH, **choices)
+    radiance, shares = np.empty(0), []
+    started = time.perf_counter()
+    for number, picture in render_shot(scene, job, numbers):
+        assert picture.settings is not None
+        shares.append(float(picture.settings.share))
+        if number == MIDDLE:
+            radiance = np.asarray(picture.radiance, np.float32)
+    seconds = (time.perf_counter() - started) / len(numbers)
+    return Made(radiance, seconds, _stops(scene), tuple(shares))
+
+
+def _stops(scene: Any) -> float:
+    return float(scene.view_settings.exposure)
+
+
+_COLUMNS = {
+    "scene": "scene",
+    "samples": "samples",
+    "noise_threshold": "threshold",
+    "method": "method",
+    "seconds": "s a frame",
+    "ratio": "of Cycles'",
+    "mean_share": "share of samples",
+    "psnr": "PSNR",
+    "gain": "gain",
+    "flip": "FLIP",
+    "worst_block": "worst block",
+    "share_of_blocks": "blocks below -1 dB",
+}
+
+
+def _write(parts: Sequence[_Scene], journal: Journal, out: Path) -> dict[str, Any]:
+    rows = [row for part in parts for row in part.rows.values()]
+    results = {
+        "machine": machine.describe(),
+        "shots": rows,
+        "failures": journal.failures,
+    }
+    write_json(out / "results.json", results)
+    write_table(out / "results.csv", rows)
+    lines = [
+        "# The same picture, sooner",
+        "Written by `xrds bench --same-picture`. *Gain* is in dB over Cycles + OIDN of "
+        "all samples, blocks of 32x32 pixels against those of that picture.",
+        "\n".join(_table(rows)),
+    ]
+    (out / "report.md").write_text("\n\n".join(lines) + "\n", "utf-8")
+    return results
+
+
+def _table(rows: Sequence[Row]) -> list[str]:
+    head = [f"| {' | '.join(_COLUMNS.values())} |", "|---" * len(_COLUMNS) + "|"]
+    cells = ([str(row[name]) for name in _COLUMNS] for row in rows)
+    return head + [f"| {' | '.join(each)} |" for each in cells]
