@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from xrds_core.arrays import Array
 from xrds_core.sequence.extra_samples import ExtraSamples
 from xrds_core.sequence.history import History
+from xrds_core.sequence.rectangles import rectangles
 from xrds_core.sequence.same_picture import (
     BLOCK,
     Gain,
@@ -27,7 +28,6 @@ from xrds_core.sequence.same_picture import (
     error_fall,
     error_ratio,
     gain,
-    rectangles,
 )
 from xrds_core.sequence.worth import Ratio, Worth
 from xrds_core.temporal.accumulate import Accumulated

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..temporal.accumulate import Accumulated, accumulate
 from ..temporal.local_filters import box
 from .extra_samples import with_extra
+from .rectangles import rectangles
+from .same_picture import BLOCK, block_means
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
     from ..temporal.frame import Stored
     from ..temporal.vectors import Movement
     from .extra_samples import ExtraSamples
+    from .rectangles import Rectangle
 
 
 # The accumulated picture has full weight from this many reused samples for each of the
@@ -30,6 +33,9 @@ _ENOUGH, _IN_ALL = 1.0, 3.0
 # few noisy pixels are.
 _LEAST_FACTOR, _MOST_FACTOR = 1.0, 2.0
 _SMOOTH = 3  # pixels across
+# The frame alone is denoised in parts where these are less than this much of it; each
+# with so many pixels around it as a denoiser's network sees.
+_PART, _AROUND = 0.75, 96
 
 
 @dataclass(frozen=True)
@@ -65,6 +71,7 @@ def finish_frame(
 
     Where few samples are reused the picture is that of the frame alone, also denoised:
     next to pixels of many samples a denoiser mistakes the noise of few for detail.
+    Where that is a small part of the picture, that part alone is denoised again.
     `region`, rows and columns, is the part to denoise: black around a crop would give
     the denoiser a wrong exposure. `accumulated` is the frame with its neighbours if it
     is known already; `extra` are samples that it has beside its own. Raises Cancelled
@@ -83,14 +90,20 @@ def finish_frame(
     denoise_started = time.perf_counter()
     region = region or (slice(None), slice(None))
     share = share[region]
-    parts = 1 if _is_even(share) else 2
+    areas = _lacking(share)
+    parts = 1 + len(areas)
     denoised = denoiser(
         *_passes(accumulated, region), progress=_part(progress, 0, parts)
     )
-    if parts == 2:
+    if areas:
         passes = _passes(_filled(alone, accumulated), region)
-        single = denoiser(*passes, progress=_part(progress, 1, parts)).radiance
-        mixed = single + (denoised.radiance - single) * share[..., None]
+        mixed = denoised.radiance.copy()
+        for number, area in enumerate(areas, 1):
+            around = (np.ascontiguousarray(x[area.around]) for x in passes)
+            told = _part(progress, number, parts)
+            single = denoiser(*around, progress=told).radiance[area.within]
+            weight = share[area.place][..., None]
+            mixed[area.place] = single + (mixed[area.place] - single) * weight
         denoised = replace(denoised, radiance=mixed)
     seconds = {
         "accumulate": denoise_started - started,
@@ -116,9 +129,35 @@ def _share(accumulated: Accumulated, alone: Accumulated, samples: float) -> Arra
     )
 
 
-def _is_even(share: Array) -> bool:
-    """Whether one of the two pictures is all that is needed."""
-    return bool((share == share.flat[0]).all()) and float(share.flat[0]) in (0.0, 1.0)
+class _Area(NamedTuple):
+    """A `place` of a picture, what is seen `around` it, and the place `within` that."""
+
+    place: Rectangle
+    around: Rectangle
+    within: Rectangle
+
+
+def _lacking(share: Array) -> list[_Area]:
+    """Where the frame alone is needed as well; nowhere if either picture is enough."""
+    if (share == share.flat[0]).all() and float(share.flat[0]) in (0.0, 1.0):
+        return []
+    blocks = rectangles(block_means(np.less(share, 1.0)) > 0.0)
+    areas = [_area(each, share.shape) for each in blocks]
+    if sum(share[x.around].size for x in areas) < _PART * share.size:
+        return areas
+    whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
+    return [_Area(whole, whole, whole)]
+
+
+def _area(blocks: Rectangle, shape: tuple[int, ...]) -> _Area:
+    place, around, within = [], [], []
+    for part, side in zip(blocks, shape, strict=True):
+        first, last = part.start * BLOCK, min(part.stop * BLOCK, side)
+        before = max(first - _AROUND, 0)
+        place.append(slice(first, last))
+        around.append(slice(before, min(last + _AROUND, side)))
+        within.append(slice(first - before, last - before))
+    return _Area(*((x[0], x[1]) for x in (place, around, within)))
 
 
 def _filled(alone: Accumulated, accumulated: Accumulated) -> Accumulated:

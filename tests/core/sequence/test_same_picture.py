@@ -17,7 +17,6 @@ from xrds_core.sequence.same_picture import (
     error_fall,
     error_ratio,
     gain,
-    rectangles,
 )
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.frame import store
@@ -78,25 +77,6 @@ def test_what_neighbours_bring_is_counted() -> None:
     alone = gain(accumulate(found[1], []), found[1])
     assert alone.of(everywhere) == pytest.approx(1.0)
     assert np.allclose(alone.blocks[np.isfinite(alone.blocks)], 1.0)
-
-
-@pytest.mark.parametrize("most", [1, 2, 4])
-def test_rectangles_cover_what_is_marked(most: int) -> None:
-    blocks = np.zeros((12, 20), bool)
-    blocks[1:3, 2:4] = blocks[8, 15:19] = blocks[11, 0] = True
-    found = rectangles(blocks, most)
-    covered = np.zeros_like(blocks)
-    for area in found:
-        assert not covered[area].any()  # nothing is rendered twice
-        covered[area] = True
-    assert covered[blocks].all()
-    assert len(found) <= most
-    if most == 4:
-        assert covered.sum() == blocks.sum()
-
-
-def test_nothing_marked_is_no_rectangle() -> None:
-    assert rectangles(np.zeros((3, 4), bool)) == []
 
 
 def extra(samples: Array, value: float) -> ExtraSamples:

@@ -1,0 +1,27 @@
+"""Rectangles that cover marked blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from xrds_core.sequence.rectangles import rectangles
+
+
+@pytest.mark.parametrize("most", [1, 2, 4])
+def test_rectangles_cover_what_is_marked(most: int) -> None:
+    blocks = np.zeros((12, 20), bool)
+    blocks[1:3, 2:4] = blocks[8, 15:19] = blocks[11, 0] = True
+    found = rectangles(blocks, most)
+    covered = np.zeros_like(blocks)
+    for area in found:
+        assert not covered[area].any()  # nothing is rendered twice
+        covered[area] = True
+    assert covered[blocks].all()
+    assert len(found) <= most
+    if most == 4:
+        assert covered.sum() == blocks.sum()
+
+
+def test_nothing_marked_is_no_rectangle() -> None:
+    assert rectangles(np.zeros((3, 4), bool)) == []
