@@ -115,6 +115,7 @@ class Settings:
     `guide_samples` are per full-size pixel: both are for enlargements. In a shot,
     samples of `temporal_radius` frames before and after are reused, and `share` is how
     much of the samples a frame takes; with a noise threshold, of those it asks for.
+    Under a still camera they `begin` after so many of the shot's; None is by its place.
     """
 
     mode: Mode = Mode.X2
@@ -124,6 +125,7 @@ class Settings:
     guide_samples: int = 4
     temporal_radius: int = 0
     share: float = 1.0
+    begin: int | None = None
 
     @property
     def scale(self) -> int:

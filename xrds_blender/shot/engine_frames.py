@@ -121,6 +121,8 @@ class EngineFrames:
 
         others = list(found.neighbours.values())
         own = method.pace.complete(method, found.own, others, more)
+        if own.views is not found.own.views:  # it lends what it has got as well
+            self.window.replace(found.number, replace(own, gathered={}))
         return replace(found, own=own)
 
     def _whole(self, number: int) -> Neighbourhood[Sampled]:

@@ -19,7 +19,7 @@ from ..planning.plan import Decision, full_size
 from ..planning.request import Request
 from ..planning.settings import Denoising, Settings
 from .methods import Method, Report
-from .sampling import Gathered, OnSampled, Sampled, sample_frame
+from .sampling import OnSampled, Sampled, sample_frame
 
 if TYPE_CHECKING:
     from xrds_core.denoising import Denoised
@@ -106,7 +106,7 @@ class FullSize(Method):
         own: Stored,
         neighbours: Sequence[Stored],
         report: Report | None = None,
-        gathered: Gathered | None = None,
+        gathered: Accumulated | None = None,
     ) -> Picture:
         """The picture of a packed frame with the samples of its neighbours."""
         finished = finish_frame(
@@ -115,8 +115,7 @@ class FullSize(Method):
             self._denoiser,
             self._movement,
             report,
-            accumulated=gathered and gathered.accumulated,
-            extra=gathered and gathered.extra,
+            accumulated=gathered,
         )
         accumulated = finished.accumulated
         return self._picture(

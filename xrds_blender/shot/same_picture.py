@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xrds_core.arrays import Array
-from xrds_core.sequence.extra_samples import ExtraSamples
+from xrds_core.sequence.extra_samples import ExtraSamples, enriched, mean_of, with_extra
 from xrds_core.sequence.history import History
 from xrds_core.sequence.rectangles import rectangles
 from xrds_core.sequence.same_picture import (
@@ -30,7 +30,7 @@ from xrds_core.sequence.same_picture import (
     gain,
 )
 from xrds_core.sequence.worth import Ratio, Worth
-from xrds_core.temporal.accumulate import Accumulated
+from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.half_floats import floats
 from xrds_core.temporal.sample_subsets import SampleSubset
 from xrds_core.temporal.vectors import Movement
@@ -46,7 +46,6 @@ from ..planning.request import Request
 from ..planning.settings import Mode
 from .sampling import (
     LARGEST_SEED,
-    Gathered,
     Sampled,
     can_continue,
     has_neighbours,
@@ -76,6 +75,8 @@ _OTHER = 1_299_709  # seeds apart; no frame's is near those of another
 class Part:
     """More samples of a frame that has `taken` some: `length` of its sequence.
 
+    With `begin` they are of another one, after so many that frames took of it.
+
     Where the file has a noise threshold, pixels stop at `share` of what it asks for.
     `region` is a part of the picture, None all of it. `other` sequences have seeds of
     their own.
@@ -85,6 +86,7 @@ class Part:
     length: int
     share: float
     region: Region | None = None
+    begin: int | None = None
     other: int = 0
 
 
@@ -153,7 +155,7 @@ def render_more(
         seed = (how.own_seed + part.other * _OTHER) % LARGEST_SEED
         subset = SampleSubset(seed, part.length, 0, part.length)
     else:
-        subset = how.further(part.taken, part.length)
+        subset = how.further(part.taken, part.length, part.begin)
     even = is_even(depsgraph.scene_eval, request)
     parts = [subset] if even or subset.length < 2 else subset.halves()
     share = None if even else part.share
@@ -164,7 +166,7 @@ def render_more(
         )
     finally:
         stages.end()
-    return {view: _mean([each[view] for each in found]) for view in found[0]}, seconds
+    return {v: mean_of([_extra(x[v]) for x in found]) for v in found[0]}, seconds
 
 
 @dataclass
@@ -184,14 +186,18 @@ class SamePicture:
     _tried: float = 1.0
     _ratio: float = 1.0
     _shares: dict[int, float] = field(default_factory=dict)
+    _taken: int = 0  # of the sequence that frames continue under a still camera
+    _taken_more: int = 0  # of that of more samples
 
     def request(self, request: Request) -> Request:
         """The request of the next frame that is sampled."""
-        return request.with_settings(share=self.share)
+        begin = None if self.history is None else self._taken
+        return request.with_settings(share=self.share, begin=begin)
 
     def takes(self, method: Finishing, frame: Sampled) -> bool:
         """Note that a frame was sampled with the present share."""
         self._shares[frame.number] = self.share
+        self._taken += round(self.samples * self.share)
         return True
 
     def complete(
@@ -202,31 +208,32 @@ class SamePicture:
         Raises Cancelled when the user stops their render.
         """
         view, started = next(iter(own.views)), time.perf_counter()
+        before = own.views[view].samples
         beside = [x.number for x in others]
         others = [*others, *self._before(own, others)]
         accumulated = {v: method.accumulate(own, others, v) for v in own.views}
-        own = replace(own, gathered={v: Gathered(x) for v, x in accumulated.items()})
+        own = replace(own, gathered=accumulated)
         share = self._shares.get(own.number, 1.0)
         gained = gain(accumulated[view], own.views[view])
         spent = _Seconds({"accumulate": time.perf_counter() - started})
+        extra: dict[str, ExtraSamples] = {}
         if self._worth.is_due(len(beside)):
-            ratio = self._measured(method, own, others, share, spent.of(more))
+            ratio, extra = self._measure(method, own, others, spent.of(more))
             whole = gained.of(gained.errors > 0.0)
             self._worth.add(ratio, share, whole, len(beside))
-            self._measured_in = own.number
-            self._tried, self._ratio = share, ratio.value
+            self._measured_in, self._tried = own.number, share
+            self._ratio = ratio.value
         lacks = self._lacks(share, gained)
-        shape = own.views[view].shape
-        extra = self._top_up(shape, share, gained, lacks, spent.of(more))
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
         self._choose_next(share, gained.of(rest), beside)
-        gathered = {v: Gathered(x, extra.get(v)) for v, x in accumulated.items()}
-        if extra:
-            added = float(extra[view].samples.mean()) / own.views[view].samples
-            share = min(share * (1.0 + added), 1.0)
+        if not extra:
+            shape = own.views[view].shape
+            extra = self._top_up(shape, share, gained, lacks, spent.of(more))
+        own = _with_more(own, extra, self._weight)
+        share *= own.views[view].samples / before
+        self._shares[own.number] = share
         return replace(
             own,
-            gathered=gathered,
             seconds=spent.added_to(own.seconds),
             share=share,
             decisions=(self._decision(share),),
@@ -271,32 +278,33 @@ class SamePicture:
         enough = self._equal(share, gained.of(whole)) >= _ENOUGH
         return lacks if enough and lacks.mean() < _MOST_LACKING else whole
 
-    def _measured(
+    def _measure(
         self,
         method: Finishing,
         own: Sampled,
         others: Sequence[Sampled],
-        share: float,
         more: _More,
-    ) -> Ratio:
+    ) -> tuple[Ratio, dict[str, ExtraSamples]]:
         """The squared error of a frame with its neighbours over that of all samples.
 
         By two renders of half of the file's samples, of two seeds: halves of one
-        sequence would not be independent.
+        sequence would not be independent. The frame has them from then on.
         """
         view, length = next(iter(own.views)), max(1, self.samples // 2)
+        halves = [more(Part(0, length, 0.5, other=other)) for other in (1, 2)]
         parts = []
-        for other in (1, 2):
-            found = more(Part(0, length, 0.5, other=other))[view]
+        for found in (each[view] for each in halves):
             denoised = method.denoised(found.radiance, found.albedo, found.normal)
             parts.append(Rendered(found.radiance, denoised))
+        pair = parts[0], parts[1]
         together = method.finish(own, others, view).radiance
+        alone = method.finish(replace(own, gathered={}), (), view).radiance
         frame = own.views[view]
         samples = floats(frame.picture[:, :3]).reshape(*frame.shape, 3)
-        pair = parts[0], parts[1]
-        alone = method.finish(replace(own, gathered={}), (), view).radiance
+        share = self._shares.get(own.number, 1.0)
         fall = error_fall(alone, share, samples, pair)
-        return error_ratio(together, samples, pair, fall)
+        ratio = error_ratio(together, samples, pair, fall)
+        return ratio, {v: mean_of([x[v] for x in halves]) for v in own.views}
 
     def _top_up(
         self,
@@ -319,8 +327,11 @@ class SamePicture:
             if length < 1:
                 continue
             region = _region(rows, columns, shape)
-            for view, samples in more(Part(first, length, missing, region)).items():
-                whole = extra.setdefault(view, _nothing(shape, self._weight))
+            begin = None if self.history is None else self._taken_more
+            self._taken_more += length
+            part = Part(first, length, missing, region, begin)
+            for view, samples in more(part).items():
+                whole = extra.setdefault(view, _nothing(shape))
                 _put(whole, region, samples)
         return extra
 
@@ -366,34 +377,34 @@ class _Seconds:
         return {x: self.stages.get(x, 0.0) + seconds.get(x, 0.0) for x in names}
 
 
-def _mean(parts: Sequence[Samples]) -> ExtraSamples:
-    """The mean of several renders of one region, weighted by their samples."""
-    counts = [x.counts for x in parts]
-    total = np.sum(counts, axis=0)
-    weights = [x / np.maximum(total, 1e-9) for x in counts]
-
-    def mean(name: str) -> Array:
-        values = (getattr(x, name) for x in parts)
-        return sum(
-            value * weight[..., None]
-            for value, weight in zip(values, weights, strict=True)
-        )
-
-    picture = mean("picture")
+def _extra(samples: Samples) -> ExtraSamples:
+    picture = samples.picture
     return ExtraSamples(
         np.ascontiguousarray(picture[..., :3]),
-        mean("albedo"),
-        mean("normal"),
+        samples.albedo,
+        samples.normal,
         picture[..., 3],
-        total,
+        samples.counts,
     )
 
 
-def _nothing(shape: tuple[int, int], worth: float) -> ExtraSamples:
+def _with_more(
+    own: Sampled, extra: Mapping[str, ExtraSamples], weight: float
+) -> Sampled:
+    """A frame with extra samples; beside them neighbours' count with a weight."""
+    views, gathered = dict(own.views), dict(own.gathered)
+    for view, more in extra.items():
+        alone = accumulate(own.views[view], [])
+        gathered[view] = with_extra(own.gathered[view], alone, more, weight)
+        views[view] = enriched(own.views[view], more)
+    return replace(own, views=views, gathered=gathered) if extra else own
+
+
+def _nothing(shape: tuple[int, int]) -> ExtraSamples:
     """No samples anywhere."""
     radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
     alpha, samples = np.zeros((2, *shape), np.float32)
-    return ExtraSamples(radiance, albedo, normal, alpha, samples, worth)
+    return ExtraSamples(radiance, albedo, normal, alpha, samples)
 
 
 def _put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:

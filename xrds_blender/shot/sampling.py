@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from xrds_core.errors import Cancelled, SceneError
-from xrds_core.sequence.extra_samples import ExtraSamples
 from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.frame import Camera, Frame, store
 from xrds_core.temporal.sample_subsets import (
     SampleSubset,
     consecutive_subset,
-    further_subset,
+    running_subset,
 )
 
 from ..cycles import session
@@ -48,28 +47,20 @@ OnSampled = Callable[[Mapping[str, Frame]], object]
 
 
 @dataclass(frozen=True)
-class Gathered:
-    """A view with its neighbours' samples, and `extra` ones beside its own."""
-
-    accumulated: Accumulated
-    extra: ExtraSamples | None = None
-
-
-@dataclass(frozen=True)
 class Sampled:
     """One frame before it is finished, by view, and the seconds that it took.
 
     At full size views are `Stored`, of a still `Samples`; above scale 1 they are a
     `View` or `Inputs` of `super_resolution`; of Cycles alone finished pictures.
-    `gathered` is what is known already of a view with its neighbours. Where `samples`
-    per pixel were requested it has these; else `share` is how much of the file's.
-    `decisions` say why.
+    `gathered` are views with their neighbours' samples, where that is known already.
+    Where `samples` per pixel were requested it has these; else `share` is how much of
+    the file's. `decisions` say why.
     """
 
     number: int
     views: dict[str, Any]
     seconds: dict[str, float]
-    gathered: Mapping[str, Gathered] = field(default_factory=dict)
+    gathered: Mapping[str, Accumulated] = field(default_factory=dict)
     samples: int | None = None
     share: float = 1.0
     decisions: tuple[Decision, ...] = ()
@@ -86,9 +77,10 @@ class Sampling:
 
     `count` samples per pixel, of the `whole` of a sequence; `geometry` names passes.
     `place` is the frame's in the shot where frames continue one sequence, None where
-    each begins its own. `still` is as in `Frame`. A frame that `has_halves` is sampled
-    in two; one that `needs_motion` is rendered once more without motion blur for its
-    motion. One that `is_alone` has no neighbours: it is sampled as its file has it.
+    each begins its own; its samples `begin` after so many, None is by its place.
+    `still` is as in `Frame`. A frame that `has_halves` is sampled in two; one that
+    `needs_motion` is rendered once more without motion blur for its motion. One that
+    `is_alone` has no neighbours: it is sampled as its file has it.
     """
 
     number: int
@@ -98,6 +90,7 @@ class Sampling:
     seed: int = 0
     geometry: Sequence[tuple[str, str]] = ()
     place: int | None = None
+    begin: int | None = None
     radius: int = 0
     still: bool = False
     has_halves: bool = False
@@ -120,6 +113,8 @@ class Sampling:
         """
         if self.place is None:
             return None
+        if self.begin is not None:
+            return running_subset(self.begin, self.count, self.whole, self.seed)
         return consecutive_subset(
             self.place, self.count, self.radius, self.seed, self.whole
         )
@@ -135,12 +130,16 @@ class Sampling:
         """The samples that the frame takes."""
         return self.subset() or SampleSubset(self.own_seed, self.whole, 0, self.count)
 
-    def further(self, taken: int, length: int) -> SampleSubset:
-        """More samples of a frame that has `taken` some."""
-        first = replace(self, count=taken).first
-        if self.place is None:
-            return replace(first, offset=taken, length=length)
-        return further_subset(first, self.radius, length)
+    def further(
+        self, taken: int, length: int, begin: int | None = None
+    ) -> SampleSubset:
+        """More samples of a frame that has `taken` some of its own sequence.
+
+        With `begin` they are of one that all frames share, after so many taken of it.
+        """
+        if begin is not None:
+            return running_subset(begin, length, self.whole, self.seed + 1)
+        return SampleSubset(self.own_seed, self.whole, taken, length)
 
     @property
     def own_seed(self) -> int:
@@ -207,6 +206,7 @@ def sampling_of(
         seed=seed,
         geometry=geometry,
         place=place,
+        begin=settings.begin,
         radius=request.settings.temporal_radius,
         still=not facts.moving,
         has_halves=_has_halves(scene, request, settings.count(of_file)),

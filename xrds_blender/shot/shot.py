@@ -7,6 +7,7 @@ along with what they show, and the sum is denoised once and, above scale 1, enla
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from xrds_core.temporal.window import Shot, Window, place_of
@@ -60,12 +61,15 @@ def render_shot(
 
     if not cache:
         method.pace = pace_of(scene, request, shot)
-    for found in Window(shot, load):
+    window = Window(shot, load)
+    for found in window:
         number, own = found.number, found.own
         if is_done(number):  # another machine was quicker
             continue
         others = list(found.neighbours.values())
         own = _completed(scene, method, frames, own, others)
+        if own.views is not found.own.views:  # it lends what it has got as well
+            window.replace(number, replace(own, gathered={}))
         if method.lacks(own, others):
             own = _sample(scene, method, frames, number)
         pictures = {view: method.finish(own, others, view) for view in own.views}

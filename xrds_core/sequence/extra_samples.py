@@ -1,4 +1,7 @@
-"""Samples that a frame gets beside its own, after its neighbours' were accumulated."""
+"""Samples that a frame gets beside its own, after its neighbours' were accumulated.
+
+From then on they are the frame's own: it lends them as well.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..temporal.accumulate import accumulate
+from ..temporal.frame import pack, pack_counts
+from ..temporal.noise import brightness
+
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..arrays import Array
     from ..temporal.accumulate import Accumulated
+    from ..temporal.frame import Stored
 
 
 @dataclass(frozen=True)
@@ -17,7 +27,6 @@ class ExtraSamples:
     """Means over `samples` (H, W) more samples per pixel, 0 where there are none.
 
     `radiance`, `albedo` and `normal` (H, W, 3) and `alpha` (H, W) are as in `Frame`.
-    Beside them a neighbour's sample counts as `worth` of the frame's own.
     """
 
     radiance: Array
@@ -25,23 +34,61 @@ class ExtraSamples:
     normal: Array
     alpha: Array
     samples: Array
-    worth: float = 1.0
+
+
+def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
+    """Return the mean of several, weighted by their samples, which add up."""
+    total = np.sum([part.samples for part in parts], axis=0)
+    weights = [part.samples / np.maximum(total, np.float32(1e-9)) for part in parts]
+
+    def mean(name: str) -> Array:
+        values = [getattr(part, name) for part in parts]
+        wide = (...,) + (None,) * (values[0].ndim - 2)
+        pairs = zip(values, weights, strict=True)
+        return np.sum([x * w[wide] for x, w in pairs], axis=0)
+
+    return ExtraSamples(
+        mean("radiance"), mean("albedo"), mean("normal"), mean("alpha"), total
+    )
+
+
+def enriched(frame: Stored, extra: ExtraSamples) -> Stored:
+    """Return a frame whose own samples are extra ones as well."""
+    alone = accumulate(frame, [])
+    found = with_extra(alone, alone, extra)
+    passes = found.radiance, found.albedo, found.normal, found.alpha
+    picture, invalid = pack(*passes, frame.picture.dtype)
+    total = found.samples
+    is_even = bool((total == total.flat[0]).all())
+    noise = frame.noise
+    if noise is not None:
+        share = (alone.samples / np.maximum(total, 1e-9)).ravel()
+        noise = noise.within(share, brightness(extra.radiance).ravel())
+    return replace(
+        frame,
+        samples=max(float(total.mean()), 1e-9),
+        counts=None if is_even else pack_counts(total),
+        picture=picture,
+        invalid=invalid if invalid.any() else None,
+        noise=noise,
+    )
 
 
 def with_extra(
-    frame: Accumulated, alone: Accumulated, extra: ExtraSamples
+    frame: Accumulated, alone: Accumulated, extra: ExtraSamples, worth: float = 1.0
 ) -> Accumulated:
     """Return a frame with extra samples; itself where these are not finite.
 
-    `alone` is the frame without its neighbours.
+    `alone` is the frame without its neighbours, whose samples count as `worth` of its
+    own.
     """
     usable = np.isfinite(extra.alpha) & (extra.samples > 0.0)
     for part in (extra.radiance, extra.albedo, extra.normal):
         usable &= np.isfinite(part).all(axis=-1)
-    worth = np.float32(extra.worth)
+    neighbours = np.float32(worth)
     counts = (
-        frame.samples * worth,
-        alone.samples * (np.float32(1.0) - worth),
+        frame.samples * neighbours,
+        alone.samples * (np.float32(1.0) - neighbours),
         np.where(usable, extra.samples, np.float32(0.0)),
     )
     total = np.maximum(sum(counts), np.float32(1e-9))

@@ -10,7 +10,6 @@ import numpy as np
 
 from ..temporal.accumulate import Accumulated, accumulate
 from ..temporal.local_filters import box
-from .extra_samples import with_extra
 from .rectangles import rectangles
 from .same_picture import BLOCK, block_means
 
@@ -21,7 +20,6 @@ if TYPE_CHECKING:
     from ..denoising import Denoised, Denoiser
     from ..temporal.frame import Stored
     from ..temporal.vectors import Movement
-    from .extra_samples import ExtraSamples
     from .rectangles import Rectangle
 
 
@@ -65,7 +63,6 @@ def finish_frame(
     *,
     region: tuple[slice, slice] | None = None,
     accumulated: Accumulated | None = None,
-    extra: ExtraSamples | None = None,
 ) -> Finished:
     """Accumulate the samples of `neighbours` on a frame and denoise it.
 
@@ -74,19 +71,13 @@ def finish_frame(
     Where that is a small part of the picture, that part alone is denoised again.
     `region`, rows and columns, is the part to denoise: black around a crop would give
     the denoiser a wrong exposure. `accumulated` is the frame with its neighbours if it
-    is known already; `extra` are samples that it has beside its own. Raises Cancelled
-    if `progress` requests it.
+    is known already. Raises Cancelled if `progress` requests it.
     """
     started = time.perf_counter()
     if accumulated is None:
         accumulated = accumulate(own, neighbours, movement)
     alone = accumulate(own, []) if neighbours else accumulated
-    samples = own.samples
-    if extra is not None:
-        accumulated = with_extra(accumulated, alone, extra)
-        alone = with_extra(alone, alone, extra)
-        samples += float(extra.samples.mean())
-    share = _share(accumulated, alone, samples)
+    share = _share(accumulated, alone, own.samples)
     denoise_started = time.perf_counter()
     region = region or (slice(None), slice(None))
     share = share[region]

@@ -16,12 +16,10 @@ import numpy as np
 from ..temporal.accumulate import accumulate, sample_counts
 from ..temporal.frame import pack, pack_counts
 from ..temporal.half_floats import floats
-from ..temporal.noise import Noise
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from ..arrays import Array
     from ..temporal.frame import Stored
     from ..temporal.vectors import Movement
 
@@ -66,23 +64,14 @@ def extended(history: Stored | None, frame: Stored, movement: Movement) -> Store
     passes = found.radiance, found.albedo, found.normal, found.alpha
     picture, invalid = pack(*passes, frame.picture.dtype)
     share = np.where(total > 0.0, own / np.maximum(total, 1e-9), 1.0)
+    noise = frame.noise
+    if noise is not None and history.noise is not None:
+        noise = noise.within(share, floats(history.noise.brightness))
     return replace(
         frame,
         samples=max(float(counts.mean()), 1e-9),
         counts=pack_counts(counts),
         picture=picture,
         invalid=invalid if invalid.any() else None,
-        noise=_noise(history, frame, share),
+        noise=noise,
     )
-
-
-def _noise(history: Stored, frame: Stored, share: Array) -> Noise | None:
-    """Return the noise of a mean in which a frame's samples have a `share`."""
-    old, new = history.noise, frame.noise
-    if old is None or new is None:
-        return None
-    brightness, latest = (floats(x.brightness) for x in (old, new))
-    brightness = brightness + (latest - brightness) * share
-    root = np.sqrt(share)
-    parts = brightness, floats(new.difference) * root, floats(new.guides) * root
-    return Noise(*(x.astype(new.difference.dtype) for x in parts))

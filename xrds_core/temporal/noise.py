@@ -59,6 +59,21 @@ class Noise:
             self.brightness * valid, self.difference * valid, self.guides * valid
         )
 
+    def within(self, share: Array, others: Array) -> Noise:
+        """Return the noise of a mean in which these samples have a `share` (H W).
+
+        `others` (H W) is the brightness of the rest; NaN where there are none of them.
+        """
+        rest = np.nan_to_num(others, posinf=0.0, neginf=0.0)
+        old = self.brightness.astype(np.float32)
+        root = np.sqrt(share)
+        parts = (
+            rest + (old - rest) * share,
+            self.difference.astype(np.float32) * root,
+            self.guides.astype(np.float32) * root,
+        )
+        return Noise(*(_packed(x, self.difference.dtype) for x in parts))
+
 
 def brightness(radiance: Array) -> Array:
     """Return the square root of luminance (..., 3) -> (...).

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 _SEEDS = 2**31  # Cycles takes a signed 32-bit integer
+_LONG = 64  # frames
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,12 @@ def consecutive_subset(
     return SampleSubset(seed % _SEEDS, whole, samples * (place % frames), samples)
 
 
-def further_subset(own: SampleSubset, radius: int, length: int) -> SampleSubset:
-    """Return more samples for a frame that has a `consecutive_subset`.
+def running_subset(begin: int, samples: int, most: int, seed: int = 0) -> SampleSubset:
+    """Return the samples of a long sequence from `begin` on, the number taken so far.
 
-    They lie behind those of all frames within `radius`.
+    Frames that count samples on have none in common, however many each takes, up to
+    `most`; after as many as `_LONG` such frames take the sequence begins anew.
     """
-    frames = 2 * radius + 1
-    place = own.offset // own.length
-    offset = frames * own.length + place * (own.whole // frames - own.length)
-    return replace(own, offset=offset, length=length)
+    return SampleSubset(
+        seed % _SEEDS, most * (_LONG + 1), begin % (most * _LONG), samples
+    )

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from shots import World, camera, view
 
-from xrds_core.sequence.extra_samples import ExtraSamples, with_extra
+from xrds_core.sequence.extra_samples import ExtraSamples, enriched, with_extra
 from xrds_core.sequence.same_picture import (
     BLOCK,
     FALL,
@@ -116,8 +114,8 @@ def test_extra_samples_that_are_not_finite_are_left_out() -> None:
 def test_neighbours_count_by_their_worth_beside_extra_samples(worth: float) -> None:
     found, accumulated = frames(moved=False)
     alone = accumulate(found[1], [])
-    more = replace(extra(np.full(found[1].shape, 3.0, np.float32), 7.0), worth=worth)
-    result = with_extra(accumulated, alone, more)
+    more = extra(np.full(found[1].shape, 3.0, np.float32), 7.0)
+    result = with_extra(accumulated, alone, more, worth)
     assert result.albedo is not None
     counts = 1.0, worth * (accumulated.samples - 1.0), 3.0
     beside = accumulated.samples[..., None]
@@ -147,3 +145,28 @@ def test_counts_that_are_alike_say_nothing_of_it() -> None:
     truth = np.full((*SHAPE, 3), 0.5, np.float32)
     parts = [Rendered(noisy(truth, 0.2, i), noisy(truth, 0.05, 9)) for i in (1, 2)]
     assert error_fall(truth, 0.4, truth, (parts[0], parts[1])) == FALL
+
+
+def test_extra_samples_are_the_frames_own_from_then_on() -> None:
+    found, _ = frames()
+    frame, samples = found[1], np.zeros(found[1].shape, np.float32)
+    samples[:BLOCK] = 3.0
+    more = enriched(frame, extra(samples, 7.0))
+    assert more.counts is not None
+    counts = more.counts.reshape(frame.shape)
+    assert (counts[:BLOCK] == 4.0).all()
+    assert (counts[BLOCK:] == frame.samples).all()
+    assert more.samples == pytest.approx(counts.mean())
+    light, before = (x.picture[:, :3].reshape(*x.shape, 3) for x in (more, frame))
+    assert np.allclose(light[:BLOCK], before[:BLOCK] / 4 + 7.0 * 3 / 4, atol=1e-2)
+    assert np.array_equal(light[BLOCK:], before[BLOCK:])
+    assert more.noise is not None
+    assert frame.noise is not None
+    apart, earlier = (
+        np.abs(x.noise.difference.reshape(x.shape)) for x in (more, frame)
+    )
+    assert apart[:BLOCK].mean() == pytest.approx(earlier[:BLOCK].mean() / 2, rel=0.01)
+    assert np.array_equal(apart[BLOCK:], earlier[BLOCK:])
+    whole = enriched(frame, extra(np.full(frame.shape, 3.0, np.float32), 7.0))
+    assert whole.counts is None
+    assert whole.samples == 4.0

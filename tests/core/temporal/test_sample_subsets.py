@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import pytest
 
 from xrds_core.temporal.sample_subsets import (
     SampleSubset,
     consecutive_subset,
-    further_subset,
+    running_subset,
 )
 
 FRAMES = range(12)
@@ -33,15 +33,18 @@ def test_no_two_frames_that_meet_take_the_same(radius: int, seed: int) -> None:
         assert 0 <= part.seed < 2**31
 
 
-def test_further_samples_are_nobody_elses() -> None:
-    radius, most, few = 1, 16, 4
-    parts = [consecutive_subset(place, few, radius, 3, most) for place in range(3)]
-    more = [further_subset(part, radius, most - few) for part in parts]
-    assert {x.whole for x in (*parts, *more)} == {most * 3}
-    every = [taken(x) for x in (*parts, *more)]
-    assert len(set().union(*every)) == sum(map(len, every)) == most * 3
-    # those that all frames have lie side by side: together they are a sequence
-    assert set().union(*every[:3]) == {(3, n) for n in range(3 * few)}
+def test_frames_that_count_on_take_what_nobody_else_takes() -> None:
+    most, counts, begin, every = 16, [16, 3, 7, 1, 16, 2] * 12, 0, []
+    for count in counts:
+        every.append(running_subset(begin, count, most, seed=3))
+        begin += count
+    assert len(set().union(*map(taken, every))) == sum(counts)
+    assert len({(x.seed, x.whole) for x in every}) == 1
+    assert all(x.offset + x.length <= x.whole for x in every)
+    for one, two in pairwise(every):  # side by side: together they are a sequence
+        assert two.offset == one.offset + one.length
+    late = running_subset(1_000_000, most, most)
+    assert late.offset + late.length <= late.whole
 
 
 def test_a_still_camera_continues_one_sequence() -> None:
