@@ -185,7 +185,7 @@ class SamePicture:
     _measured_in: int = 0
     _tried: float = 1.0
     _ratio: float = 1.0
-    _shares: dict[int, float] = field(default_factory=dict)
+    _shares: dict[int, float] = field(default_factory=dict)  # that all pixels have
     _taken: int = 0  # of the sequence that frames continue under a still camera
     _taken_more: int = 0  # of that of more samples
 
@@ -226,12 +226,14 @@ class SamePicture:
         lacks = self._lacks(share, gained)
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
         self._choose_next(share, gained.of(rest), beside)
-        if not extra:
+        everywhere = bool(extra)
+        if not everywhere:
             shape = own.views[view].shape
             extra = self._top_up(shape, share, gained, lacks, spent.of(more))
         own = _with_more(own, extra, self._weight)
         share *= own.views[view].samples / before
-        self._shares[own.number] = share
+        if everywhere:
+            self._shares[own.number] = share
         return replace(
             own,
             seconds=spent.added_to(own.seconds),
