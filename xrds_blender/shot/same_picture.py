@@ -31,7 +31,6 @@ from xrds_core.sequence.same_picture import (
 )
 from xrds_core.sequence.worth import Ratio, Worth
 from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.half_floats import floats
 from xrds_core.temporal.sample_subsets import SampleSubset
 from xrds_core.temporal.vectors import Movement
 
@@ -301,11 +300,13 @@ class SamePicture:
         pair = parts[0], parts[1]
         together = method.finish(own, others, view).radiance
         alone = method.finish(replace(own, gathered={}), (), view).radiance
-        frame = own.views[view]
-        samples = floats(frame.picture[:, :3]).reshape(*frame.shape, 3)
+        # with the neighbours' samples: what may be wrong in them has nothing to do with
+        # what denoising takes, and the frame's own few are far noisier
+        noisy = own.gathered[view].radiance
+        assert noisy is not None
         share = self._shares.get(own.number, 1.0)
-        fall = error_fall(alone, share, samples, pair)
-        ratio = error_ratio(together, samples, pair, fall)
+        fall = error_fall(alone, share, noisy, pair)
+        ratio = error_ratio(together, noisy, pair, fall)
         return ratio, {v: mean_of([x[v] for x in halves]) for v in own.views}
 
     def _top_up(

@@ -52,33 +52,34 @@ class Rendered:
 
 
 def error_ratio(
-    picture: Array, own: Array, parts: tuple[Rendered, Rendered], fall: float = FALL
+    picture: Array, noisy: Array, parts: tuple[Rendered, Rendered], fall: float = FALL
 ) -> Ratio:
     """Return the squared error of a picture over that of a frame of all samples.
 
-    `parts` are half of all samples each, of seeds of their own; `picture` (H, W, 3) was
-    made without them, and of `own` samples among others. All are radiance. Errors count
-    relative to the local luminance, as they do to the eye. The ratio is infinite where
-    noise hides the error of all samples; errors fall with their number's power `fall`.
+    `parts` are half of all samples each, of seeds of their own; `picture` (H, W, 3) and
+    `noisy`, the mean of samples that the parts do not have either, were made without
+    them. All are radiance. Errors count relative to the local luminance, as they do to
+    the eye. The ratio is infinite where noise hides the error of all samples; errors
+    fall with their number's power `fall`.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
-        ours, half = _errors(picture, own, parts)
+        ours, half = _errors(picture, noisy, parts)
         return Ratio(*_ratio(ours, half * 0.5**fall), fall)
 
 
 def error_fall(
-    alone: Array, share: float, own: Array, parts: tuple[Rendered, Rendered]
+    alone: Array, share: float, noisy: Array, parts: tuple[Rendered, Rendered]
 ) -> float:
     """Return the power of the samples with which errors fall, up to all of them.
 
-    `alone` (H, W, 3) is a picture of `own` samples, a `share` of all, by themselves;
+    `alone` (H, W, 3) is a picture of a `share` of all, by themselves; `noisy` and
     `parts` are as in `error_ratio`. Where they tell nothing it is `FALL`.
     """
     apart = 0.5 / share
     if apart < _APART:
         return FALL
     with np.errstate(over="ignore", invalid="ignore"):
-        ratio, _ = _ratio(*_errors(alone, own, parts))
+        ratio, _ = _ratio(*_errors(alone, noisy, parts))
     if not 0.0 < ratio < float("inf"):
         return FALL
     fall = _SLOWER * np.log(ratio) / np.log(apart)
@@ -86,7 +87,7 @@ def error_fall(
 
 
 def _errors(
-    picture: Array, own: Array, parts: tuple[Rendered, Rendered]
+    picture: Array, noisy: Array, parts: tuple[Rendered, Rendered]
 ) -> tuple[Array, Array]:
     """Return the errors of the picture and of half of all samples, by blocks."""
     one, two = parts
@@ -103,18 +104,19 @@ def _errors(
 
     noise = product(one.noisy - two.noisy, one.noisy - two.noisy)
     kept = noise <= np.quantile(noise, 1.0 - _NOISIEST)
-    half = error(one.denoised, two.noisy, own) + error(two.denoised, one.noisy, own)
+    half = error(one.denoised, two.noisy, noisy) + error(two.denoised, one.noisy, noisy)
     ours = error(picture, one.noisy, two.noisy)
     return ours[kept], 0.5 * half[kept]
 
 
 def _ratio(one: Array, two: Array) -> tuple[float, float]:
     """Return the ratio of two sums over blocks, and its standard error."""
-    sums = float(one.sum()), float(two.sum())
-    if sums[1] <= 2.0 * _spread(two):
+    whole = float(two.sum())
+    if whole <= 2.0 * _spread(two):
         return float("inf"), 0.0
-    spread = np.hypot(_spread(one), sums[0] / sums[1] * _spread(two)) / sums[1]
-    return max(sums[0], 0.0) / sums[1], float(spread)
+    ratio = max(float(one.sum()), 0.0) / whole
+    # blocks that are hard to render are so both ways: what is left counts
+    return ratio, _spread(one - ratio * two) / whole
 
 
 def _spread(errors: Array) -> float:
