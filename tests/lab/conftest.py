@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -54,6 +55,17 @@ def write_window() -> WriteWindow:
         np.savez_compressed(path, meta=json.dumps(meta), **half_floats)
 
     return write
+
+
+@pytest.fixture
+def blend(tmp_path: Path, still_life: Callable[..., Any]) -> Path:
+    """A file of a few cubes, to make shots of."""
+    import bpy
+
+    still_life()
+    path = tmp_path / "cubes.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
 
 
 @pytest.fixture

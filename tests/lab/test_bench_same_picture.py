@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import bpy
 import pytest
 
 from xrds_core.errors import UsageError
@@ -14,14 +12,6 @@ from xrds_lab.shots import sooner
 from xrds_lab.shots.sooner import CYCLES, SAME_PICTURE, SAME_SAMPLES, Case
 
 SIZE = (64, 48)
-
-
-@pytest.fixture
-def blend(tmp_path: Path, still_life: Callable[..., Any]) -> Path:
-    still_life()
-    path = tmp_path / "cubes.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
 
 
 def run(blend: Path, *cases: Case, frames: int = sooner.FRAMES) -> dict[str, Any]:

@@ -30,14 +30,6 @@ SIZE = (48, 36)
 WINDOW = Window(*SIZE, 0, 0, *SIZE)
 
 
-@pytest.fixture
-def blend(tmp_path: Path, still_life: Callable[..., Any]) -> Path:
-    still_life()
-    path = tmp_path / "cubes.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path))
-    return path
-
-
 def run(blend: Path, out: str = "out", **more: Any) -> dict[str, Any]:
     choices = {"motions": ("pan",), "radii": (0, 1), "pair_samples": 4} | more
     return bench_shots(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import statistics
 from collections.abc import Iterator, Sequence
 from html import escape
@@ -11,6 +10,7 @@ from typing import Any
 
 from xrds_core.atomic import replacing, write_json
 
+from ..csv_table import write_table
 from .judge import BLOCK, LOSS, SHARE, WORST_LOSS
 from .table import HALVES, SHOTS
 
@@ -53,7 +53,8 @@ def write(out: Path, results: dict[str, Any]) -> None:
     """Write results.json, results.csv and report.html into a folder."""
     bare = results | {"shots": [_without_crops(p) for p in results["shots"]]}
     write_json(out / RESULTS, bare)
-    _write_table(out / "results.csv", results["shots"])
+    rows = [{name: p.get(name) for name in _COLUMNS} for p in results["shots"]]
+    write_table(out / "results.csv", rows)
     with replacing(out / "report.html") as part:
         part.write_text(page(results), "utf-8")
 
@@ -64,16 +65,6 @@ def _without_crops(point: Point) -> Point:
         for frame in point["frames"]
     ]
     return point | {"frames": frames}
-
-
-def _write_table(path: Path, points: Sequence[Point]) -> None:
-    with (
-        replacing(path) as part,
-        part.open("w", newline="", encoding="utf-8") as file,
-    ):
-        writer = csv.DictWriter(file, list(_COLUMNS), extrasaction="ignore")
-        writer.writeheader()
-        writer.writerows(points)
 
 
 def page(results: dict[str, Any]) -> str:
