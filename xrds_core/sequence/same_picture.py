@@ -40,6 +40,9 @@ _APART = 1.5
 _NOISIEST = 0.01
 _DARKEST = 0.02  # of the mean luminance; darker pixels count as if they were as bright
 _SMOOTH = 7  # pixels across
+# Standard deviation of noise that nobody sees, of the square root of luminance and
+# relative to it: 0.2 % of the light.
+_UNSEEN = 1e-3
 _TINY = 1e-12
 
 
@@ -129,18 +132,17 @@ class Gain:
     """What neighbours bring to a frame, by blocks.
 
     `errors` are what is left of each block's error, 1 where they bring nothing;
-    `noise` is the noise of its own samples.
+    `noise` is the noise of its own samples, and `seen` whether it is ever visible.
     """
 
     errors: Array
     noise: Array
+    seen: NDArray[np.bool_]
 
     @property
     def blocks(self) -> Array:
         """How many times its own samples a block is worth; infinite without noise."""
-        with np.errstate(divide="ignore"):
-            worth = self.errors ** (-1.0 / FALL)
-        return np.where(self.noise > 2.0 * _TINY, worth, np.inf)
+        return np.where(self.seen, self.errors ** (-1.0 / FALL), np.inf)
 
     def of(self, blocks: NDArray[np.bool_]) -> float:
         """How many times their own samples some blocks are worth together."""
@@ -159,7 +161,9 @@ def gain(accumulated: Accumulated, own: Stored) -> Gain:
     alone = sample_counts(own, slice(None), noise.size).reshape(own.shape)
     share = np.clip(alone / np.maximum(accumulated.samples, _TINY), 0.0, 1.0)
     weights, weighted = block_means(noise), block_means(noise * share**FALL)
-    return Gain(np.maximum(weighted / weights, _TINY), weights)
+    light = np.square(floats(own.noise.brightness)).reshape(own.shape)
+    seen = weights > np.maximum(_UNSEEN**2 * block_means(light), 2.0 * _TINY)
+    return Gain(np.maximum(weighted / weights, _TINY), weights, seen)
 
 
 def block_means(plane: Array, size: int = BLOCK) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -75,6 +77,20 @@ def test_what_neighbours_bring_is_counted() -> None:
     alone = gain(accumulate(found[1], []), found[1])
     assert alone.of(everywhere) == pytest.approx(1.0)
     assert np.allclose(alone.blocks[np.isfinite(alone.blocks)], 1.0)
+
+
+def test_blocks_whose_noise_nobody_sees_lack_nothing() -> None:
+    found, _ = frames(moved=False)
+    noise = found[1].noise
+    assert noise is not None
+    root = noise.brightness.astype(np.float32).reshape(found[1].shape)
+    apart = root * np.float32(0.01)
+    apart[: BLOCK + 4] = root[: BLOCK + 4] * np.float32(0.0005)  # noise is smoothed
+    noise = replace(noise, difference=apart.ravel().astype(noise.difference.dtype))
+    own = replace(found[1], noise=noise)
+    blocks = gain(accumulate(own, []), own).blocks
+    assert np.isinf(blocks[0]).all()
+    assert np.allclose(blocks[1:], 1.0)
 
 
 def extra(samples: Array, value: float) -> ExtraSamples:
