@@ -7,7 +7,9 @@ from typing import Any
 
 import pytest
 
+from xrds_blender.command import main
 from xrds_core.errors import UsageError
+from xrds_lab.bench.windows import find_shots
 from xrds_lab.shots import sooner
 from xrds_lab.shots.sooner import CYCLES, SAME_PICTURE, SAME_SAMPLES, Case
 
@@ -52,3 +54,19 @@ def test_each_method_has_a_row_that_is_measured_once(
 def test_a_shot_that_is_too_short_is_refused(blend: Path) -> None:
     with pytest.raises(UsageError, match="8 frames"):
         run(blend, Case("pan", 8), frames=8)
+
+
+def test_a_file_may_move_as_it_says(blend: Path) -> None:
+    (shot,) = find_shots([blend], None, None, SIZE)
+    ends = [
+        (scene.frame_start, scene.frame_end, scene.camera.animation_data is None)
+        for scene in (
+            sooner._opened(shot, Case(motion, 8), 8) for motion in (sooner.FILE, "pan")
+        )
+    ]
+    assert ends == [(1, 250, True), (1, 17, False)]
+
+
+def test_other_measures_refuse_it(blend: Path, tmp_path: Path) -> None:
+    given = ["bench", str(blend), "--shots", "--motions", "file", "-o", str(tmp_path)]
+    assert main.main(given) == 2

@@ -14,6 +14,7 @@ from xrds_core.errors import UsageError, XRDSError
 from ..progress import report_line
 
 MOTIONS = ("pan", "fast", "still", "objects", "both")
+FILE = "file"
 GALLERY_HALVES = ("choosing", "judging")
 STABILITY = ("arrays", "large", "scenes", "shots", "load", "accumulation")
 
@@ -238,8 +239,9 @@ def _add_shots(group: Any) -> None:
     add("--shots", action="store_true", help="make a shot of each scene and measure it")
     add(
         "--motions",
-        type=arguments.names(MOTIONS),
-        help=f"of {', '.join(MOTIONS)}; all, pan with --same-picture",
+        type=arguments.names((*MOTIONS, FILE)),
+        help=f"of {', '.join(MOTIONS)}; all, with --same-picture pan, or {FILE}: "
+        "the file's own around its current frame",
     )
     add(
         "--samples",
@@ -359,11 +361,14 @@ def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
 def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
     from ..shots.bench import Measure, bench_shots
 
+    motions = options.motions or MOTIONS
+    if FILE in motions:
+        raise UsageError(f"--motions {FILE} is measured by --same-picture alone")
     return bench_shots(
         options.scenes,
         options.out,
         Measure(
-            options.motions or MOTIONS,
+            motions,
             options.samples or (2,),
             options.radii,
             options.pair_samples,

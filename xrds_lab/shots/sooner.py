@@ -1,8 +1,9 @@
 """`xrds bench --same-picture`: in how many seconds the picture of a file's settings.
 
-Each scene is made a shot. Cycles + OIDN renders frames of it with all samples, XRDS the
-whole shot with as few as it chooses, and nine frames with all. Seconds are wall clock,
-so a quiet machine is needed; the three take turns within a case, never at once.
+Each scene is made a shot, or moves as its file says. Cycles + OIDN renders frames of it
+with all samples, XRDS the whole shot with as few as it chooses, and nine frames with
+all. Seconds are wall clock, so a quiet machine is needed; the three take turns within a
+case, never at once.
 """
 
 from __future__ import annotations
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
     Row = dict[str, Any]
 
 SAMPLES = (16, 64, 256)
+FILE = "file"
+"""The motion of the file itself, around its current frame."""
 FRAMES = 17
 """Frames of a shot: from 16 on it may have fewer samples."""
 MOST_SAMPLES = 4096
@@ -185,7 +188,8 @@ def _opened(shot: Shot, case: Case, reach: int) -> Any:
     scene.cycles.samples = case.samples
     if case.noise_threshold is not None:
         sample_adaptively(scene, case.samples, case.noise_threshold)
-    animate(scene, shot.window, case.motion, MIDDLE, reach)
+    if case.motion != FILE:
+        animate(scene, shot.window, case.motion, MIDDLE, reach)
     scene.render.use_persistent_data = True  # for all three: one sync of the scene
     return scene
 
@@ -196,12 +200,13 @@ def _cycles(shot: Shot, case: Case, frames: int) -> Made:
 
     scene = _opened(shot, case, frames // 2)
     seconds, radiance = [], np.empty(0)
-    for number in range(MIDDLE - _TIMED // 2, MIDDLE + _TIMED // 2 + 1):
+    middle = scene.frame_current
+    for number in range(middle - _TIMED // 2, middle + _TIMED // 2 + 1):
         scene.frame_set(number)
         started = time.perf_counter()
         picture = render(scene, plain=True, denoiser=DEFAULT_DENOISING)
         seconds.append(time.perf_counter() - started)
-        if number == MIDDLE:
+        if number == middle:
             radiance = np.asarray(picture.radiance, np.float32)
     return Made(radiance, statistics.median(seconds), _stops(scene))
 
@@ -222,14 +227,15 @@ def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
 
     reach = frames // 2
     scene = _opened(shot, case, reach)
-    numbers = range(MIDDLE - reach, MIDDLE + reach + 1)
+    middle = scene.frame_current
+    numbers = range(middle - reach, middle + reach + 1)
     job = render_request(scale=1, temporal_radius=REACH, **choices)
     radiance, shares = np.empty(0), []
     started = time.perf_counter()
     for number, picture in render_shot(scene, job, numbers):
         assert picture.settings is not None
         shares.append(float(picture.settings.share))
-        if number == MIDDLE:
+        if number == middle:
             radiance = np.asarray(picture.radiance, np.float32)
     seconds = (time.perf_counter() - started) / len(numbers)
     return Made(radiance, seconds, _stops(scene), tuple(shares))
