@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -29,7 +29,7 @@ from .similarity import MARGIN, GuideSimilarity, Similarity, light_for_albedo
 from .vectors import Movement
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -55,7 +55,7 @@ class Accumulated:
 
     `radiance` (None of guides alone), `albedo`, `normal` (in this frame's axes) and
     `alpha` (or None) are means over `samples` (H, W) samples per pixel, NaN where no
-    frame has any.
+    frame has any. So are `parts` of the radiance, by name.
     `rejected` is the share of the neighbours' samples that were left out: of pixels
     that a neighbour does not show, or shows in other light. `frames` are the numbers of
     the frames that were considered, the frame itself included: those of its shot,
@@ -69,6 +69,7 @@ class Accumulated:
     samples: Array
     rejected: float
     frames: tuple[int, ...]
+    parts: Mapping[str, Array] = field(default_factory=dict)
 
 
 def accumulate(
@@ -92,6 +93,7 @@ def accumulate(
     pairs = [x.pair for x in reprojected if x.is_reused]
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
+    parts = np.empty((height * width, 3 * len(target.part_names)), np.float32)
     samples = np.empty(height * width, np.float32)
 
     def work(first: int) -> float:
@@ -99,14 +101,15 @@ def accumulate(
         groups = [_block_sums(block, group) for group in (near, far) if group]
         for group in groups:
             group.finish()
-        means[block.pixels], samples[block.pixels] = _means(target, block, groups)
+        found = _means(target, block, groups)
+        means[block.pixels], parts[block.pixels], samples[block.pixels] = found
         return float(sum(group.reused.sum(dtype=np.float64) for group in groups))
 
     reused = sum(_in_threads(work, range(0, height, _ROWS), threads))
     requested = sum(x.samples for x in others) * height * width
     rejected = 1.0 - reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(x.number for x in others)}))
-    return _unpacked(target, means, samples, rejected, frames)
+    return _unpacked(target, means, parts, samples, rejected, frames)
 
 
 def _neighbours(
@@ -159,6 +162,7 @@ class _Block:
         start = self.pixels.start - first * width
         self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
         self.own = floats(target.picture[self.wide.pixels])
+        self.parts = parts_of(target, self.wide.pixels)
         self.images = None if images is None else images.of(self.wide)
         self.void = self._void()
         self.known = np.ones(len(self.own), bool)
@@ -196,19 +200,24 @@ def _similarity(target: Stored, block: _Block, usual: float) -> Similarity:
 class _Sums:
     """The samples of some neighbours, summed over the rows of a block and its margin.
 
-    `values` (n, C) and `brightness` (n,) are weighted sums, `weights` (n,) the sums of
-    weights, `reused` (n,) the numbers of samples.
+    `values` (n, C), `parts` (n, 3 P) and `brightness` (n,) are weighted sums, `weights`
+    (n,) the sums of weights, `reused` (n,) the numbers of samples.
     """
 
     def __init__(self, block: _Block) -> None:
         self.block = block
-        self.values = np.zeros_like(block.own)
+        self.values, self.parts = np.zeros_like(block.own), np.zeros_like(block.parts)
         self.weights, self.reused, self.brightness = np.zeros(
             (3, len(block.own)), np.float32
         )
 
     def add(
-        self, values: Array, weight: Array, reused: Array, noise: tuple[Array, ...]
+        self,
+        values: Array,
+        parts: Array,
+        weight: Array,
+        reused: Array,
+        noise: tuple[Array, ...],
     ) -> None:
         """Add those of one neighbour; `noise` is as `_noise` returns it."""
         if self.block.similarity is not None:
@@ -216,6 +225,8 @@ class _Sums:
             self.block.similarity.add(*map(self.block.shaped, (values, *noise, weight)))
         values *= weight[:, None]
         self.values += values
+        parts *= weight[:, None]
+        self.parts += parts
         self.weights += weight
         self.reused += reused
 
@@ -235,11 +246,12 @@ class _Sums:
         if block.void is not None:
             self._scale((~block.void).astype(np.float32))
         inner = block.inner
-        self.values, self.weights = self.values[inner], self.weights[inner]
-        self.reused = self.reused[inner]
+        self.values, self.parts = self.values[inner], self.parts[inner]
+        self.weights, self.reused = self.weights[inner], self.reused[inner]
 
     def _scale(self, factor: Array) -> None:
         self.values *= factor[:, None]
+        self.parts *= factor[:, None]
         self.weights *= factor
         self.reused *= factor
 
@@ -276,7 +288,8 @@ class _Aligned:
             weight[other.invalid[pixels]] = 0.0
         # a copy: NumPy's own float32 pictures are not to be changed
         values = floats(other.picture[pixels]).copy()
-        sums.add(values, weight, weight, _noise(other, pixels, block))
+        parts = parts_of(other, pixels).copy()
+        sums.add(values, parts, weight, weight, _noise(other, pixels, block))
 
 
 class _Reprojected:
@@ -284,10 +297,14 @@ class _Reprojected:
 
     def __init__(self, pair: Pair) -> None:
         target, other = pair.here, pair.there
-        if other.picture.shape[1] != target.picture.shape[1]:
+        if (other.picture.shape[1], other.part_names) != (
+            target.picture.shape[1],
+            target.part_names,
+        ):
             raise PictureError(
                 f"frame {other.number} and frame {target.number} hold different passes:"
-                " give radiance and alpha for all frames of a shot or for none"
+                " give radiance, its parts and alpha for all frames of a shot or for "
+                "none"
             )
         self._tiles = tile_weights(pair)
         self.pair = pair
@@ -319,7 +336,16 @@ class _Reprojected:
         weight *= sample_counts(other, found.pixel, len(weight))
         reused = weight.copy()
         weight *= np.exp(found.apart * self._fall)
-        sums.add(values, weight, reused, _noise(other, found.pixel, block))
+        parts = parts_of(other, found.pixel)
+        sums.add(values, parts, weight, reused, _noise(other, found.pixel, block))
+
+
+def parts_of(frame: Stored, pixels: slice | NDArray[np.integer]) -> Array:
+    """Return the parts of flat pixels (n, 3 P) of a frame; P is 0 where it has none."""
+    if frame.parts is not None:
+        return floats(frame.parts[pixels])
+    count = pixels.stop - pixels.start if isinstance(pixels, slice) else len(pixels)
+    return np.empty((count, 0), np.float32)
 
 
 def sample_counts(
@@ -333,37 +359,48 @@ def sample_counts(
 
 def _means(
     target: Stored, block: _Block, groups: Sequence[_Sums]
-) -> tuple[Array, Array]:
-    """Return the means of the target's own and the reused samples, and their number."""
-    own = block.own[block.inner]
+) -> tuple[Array, Array, Array]:
+    """Return means of the target's own and the reused samples, of the picture and of
+    its parts, and the number of samples.
+    """
+    own, parts = block.own[block.inner], block.parts[block.inner]
     samples = sample_counts(target, block.pixels, len(own))
     if target.invalid is not None:
         samples[target.invalid[block.pixels]] = 0.0
     if not groups:
-        return np.where(samples[:, None] > 0.0, own, np.float32(np.nan)), samples
-    sums = np.sum([group.values for group in groups], axis=0)
+        has_samples = samples[:, None] > 0.0
+        nothing = np.float32(np.nan)
+        return (
+            np.where(has_samples, own, nothing),
+            np.where(has_samples, parts, nothing),
+            samples,
+        )
     weights = np.sum([group.weights for group in groups], axis=0)
     total = samples + weights
-    sums -= own * weights[:, None]
-    with np.errstate(invalid="ignore"):  # NaN where no frame has samples
-        sums /= total[:, None]
-    # in this form nothing is rounded where nothing is reused
-    return own + sums, total
+
+    def mean(own: Array, sums: Array) -> Array:
+        sums -= own * weights[:, None]
+        with np.errstate(invalid="ignore"):  # NaN where no frame has samples
+            sums /= total[:, None]
+        # in this form nothing is rounded where nothing is reused
+        return own + sums
+
+    picture = mean(own, np.sum([group.values for group in groups], axis=0))
+    return picture, mean(parts, np.sum([x.parts for x in groups], axis=0)), total
 
 
 def _unpacked(
     target: Stored,
     means: Array,
+    light_parts: Array,
     samples: Array,
     rejected: float,
     frames: tuple[int, ...],
 ) -> Accumulated:
-    parts = [
-        np.ascontiguousarray(x).reshape(*target.shape, -1)
-        for x in np.split(means, range(3, means.shape[1], 3), axis=1)
-    ]
-    alpha = parts.pop()[..., 0] if means.shape[1] % 3 else None
-    *radiance, albedo, normal = parts
+    passes = _planes(target, means)
+    alpha = passes.pop()[..., 0] if means.shape[1] % 3 else None
+    *radiance, albedo, normal = passes
+    named = zip(target.part_names, _planes(target, light_parts), strict=True)
     return Accumulated(
         radiance[0] if radiance else None,
         albedo,
@@ -372,7 +409,17 @@ def _unpacked(
         samples.reshape(target.shape),
         rejected,
         frames,
+        dict(named),
     )
+
+
+def _planes(target: Stored, values: Array) -> list[Array]:
+    """Split (H W, C) into (H, W, 3), the last one narrower where C is no multiple."""
+    places = (slice(first, first + 3) for first in range(0, values.shape[1], 3))
+    return [
+        np.ascontiguousarray(values[:, place]).reshape(*target.shape, -1)
+        for place in places
+    ]
 
 
 def _in_threads(

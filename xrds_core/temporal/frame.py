@@ -8,7 +8,7 @@ lies at (0.5, 0.5); y grows downwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,8 @@ from .local_filters import extreme
 from .noise import Noise, noise_of
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
     from numpy.typing import DTypeLike, NDArray
 
     from ..arrays import Array
@@ -150,10 +152,13 @@ class Frame:
     counts: Array | None = None
     halves: Halves | None = None
     path_length: Array | None = None
+    parts: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        for name, channels in (_PASSES | _OPTIONAL).items():
-            array = getattr(self, name)
+        shapes = _PASSES | _OPTIONAL
+        arrays = [(name, getattr(self, name), shapes[name]) for name in shapes]
+        arrays += [(name, part, (3,)) for name, part in self.parts.items()]
+        for name, array, channels in arrays:
             if array is not None and array.shape != self.shape + channels:
                 raise PictureError(
                     f"{name} of frame {self.number} has shape {array.shape} where its "
@@ -183,7 +188,8 @@ class Stored:
     infinities and are 0 now; None if there were none. `counts` (H W): samples of each
     pixel where they differ. `noise` is that of `noise_in`, None in a frame of guides
     alone. `image` (H W) is as `inverse_depth`, of the image that a mirror or glass
-    shows, NaN where there is none; None if there is none anywhere.
+    shows, NaN where there is none; None if there is none anywhere. `parts` (H W, 3 P)
+    are light that the radiance is made of, in the order of `part_names`.
     """
 
     number: int
@@ -198,6 +204,8 @@ class Stored:
     counts: NDArray[Any] | None = None
     noise: Noise | None = None
     image: Array | None = None
+    parts: NDArray[Any] | None = None
+    part_names: tuple[str, ...] = ()
 
     @property
     def has_light(self) -> bool:
@@ -239,6 +247,11 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
     """
     passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
     picture, invalid = pack(*passes, dtype)
+    parts = None
+    if frame.parts:
+        parts, bad = packed([*frame.parts.values()], dtype)
+        invalid |= bad
+        picture[invalid] = parts[invalid] = 0.0
     noise = None if frame.radiance is None else noise_in(frame, dtype)
     return Stored(
         number=frame.number,
@@ -253,6 +266,8 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         counts=None if frame.counts is None else pack_counts(frame.counts),
         noise=None if noise is None else noise.without(invalid),
         image=_image(frame),
+        parts=parts,
+        part_names=tuple(frame.parts),
     )
 
 
@@ -269,7 +284,17 @@ def pack(
         parts.insert(0, radiance)
     if alpha is not None:
         parts.append(alpha[..., None])
-    picture = np.concatenate(parts, axis=-1, dtype=np.float32)
+    return packed(parts, dtype)
+
+
+def packed(
+    passes: Sequence[Array], dtype: DTypeLike
+) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return passes (H, W, C) side by side, flat, and their invalid pixels (H W).
+
+    These are 0 in all.
+    """
+    picture = np.concatenate(passes, axis=-1, dtype=np.float32)
     picture = picture.reshape(-1, picture.shape[-1])
     invalid = ~np.isfinite(picture).all(axis=-1)
     picture[invalid] = 0.0

@@ -47,6 +47,8 @@ def reprojected_placeholder(
         shape=first.shape,
         samples=first.samples,
         picture=np.zeros_like(first.picture),
+        parts=None if first.parts is None else np.zeros_like(first.parts),
+        part_names=first.part_names,
         inverse_depth=np.where(np.isnan(near), around, near).astype(np.float32),
         invalid=empty,
         noise=None if first.noise is None else first.noise.without(empty),

@@ -1,0 +1,77 @@
+"""Parts of the light go the way that the whole goes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shots import World, camera, view
+
+from xrds_core.errors import PictureError
+from xrds_core.temporal.accumulate import Accumulated, accumulate
+from xrds_core.temporal.frame import Frame, Stored, store
+
+
+def in_parts(number: int, x: float, **parts: float) -> Frame:
+    """A frame; each part has the given share of the light, and noise of its own."""
+    world = World(card=(0.05 * number, 0.1))
+    frame = view(number, camera(x), world, noise=0.3).frame
+    light = frame.radiance
+    assert light is not None
+    return replace(frame, parts={k: light * np.float32(v) for k, v in parts.items()})
+
+
+def shot(**parts: float) -> list[Stored]:
+    return [store(in_parts(n, 0.2 * n, **parts)) for n in range(5)]
+
+
+def gathered(frames: list[Stored]) -> Accumulated:
+    return accumulate(frames[2], frames[:2] + frames[3:])
+
+
+def test_parts_add_up_to_the_whole() -> None:
+    found = gathered(shot(lamp=0.25, sky=0.75))
+    assert list(found.parts) == ["lamp", "sky"]
+    assert found.samples.mean() > 2.0
+    light = found.radiance
+    assert np.allclose(found.parts["lamp"] + found.parts["sky"], light, atol=1e-5)
+    assert np.allclose(found.parts["lamp"], 0.25 * light, atol=1e-5)
+
+
+def test_the_whole_is_the_same_with_and_without_parts() -> None:
+    found, plain = gathered(shot(lamp=0.25, sky=0.75)), gathered(shot())
+    assert plain.parts == {}
+    assert np.array_equal(found.radiance, plain.radiance)
+    assert np.array_equal(found.samples, plain.samples)
+
+
+def test_a_frame_alone_has_its_own_parts_to_the_bit() -> None:
+    frame = in_parts(0, 0.0, lamp=0.4)
+    found = accumulate(store(frame), [])
+    assert np.array_equal(found.parts["lamp"], frame.parts["lamp"])
+
+
+def test_bad_pixels_of_a_part_lend_nothing() -> None:
+    frames = [in_parts(n, 0.0, lamp=0.4) for n in range(3)]
+    bad = frames[0].parts["lamp"].copy()
+    bad[5, 6] = np.nan
+    frames[0] = replace(frames[0], parts={"lamp": bad})
+    one, *others = (store(frame) for frame in frames)
+    assert np.isfinite(accumulate(one, others).parts["lamp"]).all()
+    lent = accumulate(others[0], [one, *others[1:]])
+    assert lent.samples[5, 6] == 2.0
+    assert np.isfinite(lent.parts["lamp"]).all()
+
+
+def test_frames_of_other_parts_are_refused() -> None:
+    frames = shot(lamp=0.4)
+    frames[1] = replace(frames[1], part_names=("sky",))
+    with pytest.raises(PictureError, match="different passes"):
+        gathered(frames)
+
+
+def test_parts_have_the_size_of_the_frame() -> None:
+    frame = in_parts(0, 0.0)
+    with pytest.raises(PictureError, match=r"lamp of frame 0 has shape \(2, 2, 3\)"):
+        replace(frame, parts={"lamp": np.zeros((2, 2, 3), np.float32)})
