@@ -50,6 +50,27 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         help="files with as many other samples of each frame; #### is its number: no "
         "neighbour that shows something else is believed then",
     )
+    add(
+        "--passes",
+        type=arguments.words,
+        default=("none",),
+        metavar="all",
+        help="parts of the light that are denoised as well, and add up to the picture: "
+        "none, groups (light groups), all, or names, as Emission,key (default: none)",
+    )
+    add(
+        "--light-aovs",
+        type=arguments.words,
+        default=(),
+        metavar="NAMES",
+        help="further passes of light, which add up to nothing",
+    )
+    add(
+        "--passes-from",
+        type=Path,
+        metavar="FILE.toml",
+        help="how a renderer calls the parts of its light, where it is not known",
+    )
     add("--resume", action="store_true", help="skip frames whose files are complete")
     add(
         "--picture-only",
@@ -106,6 +127,8 @@ _PASS_HELP = {
 def _denoise(options: argparse.Namespace) -> dict[str, Any]:
     from xrds_core.denoising import Denoiser
     from xrds_core.exr import limits
+    from xrds_core.light_parts.find import Wanted
+    from xrds_core.light_parts.table import read_renderers
     from xrds_core.sequence.cameras import read_cameras
     from xrds_core.sequence.denoise import Files, denoise_sequence
     from xrds_core.sequence.reading import Reading
@@ -119,6 +142,9 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
         position_space=options.position_space,
         motion_scale=options.motion_scale or (1.0, 1.0),
         halves=options.halves,
+        light=Wanted(
+            options.passes, options.light_aovs, read_renderers(options.passes_from)
+        ),
     )
     denoiser = Denoiser(
         options.denoise, options.device, memory_limit=options.memory_limit

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import atexit
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 from weakref import WeakSet
 
 import numpy as np
@@ -21,6 +21,8 @@ from .input_images import check, sample
 from .stages import Stages
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from ..arrays import Array
@@ -56,6 +58,28 @@ _RANGE = {"albedo": (0.0, 1.0), "normal": (-1.0, 1.0)}  # beyond which OIDN sees
 
 # Of each stage; only their ratios count.
 _SECONDS = {_SMALL: 0.4, _LARGE: 0.8, "picture": 1.0, "second picture": 1.0}
+
+
+class _ForParts(NamedTuple):
+    """A network for parts, its seconds as above, and for how many parts it may be used:
+    all together take at most twice the seconds of the picture and its guides.
+    """
+
+    network: str
+    seconds: float
+    most: float
+
+    @property
+    def use(self) -> str:
+        """What its filter is called."""
+        return f"part, {self.network}"
+
+
+_FOR_PARTS = (
+    _ForParts("High", 1.0, 3),
+    _ForParts("Balanced", 0.45, 8),
+    _ForParts("Fast", 0.25, float("inf")),
+)
 _WITH_PREFILTER = ("best", "high", "medium")
 _NO_ALBEDO = 0.5  # what Cycles gives with a normal alone: OIDN wants both
 _MOST_MEBIBYTES = 2**31 - 1  # the library counts them in 32 bits
@@ -81,6 +105,8 @@ class Denoised:
     """Pixels of the inputs that held NaN, infinities, overflows or negative light."""
     prefiltered: tuple[str, ...]
     """The guides that were denoised first: of `albedo` and `normal`."""
+    parts: Mapping[str, Array] = field(default_factory=dict)
+    """Those that were given, by name: (H, W, 3)."""
 
 
 class Denoiser:
@@ -140,6 +166,7 @@ class Denoiser:
         albedo: Array | None = None,
         normal: Array | None = None,
         *,
+        parts: Mapping[str, Array] | None = None,
         hdr: bool = True,
         guides_are_clean: bool | None = None,
         progress: Callback | None = None,
@@ -151,6 +178,9 @@ class Denoiser:
                 not be correlated between pixels, as interpolation makes it.
             albedo: (H, W, 3); values above 1, as of lamps, count as 1, as in Blender.
             normal: (H, W, 3), means of unit vectors of any space, 0 where nothing is.
+            parts: (H, W, 3) by name, light that radiance is made of. Each is denoised
+                by itself with the same guides, in a smaller network where they are
+                many; one without light costs nothing.
             hdr: False for values in [0, 1] that are shown as they are.
             guides_are_clean: True if all that they show may appear in the picture,
                 False if not, None to decide for each by its own noise, as `best`,
@@ -162,8 +192,11 @@ class Denoiser:
         """
         if self._device is None:
             raise UsageError("this denoiser is closed; make another one")
-        pictures = check(radiance, albedo, normal)
+        pictures = check(radiance, albedo, normal, parts or {})
         stages = Stages(progress)
+        made_of = {
+            name: np.zeros(x.shape, np.float32) for name, x in (parts or {}).items()
+        }
         result = np.zeros(np.shape(radiance), np.float32)
         result[..., 3:] = pictures.alpha
         prefiltered: tuple[str, ...] = ()
@@ -171,14 +204,12 @@ class Denoiser:
             stages.report(0.0)
             if pictures.radiance.any():
                 prefiltered = self._to_prefilter(pictures, guides_are_clean)
-                task = self._filter("picture", QUALITIES[self.quality])
-                task.hdr = hdr
-                task.clean_aux = (
-                    bool(guides_are_clean) or self.quality in _WITH_PREFILTER
-                )
-                self._run(pictures, prefiltered, result[..., :3], stages)
+                clean = bool(guides_are_clean) or self.quality in _WITH_PREFILTER
+                for task in self._light_filters(len(pictures.lit)):
+                    task.hdr, task.clean_aux = hdr, clean
+                self._run(pictures, prefiltered, result[..., :3], made_of, stages)
             stages.report(1.0)
-        return Denoised(result, pictures.bad_pixels, prefiltered)
+        return Denoised(result, pictures.bad_pixels, prefiltered, made_of)
 
     def guides(
         self, albedo: Array, normal: Array, *, progress: Callback | None = None
@@ -238,14 +269,17 @@ class Denoiser:
         pictures: Pictures,
         prefiltered: tuple[str, ...],
         output: Array,
+        made_of: Mapping[str, Array],
         stages: Stages,
     ) -> None:
-        """Denoise into `output`, (H, W, 3)."""
+        """Denoise into `output`, (H, W, 3), and the parts into `made_of`."""
         images: dict[str, Image] = {}
         turn = self._has_room(pictures)
         pictures_made = ("picture", "second picture")[: 1 + (self.quality == "best")]
         networks = {name: self._network(name) for name in prefiltered}
+        for_part = self._for_parts(len(pictures.lit))
         total = sum(_SECONDS[x] for x in (*networks.values(), *pictures_made))
+        total += for_part.seconds * len(pictures.lit)
         for name, guide in pictures.guides.items():
             images[name] = _rows(guide, turn)
             if name in networks:
@@ -253,19 +287,27 @@ class Denoiser:
                 images[name] = self._prefilter(name, images[name], name, stages)
         if "normal" in images and "albedo" not in images:
             images["albedo"] = np.full_like(images["normal"], _NO_ALBEDO)
-        images["color"] = _rows(pictures.radiance, turn)
-        stages.begin(_SECONDS["picture"] / total)
-        task = self._filter("picture", QUALITIES[self.quality])
         held = images.values() if turn else (images[name] for name in prefiltered)
-        self._limit(task, sum(image.nbytes for image in held))
-        self._execute(task, images, output, stages)
-        if turn:
-            _turn(output)
+        held_bytes = sum(image.nbytes for image in held)
+        light = [("picture", pictures.radiance, output, _SECONDS["picture"])]
+        light += [
+            (for_part.use, pictures.parts[name], made_of[name], for_part.seconds)
+            for name in pictures.lit
+        ]
+        for use, noisy, denoised, seconds in light:
+            images["color"] = _rows(noisy, turn)
+            stages.begin(seconds / total)
+            task = self._filters[use]
+            self._limit(task, held_bytes + turn * noisy.nbytes)
+            self._execute(task, images, denoised, stages)
+            if turn:
+                _turn(denoised)
         if self.quality == "best":
             stages.begin(_SECONDS["second picture"] / total)
             other = np.empty(output.shape, np.float32)
+            images["color"] = _rows(pictures.radiance, turn)
             images = {name: _rows(image, True) for name, image in images.items()}
-            self._execute(task, images, other, stages)
+            self._execute(self._filters["picture"], images, other, stages)
             _mix(output, other if turn else other[::-1])
 
     def _has_room(self, pictures: Pictures) -> bool:
@@ -287,6 +329,19 @@ class Denoiser:
     def _network(self, name: str) -> str:
         """Return OIDN's quality for prefiltering a guide."""
         return _LARGE if (self.quality, name) == ("best", "albedo") else _SMALL
+
+    def _for_parts(self, count: int) -> _ForParts:
+        """Return the network for so many parts, none better than the picture's."""
+        own = [x.network for x in _FOR_PARTS].index(QUALITIES[self.quality])
+        return next(x for x in _FOR_PARTS[own:] if count <= x.most)
+
+    def _light_filters(self, parts: int) -> list[Any]:
+        """Return the filters of the picture and of so many parts."""
+        filters = [self._filter("picture", QUALITIES[self.quality])]
+        if parts:
+            how = self._for_parts(parts)
+            filters.append(self._filter(how.use, how.network))
+        return filters
 
     def _filter(self, use: str, quality: str) -> Any:
         """Return the filter of one use; a change of its sizes would cost time."""

@@ -6,6 +6,7 @@ Arrays are float32 (height, width, channels).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from ..errors import PictureError
 from ..holes import clean_alpha, clean_radiance, fill_holes
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from ..arrays import Array
 
 
@@ -33,10 +36,19 @@ class Pictures:
     """(H, W, 1), or (H, W, 0) where none was given."""
     guides: dict[str, Array]
     """`albedo` and `normal`, those that were given, (H, W, 3)."""
+    parts: dict[str, Array]
+    """Light that radiance is made of, by name, (H, W, 3)."""
     bad_pixels: int
 
+    @cached_property
+    def lit(self) -> tuple[str, ...]:
+        """Names of the parts that have any light."""
+        return tuple(name for name, part in self.parts.items() if part.any())
 
-def check(radiance: Any, albedo: Any, normal: Any) -> Pictures:
+
+def check(
+    radiance: Any, albedo: Any, normal: Any, parts: Mapping[str, Any]
+) -> Pictures:
     """Return the arrays, cleaned; float32 ones without a fault are not copied.
 
     Raises PictureError, with the sizes and the remedy, for arrays that do not fit.
@@ -44,17 +56,20 @@ def check(radiance: Any, albedo: Any, normal: Any) -> Pictures:
     whole = float_array("radiance", radiance, (3, 4))
     given = {"albedo": albedo, "normal": normal}
     guides = {k: float_array(k, v, (3,)) for k, v in given.items() if v is not None}
-    for name, guide in guides.items():
-        if guide.shape[:2] != whole.shape[:2]:
+    lights = {name: float_array(name, part, (3,)) for name, part in parts.items()}
+    for name, other in [*guides.items(), *lights.items()]:
+        if other.shape[:2] != whole.shape[:2]:
             raise PictureError(
-                f"{name} is {_size(guide)} pixels, but radiance is {_size(whole)}: "
+                f"{name} is {_size(other)} pixels, but radiance is {_size(whole)}: "
                 "give both of one render"
             )
     light, bad_pixels = clean_radiance(whole[..., :3])
     alpha, holes = clean_alpha(whole[..., 3:])
     filled = {name: fill_holes(guide) for name, guide in guides.items()}
-    bad_pixels += holes + sum(count for _, count in filled.values())
-    return Pictures(light, alpha, {k: v for k, (v, _) in filled.items()}, bad_pixels)
+    clean = {name: clean_radiance(part) for name, part in lights.items()}
+    bad_pixels += holes + sum(n for _, n in (*filled.values(), *clean.values()))
+    held, made_of = ({k: x for k, (x, _) in each.items()} for each in (filled, clean))
+    return Pictures(light, alpha, held, made_of, bad_pixels)
 
 
 def sample(guide: Array) -> Array | None:

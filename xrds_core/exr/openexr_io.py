@@ -103,26 +103,29 @@ def write_part(path: str | Path, part: Part, codec: str = FLOAT_ZIP.codec) -> No
 def copy(
     source: str | Path,
     path: str | Path,
-    planes: Mapping[str, Pixels],
+    planes: Mapping[int, Mapping[str, Pixels]],
     *,
-    part: int = 0,
     alone: bool = False,
 ) -> None:
-    """Write `source` to `path` with some channels of one part replaced or added.
+    """Write `source` to `path` with some channels replaced or added, by part.
 
     All others, the windows and attributes stay as they are; a plane that replaces
-    another gets its number format. `alone`: only `planes` are written, with the part's
-    windows and attributes. Raises PictureError.
+    another gets its number format. `alone`: only the `planes`, of one part, are
+    written, with its windows and attributes. Raises PictureError.
     """
     limit = limit_of(check_input(Path(source)))
     if not _is_shadowed():
-        _copy(source, path, planes, part, alone, limit)
+        _copy(source, path, planes, alone, limit)
         return
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         window = ((0, 0), (0, 0))  # not read: the source has them
-        options = {"source": os.fspath(source), "part": part, "alone": alone}
-        _pack(archive, [Part("", window, window, dict(planes), options)])
+        options = {"source": os.fspath(source), "alone": alone}
+        parts = [
+            Part("", window, window, dict(each), options | {"part": number})
+            for number, each in planes.items()
+        ]
+        _pack(archive, parts)
         _apart("copy", path, archive, str(limit))
 
 
@@ -246,37 +249,44 @@ def _write(path: str | Path, part: Part, codec: str) -> None:
 def _copy(
     source: str | Path,
     path: str | Path,
-    planes: Mapping[str, Pixels],
-    number: int,
+    planes: Mapping[int, Mapping[str, Pixels]],
     alone: bool,
     limit: int,
 ) -> None:
     import OpenEXR
 
     if alone:
-        part = _whole_headers(source)[number]
+        ((number, only),) = planes.items()
+        whole = _whole_headers(source)[number].header
+        header = {k: v for k, v in whole.items() if k not in _OF_CHANNELS}
+        header["type"] = OpenEXR.scanlineimage
         channels: dict[str, Any] = {}
+        _put(channels, only)
     else:
         file = _opened(source, limit)
-        part = file.parts[number]
-        channels = part.channels
+        for number, each in planes.items():
+            _put(file.parts[number].channels, each)
+    try:
+        if alone:
+            file = OpenEXR.File(header, channels)
+        else:
+            _make_writable(file.parts)
+        with _silent_library():
+            file.write(str(path))
+    except (OSError, RuntimeError, ValueError) as error:
+        raise PictureError(str(error)) from error
+
+
+def _put(channels: dict[str, Any], planes: Mapping[str, Pixels]) -> None:
+    """Replace or add channels of a part."""
+    import OpenEXR
+
     for name, pixels in planes.items():
         old = channels[name].pixels if name in channels else None
         if old is not None and old.dtype.kind == "f":
             old[...] = fitting(pixels, old.dtype)
         else:  # no integers, in which light would be cut to 0
             channels[name] = OpenEXR.Channel(name, np.ascontiguousarray(pixels))
-    try:
-        if not alone:
-            _make_writable(file.parts)
-        else:
-            header = {k: v for k, v in part.header.items() if k not in _OF_CHANNELS}
-            header["type"] = OpenEXR.scanlineimage
-            file = OpenEXR.File(header, channels)
-        with _silent_library():
-            file.write(str(path))
-    except (OSError, RuntimeError, ValueError) as error:
-        raise PictureError(str(error)) from error
 
 
 def _make_writable(parts: Any) -> None:
@@ -367,13 +377,13 @@ def _main(task: str, path: str, archive: str, how: str) -> int:
         if task == "headers":
             _pack(Path(archive), _read_headers(path))
             return 0
-        (part,) = _unpack(Path(archive))
+        parts = _unpack(Path(archive))
         if task == "write":
-            _write(path, part, how)
+            _write(path, parts[0], how)
         else:
-            options = part.attributes
-            source, number, alone = options["source"], options["part"], options["alone"]
-            _copy(source, path, part.channels, number, alone, int(how))
+            options = parts[0].attributes
+            planes = {part.attributes["part"]: part.channels for part in parts}
+            _copy(options["source"], path, planes, options["alone"], int(how))
     except PictureError as error:
         print(error, file=sys.stderr)
         return 1

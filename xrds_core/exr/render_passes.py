@@ -106,19 +106,22 @@ def write_picture(
 def copy_picture(
     source: str | Path,
     path: str | Path,
-    channels: Mapping[str, Array],
+    channels: Mapping[int, Mapping[str, Array]],
     *,
-    part: int = 0,
     alone: bool = False,
 ) -> None:
-    """Write `source` to `path` with other pixels in some channels of one part.
+    """Write `source` to `path` with other pixels in some channels, by part.
 
     The (H, W) planes are of the part's data window. What is not in `channels` stays as
-    it is, or is left out if they stand `alone`. Raises PictureError as `write_picture`.
+    it is, or is left out if they stand `alone`: those of one part can. Raises
+    PictureError as `write_picture`.
     """
-    planes = {k: np.ascontiguousarray(v, np.float32) for k, v in channels.items()}
+    planes = {
+        part: {k: np.ascontiguousarray(v, np.float32) for k, v in each.items()}
+        for part, each in channels.items()
+    }
     with _whole(path) as unfinished:
-        openexr_io.copy(source, unfinished, planes, part=part, alone=alone)
+        openexr_io.copy(source, unfinished, planes, alone=alone)
 
 
 def write_part(path: str | Path, part: Part) -> None:

@@ -19,11 +19,13 @@ from ..temporal.vectors import Movement
 from ..temporal.window import Shot, Window
 from ..time_left import Clock
 from .finishing import Finished, finish_frame
+from .light import channels_of
 from .loading import Loader
 from .neighbour_frames import NeighbourSelection
 from .reading import FrameFile, Reading
 
 if TYPE_CHECKING:
+    from ..arrays import Array
     from ..denoising import Denoiser
 
 Say = Callable[[str], object]
@@ -48,14 +50,14 @@ class Files:
         """Write a finished frame, whole or not at all; raises PictureError."""
         names = list("RGBA") if self.picture_only else frame.channels
         planes = dict(zip(names, np.moveaxis(finished.picture, 2, 0), strict=False))
+        by_part: dict[int, dict[str, Array]] = {frame.part: planes}
+        if not self.picture_only:
+            for name, plane in _light(frame, finished).items():
+                part, own = frame.places[name]
+                by_part.setdefault(part, {})[own] = plane
         path = frame_path(self.output, number)
-        exr.copy_picture(
-            frame_path(self.source, number),
-            path,
-            planes,
-            part=frame.part,
-            alone=self.picture_only,
-        )
+        source = frame_path(self.source, number)
+        exr.copy_picture(source, path, by_part, alone=self.picture_only)
         return path
 
     def is_done(self, number: int, neighbours: Iterable[int] = ()) -> bool:
@@ -176,7 +178,7 @@ def _entries(
             continue
         others = selection.select(number, own, found.neighbours)
         finished = finish_frame(
-            own.stored, others, denoiser, movement, region=own.inner
+            own.stored, others, denoiser, movement, region=own.inner, light=own.light
         )
         started = time.perf_counter()
         try:
@@ -194,6 +196,14 @@ def _entries(
         say(f"frame {number}: {path}, {clock.lap(left)}")
         yield _entry(number, path, shot.radius, finished, seconds)
     selection.report()
+
+
+def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
+    """The planes of the parts of a frame's light, by full channel name."""
+    found: dict[str, Array] = {}
+    for part in frame.light:
+        found |= channels_of(part, finished.parts[part.name], finished.colours)
+    return found
 
 
 def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:

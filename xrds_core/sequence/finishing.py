@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..temporal.accumulate import Accumulated, accumulate
 from ..temporal.local_filters import box
+from .light import added_up, light_in
 from .rectangles import rectangles
 from .same_picture import BLOCK, block_means
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from ..arrays import Array
     from ..denoising import Denoised, Denoiser
+    from ..light_parts.find import LightPart
     from ..temporal.frame import Stored
     from ..temporal.vectors import Movement
     from .rectangles import Rectangle
@@ -42,11 +44,15 @@ class Finished:
 
     `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of
     `accumulated`, or the requested region of it; `seconds`: accumulate, denoise.
+    `parts` (H, W, 3) of its light, by name, add up to the picture; `colours`, by name,
+    are what they are divided by.
     """
 
     denoised: Denoised
     accumulated: Accumulated
     seconds: dict[str, float]
+    parts: Mapping[str, Array] = field(default_factory=dict)
+    colours: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def picture(self) -> Array:
@@ -63,6 +69,7 @@ def finish_frame(
     *,
     region: tuple[slice, slice] | None = None,
     accumulated: Accumulated | None = None,
+    light: Sequence[LightPart] = (),
 ) -> Finished:
     """Accumulate the samples of `neighbours` on a frame and denoise it.
 
@@ -71,7 +78,8 @@ def finish_frame(
     Where that is a small part of the picture, that part alone is denoised again.
     `region`, rows and columns, is the part to denoise: black around a crop would give
     the denoiser a wrong exposure. `accumulated` is the frame with its neighbours if it
-    is known already. Raises Cancelled if `progress` requests it.
+    is known already; `light` are the parts that are denoised as well. Raises Cancelled
+    if `progress` requests it.
     """
     started = time.perf_counter()
     if accumulated is None:
@@ -84,23 +92,38 @@ def finish_frame(
     areas = _lacking(share)
     parts = 1 + len(areas)
     denoised = denoiser(
-        *_passes(accumulated, region), progress=_part(progress, 0, parts)
+        *_passes(accumulated, region),
+        parts=_cropped(light_in(accumulated, light), region),
+        progress=_part(progress, 0, parts),
     )
     if areas:
-        passes = _passes(_filled(alone, accumulated), region)
+        filled = _filled(alone, accumulated)
+        passes = _passes(filled, region)
+        lights = _cropped(light_in(filled, light, like=denoised.parts), region)
         mixed = denoised.radiance.copy()
         for number, area in enumerate(areas, 1):
-            around = (np.ascontiguousarray(x[area.around]) for x in passes)
-            told = _part(progress, number, parts)
-            single = denoiser(*around, progress=told).radiance[area.within]
+            single = denoiser(
+                *(np.ascontiguousarray(x[area.around]) for x in passes),
+                parts=_cropped(lights, area.around),
+                progress=_part(progress, number, parts),
+            )
             weight = share[area.place][..., None]
-            mixed[area.place] = single + (mixed[area.place] - single) * weight
+            pairs = [(mixed, single.radiance)]
+            pairs += [(x, single.parts[k]) for k, x in denoised.parts.items()]
+            for whole, part in pairs:
+                inner = part[area.within]
+                whole[area.place] = inner + (whole[area.place] - inner) * weight
         denoised = replace(denoised, radiance=mixed)
+    colours = _cropped(
+        {x.colour_name: accumulated.parts[x.colour_name] for x in light if x.colour},
+        region,
+    )
+    added = added_up(denoised.radiance, denoised.parts, light, colours)
     seconds = {
         "accumulate": denoise_started - started,
         "denoise": time.perf_counter() - denoise_started,
     }
-    return Finished(denoised, accumulated, seconds)
+    return Finished(denoised, accumulated, seconds, added, colours)
 
 
 def _share(accumulated: Accumulated, alone: Accumulated, samples: float) -> Array:
@@ -166,9 +189,17 @@ def _filled(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
     normal = fill(alone.normal, accumulated.normal)
     assert albedo is not None
     assert normal is not None
-    radiance = fill(alone.radiance, accumulated.radiance)
-    alpha = fill(alone.alpha, accumulated.alpha)
-    return replace(alone, radiance=radiance, albedo=albedo, normal=normal, alpha=alpha)
+    return replace(
+        alone,
+        radiance=fill(alone.radiance, accumulated.radiance),
+        albedo=albedo,
+        normal=normal,
+        alpha=fill(alone.alpha, accumulated.alpha),
+        parts={
+            name: np.where(holes[..., None], accumulated.parts[name], part)
+            for name, part in alone.parts.items()
+        },
+    )
 
 
 def _passes(frame: Accumulated, region: tuple[slice, slice]) -> list[Array]:
@@ -179,6 +210,12 @@ def _passes(frame: Accumulated, region: tuple[slice, slice]) -> list[Array]:
         noisy = np.dstack((noisy, frame.alpha))
     passes = (noisy, frame.albedo, frame.normal)
     return [np.ascontiguousarray(each[region]) for each in passes]
+
+
+def _cropped(
+    passes: Mapping[str, Array], region: tuple[slice, slice]
+) -> dict[str, Array]:
+    return {name: np.ascontiguousarray(x[region]) for name, x in passes.items()}
 
 
 def _part(

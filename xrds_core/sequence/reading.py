@@ -11,6 +11,7 @@ from ..errors import PictureError
 from ..exr import File
 from ..exr.limits import is_mostly_empty
 from ..frames import MOST_RADIUS, frame_path
+from ..light_parts.find import Wanted, find_parts
 from ..temporal.frame import LARGEST_HALF, SKY_DEPTH, Camera, Frame, Stored, store
 from ..temporal.halves import Halves
 from ..temporal.motion import centres, pixels_of
@@ -21,11 +22,12 @@ from .file_errors import NotReusable, Unfit
 from .names import Found, PassNames, find
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from ..arrays import Array
     from ..exr.openexr_io import Part, Window
+    from ..light_parts.find import LightPart
 
 SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
 NAME = "cameraLabel"
@@ -47,7 +49,8 @@ class Reading:
     and `position_space` are `world` or `camera`, None for what the passes' names say;
     `motion_scale` are the factors that convert a motion pass of two channels to pixels
     to the next frame, x to the right and y upwards. `halves` is a pattern of files with
-    the second half buffers: as many other samples of each frame.
+    the second half buffers: as many other samples of each frame. `light` are the parts
+    of the light that are read as well.
     """
 
     names: PassNames = field(default_factory=PassNames)
@@ -57,6 +60,7 @@ class Reading:
     position_space: str | None = None
     motion_scale: tuple[float, float] = (1.0, 1.0)
     halves: str | None = None
+    light: Wanted = field(default_factory=Wanted)
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,8 @@ class FrameFile:
     `channels` are those of the picture, R, G, B and, where the file has alpha, A.
     Frames with the same `key` have the same render settings; "" if unknown. `radius`
     is the one that the file recommends, or None. `reusable` is False where the frame
-    cannot be reprojected.
+    cannot be reprojected. `light` are the parts of its light that were read; `places`
+    says in which part of the file a channel lies, and what it is called there.
     """
 
     stored: Stored
@@ -79,6 +84,8 @@ class FrameFile:
     key: str
     radius: int | None
     reusable: bool
+    light: tuple[LightPart, ...] = ()
+    places: Mapping[str, tuple[int, str]] = field(default_factory=dict)
 
 
 def read_frame(
@@ -96,6 +103,7 @@ def read_frame(
     file.window = _window(path, part) if reusable else part.data_window
     camera, depth = _geometry(file, part, found, number, reading, reusable)
     beauty = _stack(file, found.beauty)
+    light = find_parts(file.names, _layer(found), reading.light)
     frame = Frame(
         number=number,
         camera=camera or _CENTRE,
@@ -108,6 +116,7 @@ def read_frame(
         vector=_vector(file, found, reading) if reusable else None,
         path_length=_path_length(file, found) if reusable else None,
         still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
+        parts=_parts(file, light),
     )
     if reading.halves is not None:
         frame = _with_other_half(frame, file, camera, reading)
@@ -122,7 +131,34 @@ def read_frame(
         key=str(part.attributes.get(KEY, "")),
         radius=attributes.whole_or_none(part.attributes.get(RADIUS), 0, MOST_RADIUS),
         reusable=camera is not None and depth is not None,
+        light=light,
+        places={
+            name: file.place(name)
+            for each in light
+            for name in (*each.channels, *each.colour)
+        },
     )
+
+
+def _layer(found: Found) -> str:
+    """The layer that the noisy radiance lies in; "" where it lies in none."""
+    return found.beauty[0].rpartition(".")[0].rpartition(".")[0]
+
+
+def _parts(file: File, light: Sequence[LightPart]) -> dict[str, Array]:
+    """The parts of the light and the colours that they were divided by, by name."""
+    parts: dict[str, Array] = {}
+    for each in light:
+        part = _stack(file, list(each.channels))
+        if each.colour:
+            colour = parts.get(each.colour_name)
+            if colour is None:
+                colour = _stack(file, list(each.colour))
+            with np.errstate(over="ignore", invalid="ignore"):
+                part = part * colour
+            parts[each.colour_name] = colour
+        parts[each.name] = part
+    return parts
 
 
 def _with_other_half(
@@ -151,6 +187,11 @@ def _with_other_half(
         **{name: np.stack((getattr(frame, name), x)) for name, x in passes.items()}
     )
     means: dict[str, Any] = {name: halves.mean(name) for name in passes}
+    light = find_parts(other.names, _layer(found), reading.light)
+    more = _parts(other, light)
+    if more.keys() != frame.parts.keys():
+        raise Unfit(f"{path} is no half of {file.path}: its parts of the light differ")
+    means["parts"] = {k: (x + more[k]) / 2 for k, x in frame.parts.items()}
     return replace(frame, **means, samples=2 * frame.samples, halves=halves)
 
 

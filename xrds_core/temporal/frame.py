@@ -20,7 +20,7 @@ from .local_filters import extreme
 from .noise import Noise, noise_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     from numpy.typing import DTypeLike, NDArray
 
@@ -247,11 +247,6 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
     """
     passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
     picture, invalid = pack(*passes, dtype)
-    parts = None
-    if frame.parts:
-        parts, bad = packed([*frame.parts.values()], dtype)
-        invalid |= bad
-        picture[invalid] = parts[invalid] = 0.0
     noise = None if frame.radiance is None else noise_in(frame, dtype)
     return Stored(
         number=frame.number,
@@ -266,7 +261,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         counts=None if frame.counts is None else pack_counts(frame.counts),
         noise=None if noise is None else noise.without(invalid),
         image=_image(frame),
-        parts=parts,
+        parts=_packed_parts(frame.parts, dtype),
         part_names=tuple(frame.parts),
     )
 
@@ -284,23 +279,24 @@ def pack(
         parts.insert(0, radiance)
     if alpha is not None:
         parts.append(alpha[..., None])
-    return packed(parts, dtype)
-
-
-def packed(
-    passes: Sequence[Array], dtype: DTypeLike
-) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return passes (H, W, C) side by side, flat, and their invalid pixels (H W).
-
-    These are 0 in all.
-    """
-    picture = np.concatenate(passes, axis=-1, dtype=np.float32)
+    picture = np.concatenate(parts, axis=-1, dtype=np.float32)
     picture = picture.reshape(-1, picture.shape[-1])
     invalid = ~np.isfinite(picture).all(axis=-1)
     picture[invalid] = 0.0
     if np.dtype(dtype) == np.float16:
         np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
     return picture.astype(dtype, copy=False), invalid
+
+
+def _packed_parts(parts: Mapping[str, Array], dtype: DTypeLike) -> NDArray[Any] | None:
+    """Return `Stored.parts`; a part is 0 where it is not finite, the picture stays."""
+    if not parts:
+        return None
+    whole = np.concatenate([*parts.values()], axis=-1, dtype=np.float32)
+    np.nan_to_num(whole, copy=False, posinf=0.0, neginf=0.0)
+    if np.dtype(dtype) == np.float16:
+        np.clip(whole, -LARGEST_HALF, LARGEST_HALF, out=whole)
+    return whole.reshape(-1, whole.shape[-1]).astype(dtype, copy=False)
 
 
 def noise_in(frame: Frame, dtype: DTypeLike) -> Noise:

@@ -40,9 +40,9 @@ class Counting:
         self.denoiser = Denoiser("fast", "cpu")
         self.sizes: list[tuple[int, ...]] = []
 
-    def __call__(self, *passes: NDArray[np.float32], progress: Any = None) -> Any:
+    def __call__(self, *passes: NDArray[np.float32], **rest: Any) -> Any:
         self.sizes.append(passes[0].shape[:2])
-        return self.denoiser(*passes, progress=progress)
+        return self.denoiser(*passes, **rest)
 
 
 def test_only_the_part_that_lacks_neighbours_is_denoised_again(

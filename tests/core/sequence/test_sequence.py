@@ -94,12 +94,12 @@ class Counting:
     def __init__(self, denoiser: Denoiser) -> None:
         self.denoiser, self.pictures = denoiser, []
 
-    def __call__(self, *passes: Any, progress: Any = None) -> Any:
+    def __call__(self, *passes: Any, progress: Any = None, **more: Any) -> Any:
         self.pictures.append(passes[0])
         for done in (0.0, 1.0):
             if progress is not None:
                 progress(done)
-        return self.denoiser(*passes)
+        return self.denoiser(*passes, **more)
 
 
 def test_where_nothing_is_reused_the_picture_is_that_of_the_frame_alone(

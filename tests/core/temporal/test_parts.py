@@ -52,16 +52,17 @@ def test_a_frame_alone_has_its_own_parts_to_the_bit() -> None:
     assert np.array_equal(found.parts["lamp"], frame.parts["lamp"])
 
 
-def test_bad_pixels_of_a_part_lend_nothing() -> None:
-    frames = [in_parts(n, 0.0, lamp=0.4) for n in range(3)]
-    bad = frames[0].parts["lamp"].copy()
-    bad[5, 6] = np.nan
-    frames[0] = replace(frames[0], parts={"lamp": bad})
-    one, *others = (store(frame) for frame in frames)
-    assert np.isfinite(accumulate(one, others).parts["lamp"]).all()
-    lent = accumulate(others[0], [one, *others[1:]])
-    assert lent.samples[5, 6] == 2.0
-    assert np.isfinite(lent.parts["lamp"]).all()
+def test_bad_pixels_of_a_part_are_dark_in_it_alone() -> None:
+    frame = in_parts(0, 0.0, lamp=0.4, sky=0.6)
+    bad = frame.parts["lamp"].copy()
+    bad[5, 6] = np.nan, np.inf, -np.inf
+    stored = store(replace(frame, parts={**frame.parts, "lamp": bad}), np.float16)
+    found = accumulate(stored, [])
+    assert not found.parts["lamp"][5, 6].any()
+    assert found.parts["sky"][5, 6].any()
+    assert np.array_equal(
+        found.radiance, accumulate(store(frame, np.float16), []).radiance
+    )
 
 
 def test_frames_of_other_parts_are_refused() -> None:

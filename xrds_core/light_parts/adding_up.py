@@ -1,0 +1,56 @@
+"""Denoised parts of a picture's light that add up to the denoised picture.
+
+A denoiser is no linear filter: parts that it has seen one by one do not add up to what
+it makes of their sum, which it sees best. The rest is shared out among them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..arrays import Array
+
+_TINY = np.float32(1e-9)
+_ROWS = 128  # at a time, so that memory does not grow with the picture
+
+
+def add_up(
+    picture: Array, parts: Mapping[str, Array], masks: Mapping[str, Array] | None = None
+) -> dict[str, Array]:
+    """Return parts (H, W, 3) that add up to a picture (H, W, 3); none is negative.
+
+    The rest goes to each by the square of its light: a denoiser's errors grow with it.
+    `masks`, by name, are colours (H, W, 3): a part that is 0 times one cannot have
+    light there, others take it.
+    """
+    found = {name: np.empty_like(part) for name, part in parts.items()}
+    for first in range(0, len(picture), _ROWS):
+        rows = slice(first, first + _ROWS)
+        whole = np.maximum(picture[rows], np.float32(0.0))
+        held = {name: _held(part[rows]) for name, part in parts.items()}
+        can = {name: _can(name, rows, masks or {}) for name in parts}
+        weights = {k: (np.square(x) + _TINY) * can[k] for k, x in held.items()}
+        total = np.maximum(sum(weights.values()), _TINY * _TINY)
+        rest = (whole - sum(held[k] * can[k] for k in held)) / total
+        for name, part in held.items():
+            shared = part * can[name] + rest * weights[name]
+            held[name] = np.maximum(shared, np.float32(0.0))
+        made = sum(held.values())
+        scale = whole / np.maximum(made, _TINY * _TINY)
+        for name, part in held.items():
+            by_weight = whole * (weights[name] / total)
+            found[name][rows] = np.where(made > 0.0, part * scale, by_weight)
+    return found
+
+
+def _held(part: Array) -> Array:
+    return np.maximum(np.nan_to_num(part, posinf=0.0), np.float32(0.0))
+
+
+def _can(name: str, rows: slice, masks: Mapping[str, Array]) -> Array | np.float32:
+    """Where a part can have light: 1, elsewhere 0."""
+    if name not in masks:
+        return np.float32(1.0)
+    return np.greater(masks[name][rows], 0.0).astype(np.float32)
