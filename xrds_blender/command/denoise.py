@@ -13,7 +13,7 @@ from xrds_core.sequence.names import PASSES, PassNames
 
 from ..planning.settings import QUALITIES
 from . import arguments
-from .options import add_read_limit
+from .options import add_light, add_read_limit
 
 SPACES = ("camera", "world")
 
@@ -50,21 +50,7 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         help="files with as many other samples of each frame; #### is its number: no "
         "neighbour that shows something else is believed then",
     )
-    add(
-        "--passes",
-        type=arguments.words,
-        default=("none",),
-        metavar="all",
-        help="parts of the light that are denoised as well, and add up to the picture: "
-        "none, groups (light groups), all, or names, as Emission,key (default: none)",
-    )
-    add(
-        "--light-aovs",
-        type=arguments.words,
-        default=(),
-        metavar="NAMES",
-        help="further passes of light, which add up to nothing",
-    )
+    add_light(command)
     add(
         "--passes-from",
         type=Path,

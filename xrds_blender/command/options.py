@@ -9,6 +9,7 @@ from typing import Any
 from xrds_core.errors import UsageError
 from xrds_core.exr.encoding import CODECS, FLOAT_ZIP, Encoding
 from xrds_core.frames import RADIUS
+from xrds_core.light_parts.find import NONE
 
 from ..planning.plan import SAVINGS
 from ..planning.request import Request, render_request
@@ -59,7 +60,27 @@ def add_request(command: argparse.ArgumentParser) -> None:
         type=arguments.whole,
         help="seed of Cycles' noise, in place of the file's",
     )
+    add_light(command)
     add_network(command)
+
+
+def add_light(command: argparse.ArgumentParser) -> None:
+    """Add which parts of the light are finished as well."""
+    command.add_argument(
+        "--passes",
+        type=arguments.words,
+        default=(NONE,),
+        metavar="all",
+        help="parts of the light that are denoised as well, and add up to the picture: "
+        "none, groups (light groups), all, or names, as Emission,key (default: none)",
+    )
+    command.add_argument(
+        "--light-aovs",
+        type=arguments.words,
+        default=(),
+        metavar="NAMES",
+        help="further passes of light, which add up to nothing",
+    )
 
 
 def _add_mode(command: argparse.ArgumentParser) -> None:
@@ -214,6 +235,7 @@ def choice_of(options: argparse.Namespace) -> SceneChoice:
 def request_of(options: argparse.Namespace) -> Request:
     """What the options of `add_request` ask for; raises UsageError."""
     _check_pace(options)
+    _check_light(options)
     return render_request(
         scale=options.scale,
         samples=options.samples if options.noise_threshold is None else None,
@@ -235,6 +257,8 @@ def request_of(options: argparse.Namespace) -> Request:
         savings=() if options.skip_nothing else SAVINGS,
         guide_cache=options.guide_cache,
         guide_limit=options.guide_limit,
+        passes=options.passes,
+        light_aovs=options.light_aovs,
     )
 
 
@@ -267,6 +291,20 @@ def _check_pace(options: argparse.Namespace) -> None:
     ruled_out = chosen[1:] + [name for name, value in others.items() if value]
     if chosen and ruled_out:
         raise UsageError(f"{chosen[0]} cannot be had with {ruled_out[0]}")
+
+
+def _check_light(options: argparse.Namespace) -> None:
+    """Raise UsageError where parts of the light could not be finished."""
+    others = {
+        "--scale above 1": options.scale > 1,
+        "--plain": options.plain,
+        "--time-budget": options.time_budget,
+        "--quality": options.quality,
+    }
+    ruled_out = [name for name, value in others.items() if value]
+    wanted = options.passes != (NONE,) or options.light_aovs
+    if wanted and ruled_out:
+        raise UsageError(f"--passes cannot be had with {ruled_out[0]}")
 
 
 def _incompatible(options: argparse.Namespace) -> str:

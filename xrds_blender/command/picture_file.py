@@ -48,6 +48,7 @@ def save(
     scene: Any,
     encoding: Encoding = FLOAT_ZIP,
     metadata: Mapping[str, str] | None = None,
+    parts: Mapping[str, Array] | None = None,
 ) -> None:
     """Write one frame, all at once or not at all; raises PictureError if it cannot.
 
@@ -59,6 +60,7 @@ def save(
             hold alpha.
         encoding: of an .exr.
         metadata: texts by name that the file is to hold.
+        parts: further passes (H, W, 3) by name, of an .exr.
     """
     if path.suffix.lower() == ".png":
         _write_png(path, radiance, alpha, scene, metadata or {})
@@ -68,6 +70,8 @@ def save(
     channels = {name: radiance[..., i] for i, name in enumerate("RGB")}
     if scene.render.film_transparent:
         channels["A"] = alpha
+    for name, pixels in (parts or {}).items():
+        channels |= {f"{name}.{x}": pixels[..., i] for i, x in enumerate("RGB")}
     exr.write_picture(path, channels, encoding, metadata)
 
 

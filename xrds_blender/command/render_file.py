@@ -66,6 +66,8 @@ def render_file(
     """
     if sample_cache is not None:
         _check_cache(request)
+    if request.light and Path(output or "").suffix.lower() != ".exr":
+        raise UsageError("--passes needs an output that ends in .exr")
     if output is not None:
         picture_file.check_output(output, frames or [0])
     scene = open_scene(path, choice)
@@ -174,6 +176,10 @@ def _check_cache(request: Request) -> None:
         )
     if not request.settings.temporal_radius:
         raise UsageError("--sample-cache needs a --temporal-radius of 1 or more")
+    if request.light:
+        raise UsageError(
+            "--sample-cache holds no parts of the light: leave out --passes"
+        )
 
 
 def _cache(scene: Any, request: Request, folder: Path) -> SampleCache:
@@ -235,9 +241,10 @@ def _write(
             if view != first:  # the first comes last: a file of it says all are there
                 path = target.with_stem(target.stem + _suffix(scene, view))
                 light = pixels[..., :3], pixels[..., 3]
-                picture_file.save(path, *light, scene, encoding, metadata)
-        light = picture.radiance, picture.alpha
-        picture_file.save(target, *light, scene, encoding, metadata)
+                parts = picture.view_parts[view]
+                picture_file.save(path, *light, scene, encoding, metadata, parts)
+        light, parts = (picture.radiance, picture.alpha), picture.parts
+        picture_file.save(target, *light, scene, encoding, metadata, parts)
     except PictureError as error:
         place = _save_elsewhere(target, picture.radiance, picture.alpha, scene)
         raise PictureError(f"{error}; the frame was {place}") from error

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.light_parts.find import LightPart
+from xrds_core.light_parts.light import passes_by_name
 from xrds_core.temporal.halves import Halves
 from xrds_core.temporal.sample_subsets import SampleSubset
 
@@ -35,12 +37,16 @@ class Half:
 
 
 def sample_halves(
-    engine: Any, depsgraph: Any, subset: SampleSubset, geometry: _Geometry
+    engine: Any,
+    depsgraph: Any,
+    subset: SampleSubset,
+    geometry: _Geometry,
+    light: Sequence[LightPart] = (),
 ) -> tuple[dict[str, Half], dict[str, float]]:
     """Render a part of a sequence, of two samples or more, in two halves.
 
-    Returns them by view, and the seconds: sync, beauty. `geometry` is as in
-    `sample_layer`; with COUNTS in it the file's noise threshold is kept, and counts
+    Returns them by view, and the seconds: sync, beauty. `geometry` and `light` are as
+    in `sample_layer`; with COUNTS the file's noise threshold is kept, and counts
     are in samples. Raises Cancelled when the user stops it.
     """
     is_even = COUNTS not in geometry
@@ -48,7 +54,12 @@ def sample_halves(
         parts, passes, clocks = [], [], []
         for part in subset.halves():
             samples, clock = sample_layer(
-                engine, depsgraph, subset=part, is_even=is_even, geometry=geometry
+                engine,
+                depsgraph,
+                subset=part,
+                is_even=is_even,
+                geometry=geometry,
+                light=light,
             )
             parts.append({v: counted(x, part, clock) for v, x in samples.items()})
             passes.append(layer.all_passes())
@@ -58,7 +69,7 @@ def sample_halves(
             view: _joined(first, parts[1][view], shares)
             for view, first in parts[0].items()
         }
-        layer.put_back(_merged(*passes, shares, found))
+        layer.put_back(_merged(*passes, shares, found) | _light(light, found))
     return found, seconds_of(clocks)
 
 
@@ -121,6 +132,7 @@ def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Hal
         normal=halves.mean("normal"),
         counts=None if counts is None else counts.sum(axis=0),
         path_length=_mean_length(first, second, halves.share()),
+        parts=_mean_parts(first, second, halves.share()[..., None]),
     )
     return Half(whole, halves)
 
@@ -130,6 +142,20 @@ def _mean_length(first: Samples, second: Samples, share: Array) -> Array | None:
     if one is None or two is None:
         return None
     return np.asarray(one * share + two * (np.float32(1.0) - share))
+
+
+def _mean_parts(first: Samples, second: Samples, share: Array) -> dict[str, Array]:
+    rest = np.float32(1.0) - share
+    return {k: x * share + second.parts[k] * rest for k, x in first.parts.items()}
+
+
+def _light(parts: Sequence[LightPart], found: Mapping[str, Half]) -> _Passes:
+    """The passes of light: those that are divided by a colour have no plain means."""
+    return {
+        (view, name): pixels
+        for view, half in found.items()
+        for name, pixels in passes_by_name(parts, half.whole.parts).items()
+    }
 
 
 def _merged(

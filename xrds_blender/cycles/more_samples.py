@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from xrds_core.light_parts.find import LightPart
 from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals.borrowed import Borrowed
@@ -26,13 +27,14 @@ def more_samples(
     *,
     region: Region | None = None,
     share: float | None = None,
+    light: Sequence[LightPart] = (),
 ) -> tuple[list[dict[str, Samples]], dict[str, float]]:
     """Render parts of sequences; samples of each by view, and the seconds.
 
     `region` is a part of the picture, in its own pixels; None is all of it. `share`
     keeps the file's noise threshold, as `set_share` has it: the parts are halves then.
-    All samples have counts. The result has the passes afterwards that it had before.
-    Raises Cancelled when the user stops it.
+    All samples have counts, and the parts of the `light`. The result has the passes
+    afterwards that it had before. Raises Cancelled when the user stops it.
     """
     geometry = [] if share is None else [COUNTS]
     found, clocks = [], []
@@ -48,7 +50,7 @@ def more_samples(
                 set_share(borrowed, scene, session.samples_of(depsgraph), share)
             for part in parts:
                 rendered, clock = passes.part_samples(
-                    place, part, is_even=share is None
+                    place, part, is_even=share is None, light=light
                 )
                 clocks.append(clock)
                 found.append({v: _counted(x, part, clock) for v, x in rendered.items()})

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
+from xrds_core.light_parts.find import LightPart
 from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals.borrowed import Borrowed
@@ -124,10 +126,16 @@ class CyclesPasses(LayerSession):
         return low
 
     def part_samples(
-        self, region: Region, subset: SampleSubset, *, is_even: bool = True
+        self,
+        region: Region,
+        subset: SampleSubset,
+        *,
+        is_even: bool = True,
+        light: Sequence[LightPart] = (),
     ) -> tuple[dict[str, Samples], session.StageClock]:
         """Render samples of a part of the frame, by view; `subset` and `is_even` as in
-        `set_samples`. Counts are there where `geometry` asked for them.
+        `set_samples`. Counts are there where `geometry` asked for them, and the parts
+        of the `light`.
         """
         with Borrowed() as borrowed:
             set_samples(borrowed, self._scene, None, None, subset, is_even)
@@ -138,7 +146,7 @@ class CyclesPasses(LayerSession):
             is_part = region != self.region
             clock = self._run(size, region, exact=True, is_part=is_part)
         found = {
-            view: read_samples(self._corner_reader(view, region), self._geometry)
+            view: read_samples(self._corner_reader(view, region), self._geometry, light)
             for view in self.views
         }
         return found, clock

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from xrds_core.arrays import Array
+from xrds_core.light_parts.find import LightPart
+from xrds_core.light_parts.light import light_of
 from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..internals import spare_passes
@@ -46,7 +48,7 @@ class Samples:
     normals in camera space. `depth` (H, W) of the first hit, in the scene's units, and
     `vector` (H, W, 4), motion in pixels, are there when asked for; so are `counts`
     (H, W), the samples that a pixel took as a share of the most that it could, and
-    `path_length` (H, W) as in `Frame`.
+    `path_length` (H, W) and `parts` as in `Frame`.
     """
 
     picture: Array
@@ -56,6 +58,7 @@ class Samples:
     vector: Array | None = None
     counts: Array | None = None
     path_length: Array | None = None
+    parts: Mapping[str, Array] = field(default_factory=dict)
 
 
 def sample_layer(
@@ -67,13 +70,14 @@ def sample_layer(
     subset: SampleSubset | None = None,
     is_even: bool = True,
     geometry: Sequence[tuple[str, str]] = (),
+    light: Sequence[LightPart] = (),
 ) -> tuple[dict[str, Samples], session.StageClock]:
     """Render without Cycles' denoiser; samples by view, and what it took.
 
     `geometry` names those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS.
     `subset` is of a longer sequence, in the place of samples and seed; `is_even` as in
-    `set_samples`. The result holds Cycles' own passes. Raises Cancelled when the user
-    stops it.
+    `set_samples`; `light` are the parts of it that are wanted. The result holds Cycles'
+    own passes. Raises Cancelled when the user stops it.
     """
     layer_name = depsgraph.view_layer_eval.name
     for name, letters in geometry:
@@ -87,15 +91,18 @@ def sample_layer(
         subset=subset,
         is_even=is_even,
     )
-    found = samples_in(engine, layer_name, {name for name, _ in geometry})
+    found = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
     live.show(next(iter(found.values())).picture)
     return found, clock
 
 
 def samples_in(
-    engine: Any, layer_name: str, wanted: Collection[str] = ()
+    engine: Any,
+    layer_name: str,
+    wanted: Collection[str] = (),
+    light: Sequence[LightPart] = (),
 ) -> dict[str, Samples]:
-    """The samples that the result holds, by view; `wanted` as `read_samples` has it."""
+    """The samples that the result holds, by view; the rest as `read_samples` has it."""
     result = engine.get_result()
     views = [view.name for view in result.views] or [""]
     layer, size = result.layers[layer_name], (result.resolution_x, result.resolution_y)
@@ -103,10 +110,12 @@ def samples_in(
     def reader(view: str) -> Reader:
         return lambda name: session.read_pass(layer, name, view, size)
 
-    return {view: read_samples(reader(view), wanted) for view in views}
+    return {view: read_samples(reader(view), wanted, light) for view in views}
 
 
-def read_samples(read: Reader, wanted: Collection[str]) -> Samples:
+def read_samples(
+    read: Reader, wanted: Collection[str], light: Sequence[LightPart] = ()
+) -> Samples:
     """What `read` gives of a noisy render; `wanted` are names of `geometry`."""
     # Without its denoiser Cycles leaves Combined black where there is Noisy Image.
     noisy = read(NOISY)
@@ -121,7 +130,18 @@ def read_samples(read: Reader, wanted: Collection[str]) -> Samples:
     if path is not None:
         path = np.ascontiguousarray(path[..., 0])
     own = (np.ascontiguousarray(x) for x in passes)
-    return Samples(*own, depth, vector, counts, path)
+    return Samples(*own, depth, vector, counts, path, _read_light(read, light))
+
+
+def _read_light(read: Reader, parts: Sequence[LightPart]) -> dict[str, Array]:
+    """As `light_of`."""
+
+    def pixels(channels: tuple[str, ...]) -> Array:
+        found = read(channels[0].rpartition(".")[0])
+        assert found is not None
+        return found[..., :3]
+
+    return light_of(parts, pixels)
 
 
 def read_geometry(read: Reader, wanted: Collection[str]) -> tuple[Array, Array | None]:

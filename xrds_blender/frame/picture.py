@@ -55,7 +55,9 @@ class Picture:
     its denoising and sampling as one, so `beauty` holds both then. `peak_memory`
     is the largest in bytes that the process has taken so far; `device` is what the
     network ran on, empty for Cycles alone; `settings` are what it was rendered
-    by, as a time budget chose them; `views` (H, W, 4) are all views of stereo by name.
+    by, as a time budget chose them; `views` (H, W, 4) are all views of stereo by name;
+    `parts` (H, W, 3) of its light by the names of their passes, `view_parts` those of
+    all views.
     """
 
     radiance: Array
@@ -70,6 +72,8 @@ class Picture:
     settings: Settings | None = None
     temporal: Temporal | None = None
     views: dict[str, Array] = field(default_factory=dict)
+    parts: dict[str, Array] = field(default_factory=dict)
+    view_parts: dict[str, dict[str, Array]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, pixels: Array, **rest: Any) -> Picture:
@@ -96,10 +100,12 @@ def joined(pictures: Mapping[str, Picture], sampled: Mapping[str, float]) -> Pic
     for picture in pictures.values():
         for stage, spent in picture.seconds.items():
             seconds[stage] = seconds.get(stage, 0.0) + spent
-    views = {}
+    views, parts = {}, {}
     if len(pictures) > 1:
         views = {view: picture.pixels for view, picture in pictures.items()}
-    return replace(next(iter(pictures.values())), seconds=seconds, views=views)
+        parts = {view: picture.parts for view, picture in pictures.items()}
+    first = next(iter(pictures.values()))
+    return replace(first, seconds=seconds, views=views, view_parts=parts)
 
 
 def peak_memory() -> int:

@@ -38,6 +38,7 @@ class XRDS_OT_preset_add(AddPresetBase, bpy.types.Operator):
         "scene.xrds.temporal_radius",
         "scene.xrds.animation",
         "scene.xrds.deadline",
+        "scene.xrds.passes",
         "scene.xrds.preset",
         "scene.xrds.guide_samples",
         "scene.xrds.use_exposure",

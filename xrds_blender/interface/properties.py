@@ -6,10 +6,12 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from xrds_core.frames import RADIUS
+from xrds_core.light_parts.find import ALL, GROUPS, NONE
 
 from ..choosing import modes
 from ..planning.request import Request, render_request
 from ..planning.settings import Mode
+from ..scene.light import passes_looked_at
 from .machine import machine
 from .translations import CONTEXT
 
@@ -124,6 +126,29 @@ _ANIMATIONS = [
     ),
 ]
 
+AUTOMATIC = "automatic"
+_PASSES = [
+    (
+        AUTOMATIC,
+        "Automatic",
+        "All light where the output is a multilayer OpenEXR file or the compositor "
+        "reads a pass of light, else none",
+    ),
+    (NONE, "None", "Passes of light stay as noisy as Cycles renders them"),
+    (
+        GROUPS,
+        "Light Groups",
+        "Light groups are denoised as well, and add up to the picture",
+    ),
+    (
+        ALL,
+        "All Light",
+        "Light groups and the passes of diffuse, glossy, transmission, volume, "
+        "emission and environment are denoised as well, and add up to the picture. "
+        "Takes up to three times the denoising of the picture",
+    ),
+]
+
 
 class XRDSSettings(bpy.types.PropertyGroup):
     """How the engine XRDS renders a scene."""
@@ -169,6 +194,13 @@ class XRDSSettings(bpy.types.PropertyGroup):
         default=SAME_TIME,
         description="What neighbouring frames' samples are used for in an animation: "
         "fewer samples for each frame, or better frames",
+    )
+    passes: EnumProperty(
+        name="Passes",
+        translation_context=CONTEXT,
+        items=_PASSES,
+        default=AUTOMATIC,
+        description="Which passes of light are denoised with the picture, at full size",
     )
     deadline: FloatProperty(
         name="Time of All Frames",
@@ -232,7 +264,9 @@ class XRDSSettings(bpy.types.PropertyGroup):
 
 def request_of(settings: XRDSSettings) -> Request:
     """What a scene's settings and the preferences describe."""
-    here = machine()
+    here, passes = machine(), (settings.passes,)
+    if settings.passes == AUTOMATIC:
+        passes = passes_looked_at(settings.id_data)
     wanted = render_request(
         scale=1,
         guide_samples=settings.guide_samples,
@@ -248,5 +282,6 @@ def request_of(settings: XRDSSettings) -> Request:
         temporal_radius=settings.temporal_radius,
         same_picture=settings.animation == SAME_PICTURE,
         deadline=settings.deadline if settings.animation == DEADLINE else None,
+        passes=passes,
     )
     return modes.in_mode(wanted, Mode(settings.mode), settings.id_data)

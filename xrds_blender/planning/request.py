@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import UsageError
+from xrds_core.light_parts.find import NONE, Wanted
 
 from .plan import SAVINGS, Facts, Plan, cycles_only, decide, full_size
 from .settings import CYCLES_DENOISING, QUALITIES, SCALES, Denoising, Mode, Settings
@@ -63,7 +64,8 @@ class Request:
     samples to them until they are `guide_limit`. `finish_stopped` leaves what there is
     in the result when the user stops the render. A shot that is to have the
     `same_picture` as the file's own settings takes fewer samples where it can; one
-    with a `deadline` takes as many as fit into these seconds.
+    with a `deadline` takes as many as fit into these seconds. `passes` are the parts of
+    the light that are finished as well, as in `Wanted`, and `light_aovs` further ones.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -77,6 +79,8 @@ class Request:
     finish_stopped: bool = False
     same_picture: bool = False
     deadline: float | None = None
+    passes: tuple[str, ...] = (NONE,)
+    light_aovs: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         unknown = set(self.savings) - set(SAVINGS)
@@ -90,6 +94,11 @@ class Request:
         for record in (self, self.settings, self.machine):
             for name in _RANGES.keys() & vars(record).keys():
                 _check_range(name, getattr(record, name))
+
+    @property
+    def light(self) -> Wanted:
+        """The parts of the light that are wanted."""
+        return Wanted(self.passes, self.light_aovs)
 
     def with_settings(self, **changes: Any) -> Request:
         """The same with other settings."""

@@ -8,7 +8,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from xrds_core.arrays import Array
+from xrds_core.light_parts.find import LightPart
+from xrds_core.light_parts.light import passes_by_name
 from xrds_core.sequence.finishing import finish_frame
+from xrds_core.sequence.light import added_up, light_in
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.vectors import Movement
 
@@ -78,11 +81,11 @@ class FullSize(Method):
     ) -> Picture:
         frame = own.views[view]
         if isinstance(frame, Samples):
-            picture = self._alone(frame, report)
+            picture = self._alone(frame, report, own.light)
         else:
             neighbours = own.neighbours(view, others)
             gathered = own.gathered.get(view)
-            picture = self.finish_stored(frame, neighbours, report, gathered)
+            picture = self.finish_stored(frame, neighbours, report, gathered, own.light)
         settings = picture.settings
         assert settings is not None
         samples = own.samples or settings.samples
@@ -107,6 +110,7 @@ class FullSize(Method):
         neighbours: Sequence[Stored],
         report: Report | None = None,
         gathered: Accumulated | None = None,
+        light: Sequence[LightPart] = (),
     ) -> Picture:
         """The picture of a packed frame with the samples of its neighbours."""
         finished = finish_frame(
@@ -116,9 +120,10 @@ class FullSize(Method):
             self._movement,
             report,
             accumulated=gathered,
+            light=light,
         )
         accumulated = finished.accumulated
-        return self._picture(
+        picture = self._picture(
             finished.denoised,
             accumulated.albedo,
             accumulated.normal,
@@ -126,17 +131,27 @@ class FullSize(Method):
             decisions=(accumulation(accumulated),),
             temporal=temporal(self.settings, accumulated),
         )
+        return replace(picture, parts=passes_by_name(light, finished.parts))
 
-    def _alone(self, samples: Samples, report: Report | None) -> Picture:
+    def _alone(
+        self, samples: Samples, report: Report | None, light: Sequence[LightPart]
+    ) -> Picture:
         started = time.perf_counter()
         denoised = self._denoiser(
-            samples.picture, samples.albedo, samples.normal, progress=report
+            samples.picture,
+            samples.albedo,
+            samples.normal,
+            parts=light_in(samples.picture[..., :3], samples.parts, light),
+            progress=report,
         )
+        made = denoised.radiance, denoised.parts
+        found = samples.parts | added_up(*made, light, samples.parts)
         seconds = {"denoise": time.perf_counter() - started}
         decisions = in_time(self.settings.quality, self._quality)
-        return self._picture(
+        picture = self._picture(
             denoised, samples.albedo, samples.normal, seconds, decisions=decisions
         )
+        return replace(picture, parts=passes_by_name(light, found))
 
     def _picture(
         self,

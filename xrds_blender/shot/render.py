@@ -183,6 +183,10 @@ def _finish(
     started = time.perf_counter()
     picture = joined(pictures, own.seconds)
     combined = picture.views or dict.fromkeys(pictures, picture.pixels)
+    layer = engine.get_result().layers[layer_name]
+    for view, each in pictures.items():
+        for name, part in each.parts.items():
+            session.write_pass(layer, name, view, part)
     _write(engine, layer_name, method, own, combined)
     picture.seconds["write"] = time.perf_counter() - started
     return picture

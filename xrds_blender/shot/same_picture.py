@@ -10,7 +10,7 @@ file asks for, where neighbours add nothing.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -161,7 +161,12 @@ def render_more(
     stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
     try:
         found, seconds = more_samples(
-            engine, depsgraph, parts, region=part.region, share=share
+            engine,
+            depsgraph,
+            parts,
+            region=part.region,
+            share=share,
+            light=how.light,
         )
     finally:
         stages.end()
@@ -334,7 +339,7 @@ class SamePicture:
             self._taken_more += length
             part = Part(first, length, missing, region, begin)
             for view, samples in more(part).items():
-                whole = extra.setdefault(view, _nothing(shape))
+                whole = extra.setdefault(view, _nothing(shape, samples.parts))
                 _put(whole, region, samples)
         return extra
 
@@ -388,6 +393,7 @@ def _extra(samples: Samples) -> ExtraSamples:
         samples.normal,
         picture[..., 3],
         samples.counts,
+        samples.parts,
     )
 
 
@@ -403,11 +409,12 @@ def _with_more(
     return replace(own, views=views, gathered=gathered) if extra else own
 
 
-def _nothing(shape: tuple[int, int]) -> ExtraSamples:
+def _nothing(shape: tuple[int, int], parts: Iterable[str]) -> ExtraSamples:
     """No samples anywhere."""
     radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
     alpha, samples = np.zeros((2, *shape), np.float32)
-    return ExtraSamples(radiance, albedo, normal, alpha, samples)
+    dark = {name: np.zeros_like(radiance) for name in parts}
+    return ExtraSamples(radiance, albedo, normal, alpha, samples, dark)
 
 
 def _put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:
@@ -416,6 +423,8 @@ def _put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:
     columns = slice(region.x, region.x + region.width)
     for name in ("radiance", "albedo", "normal", "alpha", "samples"):
         getattr(whole, name)[rows, columns] = getattr(part, name)
+    for name, pixels in part.parts.items():
+        whole.parts[name][rows, columns] = pixels
 
 
 def _region(rows: slice, columns: slice, shape: tuple[int, int]) -> Region:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from xrds_core.errors import Cancelled, SceneError
+from xrds_core.exr.channels import Channels
+from xrds_core.light_parts.find import LightPart, find_parts
 from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.frame import Camera, Frame, store
 from xrds_core.temporal.sample_subsets import (
@@ -54,7 +56,7 @@ class Sampled:
     `View` or `Inputs` of `super_resolution`; of Cycles alone finished pictures.
     `gathered` are views with their neighbours' samples, where that is known already.
     Where `samples` per pixel were requested it has these; else `share` is how much of
-    the file's. `decisions` say why.
+    the file's. `decisions` say why. `light` are the parts of it that views hold.
     """
 
     number: int
@@ -64,6 +66,7 @@ class Sampled:
     samples: int | None = None
     share: float = 1.0
     decisions: tuple[Decision, ...] = ()
+    light: tuple[LightPart, ...] = ()
 
     def neighbours(self, view: str, frames: Sequence[Sampled]) -> list[Any]:
         """That view of other frames, and this frame's other views."""
@@ -80,7 +83,8 @@ class Sampling:
     each begins its own; its samples `begin` after so many, None is by its place.
     `still` is as in `Frame`. A frame that `has_halves` is sampled in two; one that
     `needs_motion` is rendered once more without motion blur for its motion. One that
-    `is_alone` has no neighbours: it is sampled as its file has it.
+    `is_alone` has no neighbours: it is sampled as its file has it. `light` are the
+    parts of it that are wanted.
     """
 
     number: int
@@ -95,6 +99,7 @@ class Sampling:
     still: bool = False
     has_halves: bool = False
     needs_motion: bool = False
+    light: tuple[LightPart, ...] = ()
 
     @property
     def is_alone(self) -> bool:
@@ -211,7 +216,25 @@ def sampling_of(
         still=not facts.moving,
         has_halves=_has_halves(scene, request, settings.count(of_file)),
         needs_motion=blurred and shapes_move(depsgraph),
+        light=light_in(engine, depsgraph, request),
     )
+
+
+def light_in(engine: Any, depsgraph: Any, request: Request) -> tuple[LightPart, ...]:
+    """The parts of its light that the request wants of a layer.
+
+    Raises UsageError for names that it does not have.
+    """
+    if not request.light:
+        return ()
+    name = depsgraph.view_layer_eval.name
+    names = {
+        f"{each.name}.{letter}": None
+        for each in engine.get_result().layers[name].passes
+        if each.channel_id in ("RGB", "RGBA")
+        for letter in "RGB"
+    }
+    return find_parts(Channels(f"view layer {name!r}", names), "", request.light)
 
 
 def is_even(scene: Any, request: Request) -> bool:
@@ -244,25 +267,30 @@ def sample_frame(
     window; `on_sampled` takes its views before that. Raises what `noisy_frame` does.
     """
     number, count = depsgraph.scene_eval.frame_current, request.settings.own_samples
+    light = light_in(engine, depsgraph, request)
     if not request.settings.temporal_radius:
-        samples, seconds = _alone(engine, depsgraph, request)
-        return Sampled(number, dict(samples), seconds, samples=count)
+        samples, seconds = _alone(engine, depsgraph, request, light)
+        return Sampled(number, dict(samples), seconds, samples=count, light=light)
     frames, seconds = noisy_frame(engine, depsgraph, request, place)
     if on_sampled is not None:
         on_sampled(frames)
     views = {view: store(frame, np.float16) for view, frame in frames.items()}
-    return Sampled(number, views, seconds, samples=count)
+    return Sampled(number, views, seconds, samples=count, light=light)
 
 
 def _alone(
-    engine: Any, depsgraph: Any, request: Request
+    engine: Any, depsgraph: Any, request: Request, light: Sequence[LightPart]
 ) -> tuple[dict[str, Samples], dict[str, float]]:
     """Render a frame without neighbours, as `noisy_frame` does; seed as in the file."""
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     stages.begin(engine, stages.SAMPLES, 1, 2)
     try:
         found, clock = sample_layer(
-            engine, depsgraph, samples=request.settings.samples, seed=request.seed
+            engine,
+            depsgraph,
+            samples=request.settings.samples,
+            seed=request.seed,
+            light=light,
         )
     except Cancelled:
         finish_samples(engine, layer_name, request)
@@ -297,6 +325,7 @@ def noisy_frame(
                 seed=how.own_seed,
                 subset=how.subset(),
                 geometry=how.geometry,
+                light=how.light,
             )
     except Cancelled:
         finish_samples(engine, layer_name, request)
@@ -317,7 +346,7 @@ def _frames_of_halves(
     motion, seconds = {}, dict.fromkeys(("sync", "beauty"), 0.0)
     if how.needs_motion:
         motion, seconds = sample_motion(engine, depsgraph, how.own_seed)
-    found, more = sample_halves(engine, depsgraph, how.first, how.geometry)
+    found, more = sample_halves(engine, depsgraph, how.first, how.geometry, how.light)
     frames = {}
     for view, half in found.items():
         samples = half.whole
@@ -361,6 +390,7 @@ def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
         still=how.still,
         counts=counts,
         path_length=samples.path_length,
+        parts=samples.parts,
     )
 
 

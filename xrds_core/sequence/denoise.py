@@ -15,11 +15,11 @@ from .. import exr
 from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
 from ..frames import RADIUS, frame_numbers, frame_path
+from ..light_parts.light import passes_of
 from ..temporal.vectors import Movement
 from ..temporal.window import Shot, Window
 from ..time_left import Clock
 from .finishing import Finished, finish_frame
-from .light import channels_of
 from .loading import Loader
 from .neighbour_frames import NeighbourSelection
 from .reading import FrameFile, Reading
@@ -200,10 +200,12 @@ def _entries(
 
 def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
     """The planes of the parts of a frame's light, by full channel name."""
-    found: dict[str, Array] = {}
-    for part in frame.light:
-        found |= channels_of(part, finished.parts[part.name], finished.colours)
-    return found
+    passes = passes_of(frame.light, finished.parts)
+    return {
+        name: plane
+        for names, pixels in passes.items()
+        for name, plane in zip(names, np.moveaxis(pixels, 2, 0), strict=True)
+    }
 
 
 def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:

@@ -5,13 +5,13 @@ From then on they are the frame's own: it lends them as well.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..temporal.accumulate import accumulate
-from ..temporal.frame import pack, pack_counts
+from ..temporal.frame import pack, pack_counts, pack_parts
 from ..temporal.noise import brightness
 
 if TYPE_CHECKING:
@@ -26,7 +26,8 @@ if TYPE_CHECKING:
 class ExtraSamples:
     """Means over `samples` (H, W) more samples per pixel, 0 where there are none.
 
-    `radiance`, `albedo` and `normal` (H, W, 3) and `alpha` (H, W) are as in `Frame`.
+    `radiance`, `albedo` and `normal` (H, W, 3), `alpha` (H, W) and `parts` are as in
+    `Frame`.
     """
 
     radiance: Array
@@ -34,6 +35,7 @@ class ExtraSamples:
     normal: Array
     alpha: Array
     samples: Array
+    parts: dict[str, Array] = field(default_factory=dict)
 
 
 def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
@@ -41,15 +43,17 @@ def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
     total = np.sum([part.samples for part in parts], axis=0)
     weights = [part.samples / np.maximum(total, np.float32(1e-9)) for part in parts]
 
-    def mean(name: str) -> Array:
-        values = [getattr(part, name) for part in parts]
+    def mean(values: Sequence[Array]) -> Array:
         wide = (...,) + (None,) * (values[0].ndim - 2)
         pairs = zip(values, weights, strict=True)
         return np.sum([x * w[wide] for x, w in pairs], axis=0)
 
-    return ExtraSamples(
-        mean("radiance"), mean("albedo"), mean("normal"), mean("alpha"), total
+    radiance, albedo, normal, alpha = (
+        mean([getattr(part, name) for part in parts])
+        for name in ("radiance", "albedo", "normal", "alpha")
     )
+    light = {k: mean([part.parts[k] for part in parts]) for k in parts[0].parts}
+    return ExtraSamples(radiance, albedo, normal, alpha, total, light)
 
 
 def enriched(frame: Stored, extra: ExtraSamples) -> Stored:
@@ -71,6 +75,7 @@ def enriched(frame: Stored, extra: ExtraSamples) -> Stored:
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=noise,
+        parts=pack_parts(found.parts, frame.picture.dtype),
     )
 
 
@@ -94,26 +99,32 @@ def with_extra(
     total = np.maximum(sum(counts), np.float32(1e-9))
     shares = [(count / total).astype(np.float32) for count in counts]
 
-    def mean(name: str) -> Array | None:
-        whole = getattr(frame, name)
-        if whole is None:
-            return None
+    def mean(*values: Array) -> Array:
+        whole = values[0]
         wide = (...,) + (None,) * (whole.ndim - 2)
         mixed = np.zeros_like(whole)
-        for each, share in zip((frame, alone, extra), shares, strict=True):
-            values = getattr(each, name)
+        for each, share in zip(values, shares, strict=True):
             # NaN where there are no samples
-            mixed += np.where(share[wide] > 0.0, values, 0.0) * share[wide]
+            mixed += np.where(share[wide] > 0.0, each, 0.0) * share[wide]
         return np.where(usable[wide], mixed, whole)
 
-    albedo, normal = mean("albedo"), mean("normal")
+    def of(name: str) -> Array | None:
+        whole = getattr(frame, name)
+        return None if whole is None else mean(whole, *(getattr(x, name) for x in rest))
+
+    rest = alone, extra
+    albedo, normal = of("albedo"), of("normal")
     assert albedo is not None
     assert normal is not None
     return replace(
         frame,
-        radiance=mean("radiance"),
+        radiance=of("radiance"),
         albedo=albedo,
         normal=normal,
-        alpha=mean("alpha"),
+        alpha=of("alpha"),
+        parts={
+            name: mean(part, alone.parts[name], extra.parts[name])
+            for name, part in frame.parts.items()
+        },
         samples=np.where(usable, total, frame.samples).astype(np.float32),
     )

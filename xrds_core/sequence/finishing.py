@@ -15,7 +15,7 @@ from .rectangles import rectangles
 from .same_picture import BLOCK, block_means
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Collection, Mapping, Sequence
 
     from ..arrays import Array
     from ..denoising import Denoised, Denoiser
@@ -44,15 +44,14 @@ class Finished:
 
     `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of
     `accumulated`, or the requested region of it; `seconds`: accumulate, denoise.
-    `parts` (H, W, 3) of its light, by name, add up to the picture; `colours`, by name,
-    are what they are divided by.
+    `parts` (H, W, 3) are those of its light, which add up to the picture, and the
+    colours, by name, as in `light_of`.
     """
 
     denoised: Denoised
     accumulated: Accumulated
     seconds: dict[str, float]
     parts: Mapping[str, Array] = field(default_factory=dict)
-    colours: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def picture(self) -> Array:
@@ -91,22 +90,16 @@ def finish_frame(
     share = share[region]
     areas = _lacking(share)
     parts = 1 + len(areas)
-    denoised = denoiser(
-        *_passes(accumulated, region),
-        parts=_cropped(light_in(accumulated, light), region),
-        progress=_part(progress, 0, parts),
-    )
+    passes = _Passes.of(accumulated, light, region)
+    told = [_part(progress, number, parts) for number in range(parts)]
+    denoised = passes.denoised(denoiser, told[0])
     if areas:
-        filled = _filled(alone, accumulated)
-        passes = _passes(filled, region)
-        lights = _cropped(light_in(filled, light, like=denoised.parts), region)
+        lacking = _Passes.of(
+            _filled(alone, accumulated), light, region, like=denoised.parts
+        )
         mixed = denoised.radiance.copy()
-        for number, area in enumerate(areas, 1):
-            single = denoiser(
-                *(np.ascontiguousarray(x[area.around]) for x in passes),
-                parts=_cropped(lights, area.around),
-                progress=_part(progress, number, parts),
-            )
+        for area, done in zip(areas, told[1:], strict=True):
+            single = lacking.within(area.around).denoised(denoiser, done)
             weight = share[area.place][..., None]
             pairs = [(mixed, single.radiance)]
             pairs += [(x, single.parts[k]) for k, x in denoised.parts.items()]
@@ -118,12 +111,12 @@ def finish_frame(
         {x.colour_name: accumulated.parts[x.colour_name] for x in light if x.colour},
         region,
     )
-    added = added_up(denoised.radiance, denoised.parts, light, colours)
+    found = colours | added_up(denoised.radiance, denoised.parts, light, colours)
     seconds = {
         "accumulate": denoise_started - started,
         "denoise": time.perf_counter() - denoise_started,
     }
-    return Finished(denoised, accumulated, seconds, added, colours)
+    return Finished(denoised, accumulated, seconds, found)
 
 
 def _share(accumulated: Accumulated, alone: Accumulated, samples: float) -> Array:
@@ -202,14 +195,39 @@ def _filled(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
     )
 
 
-def _passes(frame: Accumulated, region: tuple[slice, slice]) -> list[Array]:
-    """Return radiance, with alpha where there is one, albedo and normal of a region."""
-    assert frame.radiance is not None
-    noisy = frame.radiance
-    if frame.alpha is not None:
-        noisy = np.dstack((noisy, frame.alpha))
-    passes = (noisy, frame.albedo, frame.normal)
-    return [np.ascontiguousarray(each[region]) for each in passes]
+class _Passes(NamedTuple):
+    """What is denoised: radiance, with alpha where there is one, guides, and parts."""
+
+    noisy: Array
+    albedo: Array
+    normal: Array
+    parts: dict[str, Array]
+
+    @classmethod
+    def of(
+        cls,
+        frame: Accumulated,
+        light: Sequence[LightPart],
+        region: tuple[slice, slice],
+        like: Collection[str] | None = None,
+    ) -> _Passes:
+        """Those of a region of a frame; `like` as in `light_in`."""
+        noisy = frame.radiance
+        assert noisy is not None
+        parts = light_in(noisy, frame.parts, light, like)
+        if frame.alpha is not None:
+            noisy = np.dstack((noisy, frame.alpha))
+        return cls(noisy, frame.albedo, frame.normal, parts).within(region)
+
+    def within(self, region: tuple[slice, slice]) -> _Passes:
+        """Those of a region."""
+        noisy, albedo, normal = (np.ascontiguousarray(x[region]) for x in self[:3])
+        return _Passes(noisy, albedo, normal, _cropped(self.parts, region))
+
+    def denoised(
+        self, denoiser: Denoiser, progress: Callable[[float], bool] | None
+    ) -> Denoised:
+        return denoiser(*self[:3], parts=self.parts, progress=progress)
 
 
 def _cropped(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..temporal.accumulate import accumulate, sample_counts
-from ..temporal.frame import pack, pack_counts
+from ..temporal.frame import pack, pack_counts, pack_parts
 from ..temporal.half_floats import floats
 
 if TYPE_CHECKING:
@@ -74,4 +74,5 @@ def extended(history: Stored | None, frame: Stored, movement: Movement) -> Store
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=noise,
+        parts=pack_parts(found.parts, frame.picture.dtype),
     )

@@ -13,26 +13,28 @@ if TYPE_CHECKING:
 
     from ..arrays import Array
     from ..light_parts.find import LightPart
-    from ..temporal.accumulate import Accumulated
 
 # Of the mean radiance: where parts miss no more of it, they are all there are.
 _ALL = 0.002
 
 
 def light_in(
-    frame: Accumulated, parts: Sequence[LightPart], like: Collection[str] | None = None
+    radiance: Array | None,
+    light: Mapping[str, Array],
+    parts: Sequence[LightPart],
+    like: Collection[str] | None = None,
 ) -> dict[str, Array]:
-    """Return the parts of a frame's light (H, W, 3), by name.
+    """Return the parts of a frame's `light` (H, W, 3), by name, without colours.
 
     Where those of one sum do not make up the radiance, what they miss is one more; or
     where it is among the names that the result is to be `like`.
     """
-    found = {part.name: frame.parts[part.name] for part in parts}
-    if frame.radiance is None or not found:
+    found = {part.name: light[part.name] for part in parts}
+    if radiance is None or not found:
         return found
-    least = _ALL * float(np.nan_to_num(frame.radiance).mean())
+    least = _ALL * float(np.nan_to_num(radiance).mean())
     for name, members in _sums(parts).items():
-        missing = frame.radiance - sum(found[part.name] for part in members)
+        missing = radiance - sum(found[part.name] for part in members)
         is_much = float(np.nan_to_num(np.abs(missing)).mean()) > least
         if is_much if like is None else _rest(name) in like:
             found[_rest(name)] = np.maximum(missing, np.float32(0.0))
@@ -59,22 +61,6 @@ def added_up(
         }
         found |= add_up(picture[..., :3], sums, masks)
     return {part.name: found[part.name] for part in parts}
-
-
-def channels_of(
-    part: LightPart, light: Array, colours: Mapping[str, Array]
-) -> dict[str, Array]:
-    """Return the planes (H, W) of a part, and of its colour, by full channel name."""
-    if not part.colour:
-        return _planes(part.channels, light)
-    colour = colours[part.colour_name]
-    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        divided = np.where(colour > 0.0, light / colour, np.float32(0.0))
-    return _planes(part.channels, divided) | _planes(part.colour, colour)
-
-
-def _planes(names: Sequence[str], pixels: Array) -> dict[str, Array]:
-    return dict(zip(names, np.moveaxis(pixels, 2, 0), strict=True))
 
 
 def _sums(parts: Sequence[LightPart]) -> dict[str, list[LightPart]]:

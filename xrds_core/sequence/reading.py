@@ -12,6 +12,7 @@ from ..exr import File
 from ..exr.limits import is_mostly_empty
 from ..frames import MOST_RADIUS, frame_path
 from ..light_parts.find import Wanted, find_parts
+from ..light_parts.light import light_of
 from ..temporal.frame import LARGEST_HALF, SKY_DEPTH, Camera, Frame, Stored, store
 from ..temporal.halves import Halves
 from ..temporal.motion import centres, pixels_of
@@ -116,7 +117,7 @@ def read_frame(
         vector=_vector(file, found, reading) if reusable else None,
         path_length=_path_length(file, found) if reusable else None,
         still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
-        parts=_parts(file, light),
+        parts=_light(file, light),
     )
     if reading.halves is not None:
         frame = _with_other_half(frame, file, camera, reading)
@@ -145,20 +146,8 @@ def _layer(found: Found) -> str:
     return found.beauty[0].rpartition(".")[0].rpartition(".")[0]
 
 
-def _parts(file: File, light: Sequence[LightPart]) -> dict[str, Array]:
-    """The parts of the light and the colours that they were divided by, by name."""
-    parts: dict[str, Array] = {}
-    for each in light:
-        part = _stack(file, list(each.channels))
-        if each.colour:
-            colour = parts.get(each.colour_name)
-            if colour is None:
-                colour = _stack(file, list(each.colour))
-            with np.errstate(over="ignore", invalid="ignore"):
-                part = part * colour
-            parts[each.colour_name] = colour
-        parts[each.name] = part
-    return parts
+def _light(file: File, parts: Sequence[LightPart]) -> dict[str, Array]:
+    return light_of(parts, lambda names: _stack(file, list(names)))
 
 
 def _with_other_half(
@@ -188,7 +177,7 @@ def _with_other_half(
     )
     means: dict[str, Any] = {name: halves.mean(name) for name in passes}
     light = find_parts(other.names, _layer(found), reading.light)
-    more = _parts(other, light)
+    more = _light(other, light)
     if more.keys() != frame.parts.keys():
         raise Unfit(f"{path} is no half of {file.path}: its parts of the light differ")
     means["parts"] = {k: (x + more[k]) / 2 for k, x in frame.parts.items()}

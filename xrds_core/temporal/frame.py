@@ -261,7 +261,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         counts=None if frame.counts is None else pack_counts(frame.counts),
         noise=None if noise is None else noise.without(invalid),
         image=_image(frame),
-        parts=_packed_parts(frame.parts, dtype),
+        parts=pack_parts(frame.parts, dtype),
         part_names=tuple(frame.parts),
     )
 
@@ -288,7 +288,7 @@ def pack(
     return picture.astype(dtype, copy=False), invalid
 
 
-def _packed_parts(parts: Mapping[str, Array], dtype: DTypeLike) -> NDArray[Any] | None:
+def pack_parts(parts: Mapping[str, Array], dtype: DTypeLike) -> NDArray[Any] | None:
     """Return `Stored.parts`; a part is 0 where it is not finite, the picture stays."""
     if not parts:
         return None

@@ -15,6 +15,7 @@ from ...internals.lifetimes import FILE
 from ...planning.estimates import Capabilities
 from ...planning.request import Request
 from ...planning.settings import PRESETS, Mode
+from ...scene.light import has_light
 from .. import operators, presets, status_bar, translations
 from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
@@ -89,6 +90,9 @@ def _draw_choices(
         layout.prop(settings, "animation")
         if settings.animation == DEADLINE:
             layout.prop(settings, "deadline")
+    layers = (layer for layer in scene.view_layers if layer.use)
+    if request.settings.mode is Mode.FULL_SIZE and any(map(has_light, layers)):
+        layout.prop(settings, "passes")
 
 
 class XRDS_PT_under_cycles(bpy.types.Panel):

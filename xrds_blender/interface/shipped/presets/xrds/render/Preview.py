@@ -11,6 +11,7 @@ scene.xrds.denoise = "fast"
 scene.xrds.temporal_radius = 4
 scene.xrds.animation = "same_time"
 scene.xrds.deadline = 28800.0
+scene.xrds.passes = "automatic"
 scene.xrds.preset = "fast"
 scene.xrds.guide_samples = 4
 scene.xrds.use_exposure = False
