@@ -22,13 +22,18 @@ from .whole_file import png_size
 SUFFIXES = (".exr", ".png")
 
 
-def check_output(pattern: str, frames: Sequence[int]) -> None:
+def check_output(
+    pattern: str, frames: Sequence[int], *, has_passes: bool = False
+) -> None:
     """Refuse, before anything is rendered, an output that could not be written.
 
-    Makes the folder. Raises UsageError for a suffix that is neither .exr nor .png and
-    for several frames of one name, PictureError as `xrds_core.files.check_output`.
+    Makes the folder. Raises UsageError for a suffix that is neither .exr nor .png, for
+    one that holds no passes where there are some, and for several frames of one name,
+    PictureError as `xrds_core.files.check_output`.
     """
     path = Path(pattern)
+    if has_passes and path.suffix.lower() != ".exr":
+        raise UsageError(f"--passes needs an output that ends in .exr, not {pattern!r}")
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(f"output {pattern!r} must end in .exr or .png")
     if len(frames) > 1 and "#" not in path.name:

@@ -66,10 +66,8 @@ def render_file(
     """
     if sample_cache is not None:
         _check_cache(request)
-    if request.light and Path(output or "").suffix.lower() != ".exr":
-        raise UsageError("--passes needs an output that ends in .exr")
     if output is not None:
-        picture_file.check_output(output, frames or [0])
+        picture_file.check_output(output, frames or [0], has_passes=bool(request.light))
     scene = open_scene(path, choice)
     _check_libraries(request)
     numbers = _numbers(scene, frames, animation, output)

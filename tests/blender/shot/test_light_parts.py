@@ -212,7 +212,10 @@ def test_the_command_writes_them(shot: Path) -> None:
             "--passes cannot be had with --scale above 1",
         ),
         (("--plain", "-o", "o.exr"), "--passes cannot be had with"),
-        (("--scale", "1", "-o", "o.png"), "--passes needs an output that ends in .exr"),
+        (
+            ("--scale", "1", "-o", "o.png"),
+            "--passes needs an output that ends in .exr, not ",
+        ),
         (
             ("--scale", "1", "-o", "o.exr", "--sample-cache", "c"),
             "--sample-cache holds no parts of the light",
