@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from xrds_core.errors import XRDSError
+from xrds_core.errors import UsageError, XRDSError
 from xrds_core.frames import in_words
 from xrds_core.notices import warn
 from xrds_core.sequence.names import PASSES, PassNames
@@ -24,7 +24,10 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         "denoise", help="denoise frames that lie in EXR files, as a shot"
     )
     add = command.add_argument
-    add("source", metavar="IN.exr", help="noisy frames; #### is the frame number")
+    add(
+        "source", nargs="?", metavar="IN.exr", help="noisy frames; #### is their number"
+    )
+    add("-i", "--input", metavar="IN.exr", help="the same, as other denoisers have it")
     add("-o", "--out", required=True, metavar="OUT.exr", help="denoised frames")
     add(
         "--frames",
@@ -44,11 +47,36 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         default="high",
         help="quality of the denoiser (default: high)",
     )
+    _add_inputs(command)
+    add("--resume", action="store_true", help="skip frames whose files are complete")
+    add(
+        "--picture-only",
+        action="store_true",
+        help="write R, G, B and A alone, not the input's other channels",
+    )
+    _add_machine(command)
+    add_read_limit(command)
+    _add_reading(command)
+    command.set_defaults(work=_denoise, lines=_lines, check=_check)
+    return command
+
+
+def _add_inputs(command: argparse.ArgumentParser) -> None:
+    """Add what is read beside the picture."""
+    add = command.add_argument
     add(
         "--halves",
         metavar="B.exr",
         help="files with as many other samples of each frame; #### is its number: no "
         "neighbour that shows something else is believed then",
+    )
+    add(
+        "--also",
+        action="append",
+        default=[],
+        metavar="PARTS.exr",
+        help="further files of the same frames, with passes that IN.exr lacks; may be "
+        "given several times",
     )
     add_light(command)
     add(
@@ -57,22 +85,18 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         metavar="FILE.toml",
         help="how a renderer calls the parts of its light, where it is not known",
     )
-    add("--resume", action="store_true", help="skip frames whose files are complete")
-    add(
-        "--picture-only",
-        action="store_true",
-        help="write R, G, B and A alone, not the input's other channels",
-    )
+
+
+def _add_machine(command: argparse.ArgumentParser) -> None:
+    """Add what the denoiser runs on."""
+    add = command.add_argument
     add("--device", default="auto", help="of the denoiser: auto, cpu, cuda, metal")
+    add("--threads", type=arguments.positive, help="of the denoiser (default: all)")
     add(
         "--memory-limit",
         type=arguments.size_in_bytes,
         help="memory for the denoiser, such as 500M or 4G",
     )
-    add_read_limit(command)
-    _add_reading(command)
-    command.set_defaults(work=_denoise, lines=_lines, check=_check)
-    return command
 
 
 def _add_reading(command: argparse.ArgumentParser) -> None:
@@ -131,14 +155,23 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
         light=Wanted(
             options.passes, options.light_aovs, read_renderers(options.passes_from)
         ),
+        also=tuple(options.also),
     )
     denoiser = Denoiser(
-        options.denoise, options.device, memory_limit=options.memory_limit
+        options.denoise,
+        options.device,
+        threads=options.threads or 0,
+        memory_limit=options.memory_limit,
     )
     others = (options.camera,) if options.camera else ()
     return denoise_sequence(
         Files(
-            options.source, options.out, options.picture_only, others, options.halves
+            _source(options),
+            options.out,
+            options.picture_only,
+            others,
+            options.halves,
+            tuple(options.also),
         ),
         denoiser,
         frames=options.frames,
@@ -147,6 +180,14 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
         resume=options.resume,
         say=warn,
     )
+
+
+def _source(options: argparse.Namespace) -> str:
+    """The input, which has two ways to be given; raises UsageError for none or both."""
+    given = [x for x in (options.source, options.input) if x is not None]
+    if len(given) != 1:
+        raise UsageError("give the noisy frames once, as IN.exr or with -i IN.exr")
+    return str(given[0])
 
 
 def _lines(result: dict[str, Any]) -> list[str]:

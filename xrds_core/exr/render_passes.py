@@ -153,15 +153,31 @@ class File:
     """The channels of a file by full name, as `ViewLayer.Combined.R`.
 
     Planes are of the display window, or of `window` where that is set; zero where the
-    file has no pixels. Raises PictureError if the file cannot be read.
+    file has no pixels. Files that `also` belong to it add the channels that it lacks;
+    the only picture of such a file is called as the name given with it. Raises
+    PictureError if a file cannot be read, or has another size.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(
+        self, path: str | Path, also: Mapping[str, Path] | None = None
+    ) -> None:
         self.path = path
         self.parts = openexr_io.read(path)
+        self.own_parts = len(self.parts)
         self._places = _places(path, self.parts)
+        for name, other in (also or {}).items():
+            self._add(name, other)
         self.names = Channels(path, self._places)
         self.window: Window | None = None
+
+    def _add(self, name: str, path: Path) -> None:
+        parts = openexr_io.read(path)
+        if parts[0].display_window != self.parts[0].display_window:
+            raise PictureError(f"{path} is no part of {self.path}: its size differs")
+        for channel, (part, own) in _places(path, parts).items():
+            full = channel if "." in channel else f"{name}.{channel}"
+            self._places.setdefault(full, (len(self.parts) + part, own))
+        self.parts += parts
 
     def place(self, name: str) -> tuple[int, str]:
         """Return the part that a channel lies in, and what it is called there."""

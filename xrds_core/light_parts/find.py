@@ -49,7 +49,7 @@ class Wanted:
 
 
 def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPart, ...]:
-    """Return the wanted parts of one layer of a file; "" is what has no layer.
+    """Return the wanted parts of one layer of a file, and of what has no layer.
 
     Raises UsageError for names that the file does not have.
     """
@@ -75,14 +75,14 @@ def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPar
 
 
 def _passes(channels: Channels, layer: str) -> dict[str, tuple[str, ...]]:
-    """The channels of all colours in a layer, by the passes' names within it."""
+    """The channels of all colours in a layer, or in none, by the passes' names."""
     ahead = f"{layer}." if layer else ""
     prefixes = sorted({name.rpartition(".")[0] for name in channels.names})
     found = ((prefix, channels.of(prefix, ("RGB", "rgb"))) for prefix in prefixes)
     return {
         prefix.removeprefix(ahead): tuple(names)
         for prefix, names in found
-        if names and prefix and prefix.startswith(ahead)
+        if names and prefix and (prefix.startswith(ahead) or "." not in prefix)
     }
 
 

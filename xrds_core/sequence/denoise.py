@@ -37,7 +37,8 @@ class Files:
 
     `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
     the input as well, unchanged. `others` are files that are read besides the frames,
-    `halves` is the pattern of their second half buffers.
+    `halves` is the pattern of their second half buffers, `also` those of further files
+    of each frame.
     """
 
     source: str
@@ -45,6 +46,7 @@ class Files:
     picture_only: bool = False
     others: tuple[Path, ...] = ()
     halves: str | None = None
+    also: tuple[str, ...] = ()
 
     def write(self, number: int, frame: FrameFile, finished: Finished) -> Path:
         """Write a finished frame, whole or not at all; raises PictureError."""
@@ -67,7 +69,11 @@ class Files:
         later.
         """
         source, output = (frame_path(x, number) for x in (self.source, self.output))
-        inputs = [source, *(frame_path(self.source, n) for n in neighbours)]
+        inputs = [
+            frame_path(pattern, n)
+            for pattern in (self.source, *self.also)
+            for n in (number, *neighbours)
+        ]
         times = [path.stat().st_mtime_ns for path in inputs if path.is_file()]
         if not output.is_file() or output.stat().st_mtime_ns < max(times, default=0):
             return False
@@ -89,7 +95,8 @@ class Files:
                 f"all {len(numbers)} frames would be written to {self.output!r}; add "
                 "#### for the frame number"
             )
-        patterns = [self.source] if self.halves is None else [self.source, self.halves]
+        patterns = [self.source, *self.also]
+        patterns += [] if self.halves is None else [self.halves]
         inputs = [frame_path(pattern, n) for pattern in patterns for n in there]
         known = set(there)
         outputs = (frame_path(self.output, n) for n in numbers if n in known)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,7 +25,6 @@ from .names import Found, PassNames, find
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-    from pathlib import Path
 
     from ..arrays import Array
     from ..exr.openexr_io import Part, Window
@@ -51,7 +51,8 @@ class Reading:
     `motion_scale` are the factors that convert a motion pass of two channels to pixels
     to the next frame, x to the right and y upwards. `halves` is a pattern of files with
     the second half buffers: as many other samples of each frame. `light` are the parts
-    of the light that are read as well.
+    of the light that are read as well; `also` are patterns of files with further
+    passes. The picture of one without passes is called as the file without the number.
     """
 
     names: PassNames = field(default_factory=PassNames)
@@ -62,6 +63,7 @@ class Reading:
     motion_scale: tuple[float, float] = (1.0, 1.0)
     halves: str | None = None
     light: Wanted = field(default_factory=Wanted)
+    also: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ def read_frame(
     Raises Unfit, also NotReusable, with the path and the remedy, and PictureError for
     an incomplete file.
     """
-    file = File(path)
+    file = File(path, _also(path, number, reading))
     found = find(file.names, reading.names)
     number_of_part, channels = _target(file, found)
     part = file.parts[number_of_part]
@@ -134,11 +136,28 @@ def read_frame(
         reusable=camera is not None and depth is not None,
         light=light,
         places={
-            name: file.place(name)
+            name: _place(file, number_of_part, name)
             for each in light
             for name in (*each.channels, *each.colour)
         },
     )
+
+
+def _also(path: Path, number: int, reading: Reading) -> dict[str, Path]:
+    """The files that belong to a frame's, by their names without its number."""
+    found = {}
+    for pattern in reading.also:
+        other = frame_path(pattern, number)
+        if not other.is_file():
+            raise PictureError(f"there is no file {other}, which belongs to {path}")
+        found[Path(pattern).stem.partition("#")[0].rstrip("._-")] = other
+    return found
+
+
+def _place(file: File, part: int, name: str) -> tuple[int, str]:
+    """Where a channel is written to: what lies in other files is added to a `part`."""
+    there, own = file.place(name)
+    return (there, own) if there < file.own_parts else (part, name)
 
 
 def _layer(found: Found) -> str:

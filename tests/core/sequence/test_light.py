@@ -16,7 +16,7 @@ from xrds_core import exr
 pytest.importorskip("mitsuba_oidn")
 
 from xrds_core.denoising import Denoiser
-from xrds_core.errors import UsageError
+from xrds_core.errors import PictureError, UsageError
 from xrds_core.light_parts.find import ALL, GROUPS, Wanted
 from xrds_core.sequence.denoise import Files, denoise_sequence
 from xrds_core.sequence.reading import Reading
@@ -176,3 +176,49 @@ def test_parts_may_lie_in_other_parts_of_the_file(
     file = exr.File(out)
     found = np.dstack([file.pixels(f"ViewLayer.DiffDir.{x}") for x in "RGB"])
     assert np.array_equal(found, expected)
+
+
+def test_parts_may_lie_in_files_of_their_own(shot: Path, denoiser: Denoiser) -> None:
+    """As Blender's File Output and Arnold's drivers write them."""
+    expected = read(denoise(shot, denoiser, ALL), "DiffDir")
+    alone = {"direct": "DiffDir", "colour": "DiffCol"}
+    rest = {name: x for name, x in NAMES.items() if name not in alone}
+    for number in range(1, 4):
+        for name, to in alone.items():
+            names = {name: "RGB"}
+            path = write(shot / to, frame(number), names, **passes(number))
+            path.rename(shot / f"{to}_{number:04d}.exr")
+        write(shot / "in", frame(number), CYCLES | rest, **passes(number))
+    also = tuple(str(shot / f"{to}_####.exr") for to in alone.values())
+    files = Files(str(shot / "in/####.exr"), str(shot / "new/####.exr"), also=also)
+    reading = Reading(light=Wanted((ALL,)), also=also)
+    denoise_sequence(files, denoiser, reading=reading)
+    found = np.asarray(picture(shot / "new/0002.exr", "DiffDir"), np.float32)
+    assert np.array_equal(found, expected)
+    (shot / "DiffDir_0003.exr").unlink()
+    result = denoise_sequence(files, denoiser, reading=reading)
+    (left_out,) = result["left_out"]
+    assert "DiffDir_0003.exr, which belongs to" in left_out["reason"]
+
+
+def test_files_that_belong_to_a_frame_are_not_overwritten(
+    shot: Path, denoiser: Denoiser
+) -> None:
+    for number in range(1, 4):
+        write(shot / "parts", frame(number), CYCLES | NAMES, **passes(number))
+    also = (str(shot / "parts/####.exr"),)
+    files = Files(str(shot / "in/####.exr"), also[0], also=also)
+    with pytest.raises(PictureError, match=r"parts/0001.exr: it is an input"):
+        denoise_sequence(files, denoiser, reading=Reading(also=also))
+
+
+def test_files_of_another_size_are_no_part_of_a_frame(
+    shot: Path, denoiser: Denoiser
+) -> None:
+    small = np.zeros((4, 4), np.float32)
+    for number in range(1, 4):
+        exr.write_picture(shot / f"key_{number:04d}.exr", dict.fromkeys("RGB", small))
+    also = (str(shot / "key_####.exr"),)
+    files = Files(str(shot / "in/####.exr"), str(shot / "out/####.exr"), also=also)
+    with pytest.raises(PictureError, match=r"key_0001.exr is no part of .*0001.exr"):
+        denoise_sequence(files, denoiser, reading=Reading(also=also))
