@@ -23,14 +23,15 @@ def add_up(
 
     The rest goes to each by the square of its light: a denoiser's errors grow with it.
     `masks`, by name, are colours (H, W, 3): a part that is 0 times one cannot have
-    light there, others take it.
+    light there, others take it. A part that is dark everywhere stays so.
     """
-    found = {name: np.empty_like(part) for name, part in parts.items()}
+    lit = [name for name, part in parts.items() if part.any()] or list(parts)
+    found = dict(parts) | {name: np.empty_like(parts[name]) for name in lit}
     for first in range(0, len(picture), _ROWS):
         rows = slice(first, first + _ROWS)
         whole = np.maximum(picture[rows], np.float32(0.0))
-        held = {name: _held(part[rows]) for name, part in parts.items()}
-        can = {name: _can(name, rows, masks or {}) for name in parts}
+        held = {name: _held(parts[name][rows]) for name in lit}
+        can = {name: _can(name, rows, masks or {}) for name in lit}
         weights = {k: (np.square(x) + _TINY) * can[k] for k, x in held.items()}
         total = np.maximum(sum(weights.values()), _TINY * _TINY)
         rest = (whole - sum(held[k] * can[k] for k in held)) / total

@@ -62,7 +62,7 @@ def _difference(one: FrameFile, two: FrameFile) -> str:
         return f"their sizes are {old} and {new} pixels"
     if one.stored.picture.shape[1] != two.stored.picture.shape[1]:
         return "one has alpha, the other has not"
-    if one.stored.part_names != two.stored.part_names:
+    if one.stored.parts.keys() != two.stored.parts.keys():
         return "they hold different parts of the light"
     if one.key != two.key:
         return "they were rendered from other files or with other settings"

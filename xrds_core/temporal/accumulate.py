@@ -93,11 +93,13 @@ def accumulate(
     pairs = [x.pair for x in reprojected if x.is_reused]
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
-    parts = np.empty((height * width, 3 * len(target.part_names)), np.float32)
+    lit = _lit(target, others)
+    parts = np.empty((height * width, 3 * len(lit)), np.float32)
     samples = np.empty(height * width, np.float32)
 
     def work(first: int) -> float:
-        block = _Block(target, slice(first, min(first + _ROWS, height)), usual, images)
+        rows = slice(first, min(first + _ROWS, height))
+        block = _Block(target, rows, usual, images, lit)
         groups = [_block_sums(block, group) for group in (near, far) if group]
         for group in groups:
             group.finish()
@@ -109,7 +111,23 @@ def accumulate(
     requested = sum(x.samples for x in others) * height * width
     rejected = 1.0 - reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(x.number for x in others)}))
-    return _unpacked(target, means, parts, samples, rejected, frames)
+    light = dict(zip(lit, _planes(target, parts), strict=True))
+    found = {name: light.get(name, _dark(target)) for name in target.parts}
+    return _unpacked(target, means, found, samples, rejected, frames)
+
+
+def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
+    """Return the names of the parts that any of the frames has light in."""
+    frames = (target, *others)
+    return tuple(
+        name
+        for name in target.parts
+        if any(frame.parts.get(name) is not None for frame in frames)
+    )
+
+
+def _dark(target: Stored) -> Array:
+    return np.zeros((*target.shape, 3), np.float32)
 
 
 def _neighbours(
@@ -152,7 +170,12 @@ class _Block:
     """
 
     def __init__(
-        self, target: Stored, rows: slice, usual: float, images: Images | None
+        self,
+        target: Stored,
+        rows: slice,
+        usual: float,
+        images: Images | None,
+        lit: tuple[str, ...] = (),
     ) -> None:
         height, width = target.shape
         first, last = max(rows.start - MARGIN, 0), min(rows.stop + MARGIN, height)
@@ -162,7 +185,8 @@ class _Block:
         start = self.pixels.start - first * width
         self.inner = slice(start, start + self.pixels.stop - self.pixels.start)
         self.own = floats(target.picture[self.wide.pixels])
-        self.parts = parts_of(target, self.wide.pixels)
+        self.lit = lit
+        self.parts = self.parts_of(target, self.wide.pixels)
         self.images = None if images is None else images.of(self.wide)
         self.void = self._void()
         self.known = np.ones(len(self.own), bool)
@@ -175,6 +199,15 @@ class _Block:
             return None
         least = extreme(self.shaped(self.own[:, -1]), np.fmin)
         return np.asarray(least.ravel() == 0.0)
+
+    def parts_of(self, frame: Stored, pixels: slice | NDArray[np.integer]) -> Array:
+        """As many flat pixels (n, 3 P) of a frame's parts, of those lit in any frame."""
+        found = np.zeros((len(self.own), 3 * len(self.lit)), np.float32)
+        for number, name in enumerate(self.lit):
+            part = frame.parts[name]
+            if part is not None:
+                found[:, 3 * number : 3 * number + 3] = floats(part[pixels])
+        return found
 
     def shaped(self, x: NDArray[Any]) -> NDArray[Any]:
         """The rows (n, ...) as (H, W, ...)."""
@@ -288,7 +321,7 @@ class _Aligned:
             weight[other.invalid[pixels]] = 0.0
         # a copy: NumPy's own float32 pictures are not to be changed
         values = floats(other.picture[pixels]).copy()
-        parts = parts_of(other, pixels).copy()
+        parts = block.parts_of(other, pixels)
         sums.add(values, parts, weight, weight, _noise(other, pixels, block))
 
 
@@ -297,9 +330,9 @@ class _Reprojected:
 
     def __init__(self, pair: Pair) -> None:
         target, other = pair.here, pair.there
-        if (other.picture.shape[1], other.part_names) != (
+        if (other.picture.shape[1], other.parts.keys()) != (
             target.picture.shape[1],
-            target.part_names,
+            target.parts.keys(),
         ):
             raise PictureError(
                 f"frame {other.number} and frame {target.number} hold different passes:"
@@ -336,16 +369,8 @@ class _Reprojected:
         weight *= sample_counts(other, found.pixel, len(weight))
         reused = weight.copy()
         weight *= np.exp(found.apart * self._fall)
-        parts = parts_of(other, found.pixel)
+        parts = block.parts_of(other, found.pixel)
         sums.add(values, parts, weight, reused, _noise(other, found.pixel, block))
-
-
-def parts_of(frame: Stored, pixels: slice | NDArray[np.integer]) -> Array:
-    """Return the parts of flat pixels (n, 3 P) of a frame; P is 0 where it has none."""
-    if frame.parts is not None:
-        return floats(frame.parts[pixels])
-    count = pixels.stop - pixels.start if isinstance(pixels, slice) else len(pixels)
-    return np.empty((count, 0), np.float32)
 
 
 def sample_counts(
@@ -392,7 +417,7 @@ def _means(
 def _unpacked(
     target: Stored,
     means: Array,
-    light_parts: Array,
+    parts: Mapping[str, Array],
     samples: Array,
     rejected: float,
     frames: tuple[int, ...],
@@ -400,7 +425,6 @@ def _unpacked(
     passes = _planes(target, means)
     alpha = passes.pop()[..., 0] if means.shape[1] % 3 else None
     *radiance, albedo, normal = passes
-    named = zip(target.part_names, _planes(target, light_parts), strict=True)
     return Accumulated(
         radiance[0] if radiance else None,
         albedo,
@@ -409,7 +433,7 @@ def _unpacked(
         samples.reshape(target.shape),
         rejected,
         frames,
-        dict(named),
+        parts,
     )
 
 

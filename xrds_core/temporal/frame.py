@@ -188,8 +188,8 @@ class Stored:
     infinities and are 0 now; None if there were none. `counts` (H W): samples of each
     pixel where they differ. `noise` is that of `noise_in`, None in a frame of guides
     alone. `image` (H W) is as `inverse_depth`, of the image that a mirror or glass
-    shows, NaN where there is none; None if there is none anywhere. `parts` (H W, 3 P)
-    are light that the radiance is made of, in the order of `part_names`.
+    shows, NaN where there is none; None if there is none anywhere. `parts` (H W, 3), by
+    name, are light that the radiance is made of; None for one that is dark everywhere.
     """
 
     number: int
@@ -204,8 +204,7 @@ class Stored:
     counts: NDArray[Any] | None = None
     noise: Noise | None = None
     image: Array | None = None
-    parts: NDArray[Any] | None = None
-    part_names: tuple[str, ...] = ()
+    parts: Mapping[str, NDArray[Any] | None] = field(default_factory=dict)
 
     @property
     def has_light(self) -> bool:
@@ -262,7 +261,6 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         noise=None if noise is None else noise.without(invalid),
         image=_image(frame),
         parts=pack_parts(frame.parts, dtype),
-        part_names=tuple(frame.parts),
     )
 
 
@@ -288,15 +286,20 @@ def pack(
     return picture.astype(dtype, copy=False), invalid
 
 
-def pack_parts(parts: Mapping[str, Array], dtype: DTypeLike) -> NDArray[Any] | None:
+def pack_parts(
+    parts: Mapping[str, Array], dtype: DTypeLike
+) -> dict[str, NDArray[Any] | None]:
     """Return `Stored.parts`; a part is 0 where it is not finite, the picture stays."""
-    if not parts:
+    return {name: _packed_part(part, dtype) for name, part in parts.items()}
+
+
+def _packed_part(part: Array, dtype: DTypeLike) -> NDArray[Any] | None:
+    if not part.any():
         return None
-    whole = np.concatenate([*parts.values()], axis=-1, dtype=np.float32)
-    np.nan_to_num(whole, copy=False, posinf=0.0, neginf=0.0)
+    finite = np.nan_to_num(part.reshape(-1, 3), posinf=0.0, neginf=0.0)
     if np.dtype(dtype) == np.float16:
-        np.clip(whole, -LARGEST_HALF, LARGEST_HALF, out=whole)
-    return whole.reshape(-1, whole.shape[-1]).astype(dtype, copy=False)
+        np.clip(finite, -LARGEST_HALF, LARGEST_HALF, out=finite)
+    return finite.astype(dtype, copy=False)
 
 
 def noise_in(frame: Frame, dtype: DTypeLike) -> Noise:

@@ -61,3 +61,11 @@ def test_what_is_not_finite_is_survived() -> None:
     parts["fill"][1, 1] = np.inf
     found = add_up(light(3), parts)
     assert all(np.isfinite(part).all() for part in found.values())
+
+
+def test_a_part_that_is_dark_everywhere_stays_so() -> None:
+    parts = {"key": light(1), "off": np.zeros(SHAPE, np.float32)}
+    picture = light(2)
+    found = add_up(picture, parts)
+    assert not found["off"].any()
+    assert found["key"] == pytest.approx(picture, rel=1e-5)

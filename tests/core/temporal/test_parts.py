@@ -67,7 +67,7 @@ def test_bad_pixels_of_a_part_are_dark_in_it_alone() -> None:
 
 def test_frames_of_other_parts_are_refused() -> None:
     frames = shot(lamp=0.4)
-    frames[1] = replace(frames[1], part_names=("sky",))
+    frames[1] = replace(frames[1], parts={"sky": None})
     with pytest.raises(PictureError, match="different passes"):
         gathered(frames)
 
@@ -76,3 +76,20 @@ def test_parts_have_the_size_of_the_frame() -> None:
     frame = in_parts(0, 0.0)
     with pytest.raises(PictureError, match=r"lamp of frame 0 has shape \(2, 2, 3\)"):
         replace(frame, parts={"lamp": np.zeros((2, 2, 3), np.float32)})
+
+
+def test_parts_that_are_dark_take_no_memory() -> None:
+    frames = shot(lamp=0.4, off=0.0)
+    assert all(frame.parts["off"] is None for frame in frames)
+    found = gathered(frames)
+    assert list(found.parts) == ["lamp", "off"]
+    assert not found.parts["off"].any()
+
+
+def test_a_lamp_that_is_off_in_one_frame_is_lent_as_dark() -> None:
+    lit, dark = in_parts(0, 0.0, lamp=0.4), in_parts(0, 0.0, lamp=0.0)
+    one, two = store(replace(lit, number=1)), store(replace(dark, number=2))
+    whole, none = (accumulate(one, [x]).parts["lamp"] for x in (one, two))
+    share = 1.0 - 1.0 / accumulate(one, [two]).samples[..., None]
+    assert share.mean() > 0.3
+    assert np.allclose(none, whole * (1.0 - share), atol=1e-5)
