@@ -201,7 +201,7 @@ class _Block:
         return np.asarray(least.ravel() == 0.0)
 
     def parts_of(self, frame: Stored, pixels: slice | NDArray[np.integer]) -> Array:
-        """As many flat pixels (n, 3 P) of a frame's parts, of those lit in any frame."""
+        """As many flat pixels (n, 3 P) of a frame's parts, of those lit anywhere."""
         found = np.zeros((len(self.own), 3 * len(self.lit)), np.float32)
         for number, name in enumerate(self.lit):
             part = frame.parts[name]
