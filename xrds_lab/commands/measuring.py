@@ -255,6 +255,11 @@ def _add_shots(group: Any) -> None:
         help="time the picture of the file's samples, with fewer; on a quiet machine",
     )
     add(
+        "--light-parts",
+        action="store_true",
+        help="judge the parts of the light under a moving camera",
+    )
+    add(
         "--radii",
         type=arguments.integers,
         default=(0, 1, 2, 4),
@@ -296,6 +301,8 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         raise UsageError("no scenes: give files, or --gallery")
     if options.same_picture:
         return _bench_same_picture(options)
+    if options.light_parts:
+        return _bench_light_parts(options)
     if options.shots:
         return _bench_shots(options)
     if options.low_budgets:
@@ -393,6 +400,13 @@ def _bench_same_picture(options: argparse.Namespace) -> dict[str, Any]:
         )
     ]
     return bench_same_picture(options.scenes, options.out, cases, **_inputs(options))
+
+
+def _bench_light_parts(options: argparse.Namespace) -> dict[str, Any]:
+    from ..shots.light import bench_light_parts
+
+    samples = options.samples or (4,)
+    return bench_light_parts(options.scenes, options.out, samples, **_inputs(options))
 
 
 def _inputs(options: argparse.Namespace) -> dict[str, Any]:
