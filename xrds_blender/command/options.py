@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -281,30 +282,35 @@ def _check_pace(options: argparse.Namespace) -> None:
     paces = {"--same-picture": options.same_picture, "--deadline": options.deadline}
     others = {
         "--samples": options.samples,
-        "--scale above 1": options.scale > 1,
-        "--plain": options.plain,
-        "--time-budget": options.time_budget,
-        "--quality": options.quality,
+        **_not_full_size(options),
         "--sample-cache": getattr(options, "sample_cache", None),
     }
     chosen = [name for name, value in paces.items() if value]
-    ruled_out = chosen[1:] + [name for name, value in others.items() if value]
-    if chosen and ruled_out:
-        raise UsageError(f"{chosen[0]} cannot be had with {ruled_out[0]}")
+    if chosen:
+        _rule_out(chosen[0], dict.fromkeys(chosen[1:], True) | others)
 
 
 def _check_light(options: argparse.Namespace) -> None:
     """Raise UsageError where parts of the light could not be finished."""
-    others = {
+    if options.passes != (NONE,) or options.light_aovs:
+        _rule_out("--passes", _not_full_size(options))
+
+
+def _not_full_size(options: argparse.Namespace) -> dict[str, Any]:
+    """The options with which XRDS may not make the picture at full size."""
+    return {
         "--scale above 1": options.scale > 1,
         "--plain": options.plain,
         "--time-budget": options.time_budget,
         "--quality": options.quality,
     }
-    ruled_out = [name for name, value in others.items() if value]
-    wanted = options.passes != (NONE,) or options.light_aovs
-    if wanted and ruled_out:
-        raise UsageError(f"--passes cannot be had with {ruled_out[0]}")
+
+
+def _rule_out(option: str, others: Mapping[str, Any]) -> None:
+    """Raise UsageError for the first of the others that is given beside an option."""
+    for name, value in others.items():
+        if value:
+            raise UsageError(f"{option} cannot be had with {name}")
 
 
 def _incompatible(options: argparse.Namespace) -> str:

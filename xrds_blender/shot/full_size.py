@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from xrds_core.arrays import Array
 from xrds_core.light_parts.find import LightPart
 from xrds_core.light_parts.light import passes_by_name
+from xrds_core.light_parts.sums import added_up, light_in
 from xrds_core.sequence.finishing import finish_frame
-from xrds_core.sequence.light import added_up, light_in
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.vectors import Movement
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import takewhile
 from typing import Any
@@ -183,11 +183,8 @@ def _finish(
     started = time.perf_counter()
     picture = joined(pictures, own.seconds)
     combined = picture.views or dict.fromkeys(pictures, picture.pixels)
-    layer = engine.get_result().layers[layer_name]
-    for view, each in pictures.items():
-        for name, part in each.parts.items():
-            session.write_pass(layer, name, view, part)
-    _write(engine, layer_name, method, own, combined)
+    parts = {view: each.parts for view, each in pictures.items()}
+    _write(engine, layer_name, method, own, combined, parts)
     picture.seconds["write"] = time.perf_counter() - started
     return picture
 
@@ -204,11 +201,16 @@ def _write(
     method: Method,
     own: Sampled,
     pictures: dict[str, Array],
+    parts: Mapping[str, Mapping[str, Array]] | None = None,
 ) -> None:
-    """Write the pictures (H, W, 4) and the light passes of each view."""
+    """Write the pictures (H, W, 4) and the light passes of each view.
+
+    `parts` are those that were finished with the pictures.
+    """
     layer = engine.get_result().layers[layer_name]
     for view in own.views:
-        for name, light in method.light_passes(own, view).items():
+        finished = (parts or {}).get(view, {})
+        for name, light in {**method.light_passes(own, view), **finished}.items():
             session.write_pass(layer, name, view, light)
     session.write_combined(engine, layer_name, pictures)
 

@@ -216,11 +216,13 @@ def sampling_of(
         still=not facts.moving,
         has_halves=_has_halves(scene, request, settings.count(of_file)),
         needs_motion=blurred and shapes_move(depsgraph),
-        light=light_in(engine, depsgraph, request),
+        light=parts_of_layer(engine, depsgraph, request),
     )
 
 
-def light_in(engine: Any, depsgraph: Any, request: Request) -> tuple[LightPart, ...]:
+def parts_of_layer(
+    engine: Any, depsgraph: Any, request: Request
+) -> tuple[LightPart, ...]:
     """The parts of its light that the request wants of a layer.
 
     Raises UsageError for names that it does not have.
@@ -267,7 +269,7 @@ def sample_frame(
     window; `on_sampled` takes its views before that. Raises what `noisy_frame` does.
     """
     number, count = depsgraph.scene_eval.frame_current, request.settings.own_samples
-    light = light_in(engine, depsgraph, request)
+    light = parts_of_layer(engine, depsgraph, request)
     if not request.settings.temporal_radius:
         samples, seconds = _alone(engine, depsgraph, request, light)
         return Sampled(number, dict(samples), seconds, samples=count, light=light)

@@ -194,9 +194,7 @@ class Denoiser:
             raise UsageError("this denoiser is closed; make another one")
         pictures = check(radiance, albedo, normal, parts or {})
         stages = Stages(progress)
-        made_of = {
-            name: np.zeros(x.shape, np.float32) for name, x in (parts or {}).items()
-        }
+        made_of = {k: np.zeros(x.shape, np.float32) for k, x in pictures.parts.items()}
         result = np.zeros(np.shape(radiance), np.float32)
         result[..., 3:] = pictures.alpha
         prefiltered: tuple[str, ...] = ()

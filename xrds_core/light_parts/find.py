@@ -56,8 +56,7 @@ def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPar
     if not wanted:
         return ()
     passes = _passes(channels, layer)
-    best = max(wanted.renderers, key=lambda x: len(_of(x, passes)))
-    known = _of(best, passes)
+    known = max((_of(x, passes) for x in wanted.renderers), key=len)
     named = {name: part for part in known for name in part.names}
     found: list[LightPart] = []
     for which in wanted.which:

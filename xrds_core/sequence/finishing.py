@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..light_parts.sums import added_up, light_in
 from ..temporal.accumulate import Accumulated, accumulate
 from ..temporal.local_filters import box
-from .light import added_up, light_in
 from .rectangles import rectangles
 from .same_picture import BLOCK, block_means
 

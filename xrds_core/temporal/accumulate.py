@@ -112,7 +112,10 @@ def accumulate(
     rejected = 1.0 - reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(x.number for x in others)}))
     light = dict(zip(lit, _planes(target, parts), strict=True))
-    found = {name: light.get(name, _dark(target)) for name in target.parts}
+    found = {
+        name: light[name] if name in light else np.zeros((height, width, 3), np.float32)
+        for name in target.parts
+    }
     return _unpacked(target, means, found, samples, rejected, frames)
 
 
@@ -124,10 +127,6 @@ def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
         for name in target.parts
         if any(frame.parts.get(name) is not None for frame in frames)
     )
-
-
-def _dark(target: Stored) -> Array:
-    return np.zeros((*target.shape, 3), np.float32)
 
 
 def _neighbours(

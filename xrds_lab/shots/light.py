@@ -100,7 +100,7 @@ def bench_light_parts(
 def _render(shot: Shot, samples: int, reference_samples: int) -> _Rendered:
     from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.sampling import light_in, noisy_frame
+    from xrds_blender.shot.sampling import noisy_frame, parts_of_layer
 
     scene = open_scene(shot.path, shot.window)
     animate(scene, shot.window, "pan", MIDDLE, _REACH)
@@ -123,7 +123,7 @@ def _render(shot: Shot, samples: int, reference_samples: int) -> _Rendered:
     numbers = range(MIDDLE - _REACH, MIDDLE + _REACH + 1)
     frames = {number: sampled(number) for number in numbers}
     truth = [sampled(MIDDLE, samples=reference_samples, seed=seed) for seed in _SEEDS]
-    parts = call_engine(scene, lambda *given: light_in(*given, job))
+    parts = call_engine(scene, lambda *given: parts_of_layer(*given, job))
     return _Rendered(frames, truth, parts, float(scene.view_settings.exposure))
 
 

@@ -1,4 +1,4 @@
-"""The parts of a frame's light on their way from the file to the file."""
+"""What parts of a frame's light sum up to, before and after they are denoised."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..light_parts.adding_up import add_up
+from .adding_up import add_up
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping, Sequence
 
     from ..arrays import Array
-    from ..light_parts.find import LightPart
+    from .find import LightPart
 
 # Of the mean radiance: where parts miss no more of it, they are all there are.
 _ALL = 0.002
