@@ -1,11 +1,11 @@
 """Build the extension's zips, for each platform and Python of Blender.
 
 Each holds a manifest, a root module and wheels. `light` zips render at full size: they
-hold the project's own wheel, Open Image Denoise and OpenEXR. `full` zips hold PyTorch's
-CPU build and safetensors beside these, and the large network's weights. The `bare` zip,
-one for all, holds the project's own wheel alone, for pipelines that bring the
-libraries. Blender's own `extension build` makes and checks them; it comes with the bpy
-module.
+hold the project's own wheel, Open Image Denoise, OpenEXR and wgpu. `full` zips hold
+PyTorch's CPU build and safetensors beside these, and the large network's weights. The
+`bare` zip, one for all, holds the project's own wheel alone, for pipelines that bring
+the libraries. Blender's own `extension build`, which comes with the bpy module, makes
+and checks them.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ PACKAGES = ("xrds_core", "xrds_blender")
 SIZE_LIMIT = 300_000_000  # bytes; what the extension platform means to take
 # Python inside Blender, and the Blenders that have it: from, to (not included).
 PYTHONS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
-LIGHT = ("mitsuba-oidn", "OpenEXR")
+LIGHT = ("mitsuba-oidn", "OpenEXR", "wgpu")
 LARGE = "paper_*.safetensors"  # 29 MB of weights, in `full` zips alone
 
 

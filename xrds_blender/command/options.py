@@ -171,6 +171,7 @@ def add_network(command: argparse.ArgumentParser) -> None:
         help="fixed exposure factor, for animations and border renders",
     )
     add("--device", default="auto", help=DEVICE_HELP)
+    add_accumulate_on(command)
     add(
         "--threads",
         type=arguments.positive,
@@ -183,6 +184,17 @@ def add_network(command: argparse.ArgumentParser) -> None:
         help="memory for the network, such as 500M or 4G",
     )
     add("--weights", type=Path, help="weights file, or a folder of them")
+
+
+def add_accumulate_on(command: argparse.ArgumentParser) -> None:
+    """Add what neighbours' samples are accumulated on."""
+    command.add_argument(
+        "--accumulate-on",
+        default="auto",
+        metavar="DEVICE",
+        help="where neighbours' samples are accumulated: auto (a graphics card where "
+        "one is), cpu, gpu, or a part of a card's name",
+    )
 
 
 def add_output(command: argparse.ArgumentParser, **how: Any) -> None:

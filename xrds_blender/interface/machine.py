@@ -19,6 +19,8 @@ class Machine:
     """The preferences as plain values; the defaults hold where there is no add-on."""
 
     device: str = "auto"
+    accumulate_on: str = "auto"
+    """What neighbours' samples are accumulated on; as in `Accumulator`."""
     memory_limit: int | None = None
     """Bytes that the network may add; None leaves it to the device."""
     weights: Path | None = None
@@ -39,6 +41,7 @@ def machine() -> Machine:
         return Machine()
     return Machine(
         device=stored.device or "auto",
+        accumulate_on=stored.accumulate_on,
         memory_limit=stored.memory_limit * MEBIBYTE or None,
         weights=folder(stored.weights),
         threads=stored.threads or None,

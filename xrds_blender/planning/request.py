@@ -44,11 +44,13 @@ class Goal:
 class Machine:
     """What the network and our denoiser run on.
 
-    `device` as `xrds info` lists them, or auto; `memory_limit` in bytes; `weights` is a
+    `device` as `xrds info` lists them, or auto; `accumulate_on` as in `Accumulator`;
+    `memory_limit` in bytes; `weights` is a
     folder of weights files or one file, in the place of the shipped ones.
     """
 
     device: str = "auto"
+    accumulate_on: str = "auto"
     memory_limit: int | None = None
     threads: int | None = None
     weights: str | Path | None = None

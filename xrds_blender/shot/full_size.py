@@ -11,9 +11,9 @@ from xrds_core.arrays import Array
 from xrds_core.light_parts.find import LightPart
 from xrds_core.light_parts.light import passes_by_name
 from xrds_core.light_parts.sums import added_up, light_in
+from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.finishing import finish_frame
-from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.vectors import Movement
+from xrds_core.temporal.accumulate import Accumulated
 
 from ..cycles.samples import Samples
 from ..frame.denoisers import load_denoiser
@@ -46,7 +46,7 @@ class FullSize(Method):
         self._on_sampled, self._denoise_in_time = on_sampled, denoise_in_time
         self._quality = self.settings.quality
         self._denoiser = load_denoiser(self._quality, request.machine)
-        self._movement = Movement()
+        self._accumulate = Accumulator(request.machine.accumulate_on)
 
     def sample(
         self,
@@ -98,7 +98,7 @@ class FullSize(Method):
     ) -> Accumulated:
         """One view with the samples of its neighbours."""
         neighbours = own.neighbours(view, others)
-        return accumulate(own.views[view], neighbours, self._movement)
+        return self._accumulate(own.views[view], neighbours)
 
     def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
         """Samples by themselves, denoised."""
@@ -117,7 +117,7 @@ class FullSize(Method):
             own,
             neighbours,
             self._denoiser,
-            self._movement,
+            self._accumulate,
             report,
             accumulated=gathered,
             light=light,

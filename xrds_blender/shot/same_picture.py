@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xrds_core.arrays import Array
+from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.extra_samples import ExtraSamples, enriched, mean_of, with_extra
 from xrds_core.sequence.history import History
 from xrds_core.sequence.rectangles import rectangles
@@ -32,7 +33,6 @@ from xrds_core.sequence.same_picture import (
 from xrds_core.sequence.worth import Ratio, Worth
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.sample_subsets import SampleSubset
-from xrds_core.temporal.vectors import Movement
 
 from ..cycles.low_camera import Region
 from ..cycles.more_samples import more_samples
@@ -135,7 +135,9 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     """
     if not can_save(scene, request, frames):
         return None
-    history = History(Movement()) if can_continue(scene, request) else None
+    history = None
+    if can_continue(scene, request):
+        history = History(Accumulator(request.machine.accumulate_on))
     found = SamePicture(scene.cycles.samples, history)
     found.share = found.possible(_FIRST)
     return found

@@ -16,9 +16,9 @@ from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
 from ..frames import RADIUS, frame_numbers, frame_path
 from ..light_parts.light import passes_of
-from ..temporal.vectors import Movement
 from ..temporal.window import Shot, Window
 from ..time_left import Clock
+from .accumulator import Accumulator
 from .finishing import Finished, finish_frame
 from .loading import Loader
 from .neighbour_frames import NeighbourSelection
@@ -111,6 +111,7 @@ def denoise_sequence(
     frames: Iterable[int] | None = None,
     radius: int | None = None,
     reading: Reading | None = None,
+    accumulate: Accumulator | None = None,
     resume: bool = False,
     say: Say = lambda _: None,
 ) -> dict[str, Any]:
@@ -120,26 +121,25 @@ def denoise_sequence(
         files: inputs and outputs.
         frames: their numbers; by default all that exist. Samples of other existing
             frames, between these or next to them, are reused, too.
-        radius: the temporal radius: how many frames before and after are neighbours; by
-            default what the files recommend, or 4.
+        radius: how many frames before and after are neighbours; by default what the
+            files recommend, or 4.
+        accumulate: by default on a graphics card where there is one.
         resume: skip outputs that are complete, of the right size, and newer than all
             inputs whose samples they reuse.
         say: takes a line about a frame that is finished, left out, or not reusable.
 
     Returns:
-        {output, temporal_radius, device, frames, kept, left_out}; `left_out` are the
-        requested frames that could not be read, with the reason.
+        What `xrds denoise --json` prints; `left_out` says why frames were not read.
 
     Raises:
-        UsageError: there are no frames, or outputs are impossible.
+        UsageError: no frames, or impossible outputs.
         PictureError: no frame can be read, the first lacks passes, or an output cannot
             be written; outputs before it are complete.
     """
     numbers = sorted(set(frames)) if frames else _all_frames(files.source)
     there = _there(files.source, numbers)
     files.check(numbers, there)
-    if "#" not in Path(files.source).name:
-        radius = radius or 0  # a single frame
+    radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
     loader = Loader(files.source, reading or Reading(), reusable=radius != 0, say=say)
     loader.look(numbers, set(there))
     readable = [n for n in numbers if n not in loader.failed]
@@ -152,13 +152,15 @@ def denoise_sequence(
     done = {n for n in numbers if n in written and files.is_done(n, shot.neighbours(n))}
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
-    todo = [n for n in readable if n not in done]
-    shot = Shot(tuple(todo), radius, others=beside)
+    shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
+    accumulate = accumulate or Accumulator()
+    entries = _entries(files, denoiser, accumulate, shot, loader, resume, say)
+    devices = {"device": denoiser.device, "accumulated_on": accumulate.device}
     return {
         "output": files.output,
         "temporal_radius": radius,
-        "device": denoiser.device,
-        "frames": list(_entries(files, denoiser, shot, loader, resume, say)),
+        **devices,
+        "frames": list(entries),
         "kept": sorted(done),
         "left_out": _left_out(loader, [n for n in numbers if n not in done]),
     }
@@ -167,6 +169,7 @@ def denoise_sequence(
 def _entries(
     files: Files,
     denoiser: Denoiser,
+    accumulate: Accumulator,
     shot: Shot,
     loader: Loader,
     resume: bool,
@@ -176,7 +179,7 @@ def _entries(
 
     A frame that cannot be written is left out; two of them in a row are an error.
     """
-    selection, movement, fails = NeighbourSelection(say), Movement(), False
+    selection, fails = NeighbourSelection(say), False
     clock = Clock()
     for found in Window(shot, loader.load):
         number, own = found.number, found.own
@@ -185,7 +188,7 @@ def _entries(
             continue
         others = selection.select(number, own, found.neighbours)
         finished = finish_frame(
-            own.stored, others, denoiser, movement, region=own.inner, light=own.light
+            own.stored, others, denoiser, accumulate, region=own.inner, light=own.light
         )
         started = time.perf_counter()
         try:

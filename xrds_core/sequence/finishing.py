@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..light_parts.sums import added_up, light_in
-from ..temporal.accumulate import Accumulated, accumulate
+from ..temporal.accumulate import Accumulated
 from ..temporal.local_filters import box
 from .rectangles import rectangles
 from .same_picture import BLOCK, block_means
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ..denoising import Denoised, Denoiser
     from ..light_parts.find import LightPart
     from ..temporal.frame import Stored
-    from ..temporal.vectors import Movement
+    from .accumulator import Accumulator
     from .rectangles import Rectangle
 
 
@@ -63,7 +63,7 @@ def finish_frame(
     own: Stored,
     neighbours: Sequence[Stored],
     denoiser: Denoiser,
-    movement: Movement,
+    accumulate: Accumulator,
     progress: Callable[[float], bool] | None = None,
     *,
     region: tuple[slice, slice] | None = None,
@@ -82,8 +82,8 @@ def finish_frame(
     """
     started = time.perf_counter()
     if accumulated is None:
-        accumulated = accumulate(own, neighbours, movement)
-    alone = accumulate(own, []) if neighbours else accumulated
+        accumulated = accumulate(own, neighbours)
+    alone = accumulate(own) if neighbours else accumulated
     share = _share(accumulated, alone, own.samples)
     denoise_started = time.perf_counter()
     region = region or (slice(None), slice(None))

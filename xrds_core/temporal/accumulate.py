@@ -13,8 +13,8 @@ from __future__ import annotations
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -77,46 +77,91 @@ def accumulate(
     others: Sequence[Stored],
     movement: Movement | None = None,
     threads: int | None = None,
+    card: OnCard | None = None,
 ) -> Accumulated:
     """Return `target` with the samples of `others`.
 
     `movement` caches the object motion of this shot; without it each call computes it
     again. No samples are reused across a shot cut. Without others the result is
     bit-identical to the target. `threads`: all processors by default; the result does
-    not depend on it. Raises PictureError where the frames hold different passes.
+    not depend on it. `card` accumulates what it can, in the processor's place. Raises
+    PictureError where the frames hold different passes.
     """
     others = same_shot(target, others)
-    near, far = _neighbours(target, others, movement or Movement())
+    groups = _neighbours(target, others, movement or Movement())
     usual = light_for_albedo(target) if others and target.has_light else 0.0
-    height, width = target.shape
-    reprojected = [x for x in (*near, *far) if isinstance(x, _Reprojected)]
-    pairs = [x.pair for x in reprojected if x.is_reused]
+    pairs = [x.pair for group in groups for x in group if x.pair and x.is_reused]
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
-    means = np.empty((height * width, target.picture.shape[1]), np.float32)
     lit = _lit(target, others)
+    sums = None
+    if card is not None and card.takes(target, others) and not lit:
+        sums = card.sums(target, [x for x in groups if x], images, usual)
+    if sums is None:
+        sums = _by_rows(target, groups, images, usual, lit, threads)
+    height, width = target.shape
+    requested = sum(x.samples for x in others) * height * width
+    rejected = 1.0 - sums.reused / requested if requested else 0.0
+    frames = tuple(sorted({target.number, *(x.number for x in others)}))
+    return _unpacked(target, sums, lit, rejected, frames)
+
+
+class OnCard(Protocol):
+    """What accumulates on a graphics card."""
+
+    def takes(self, target: Stored, others: Sequence[Stored]) -> bool:
+        """Whether it can accumulate these frames."""
+
+    def sums(
+        self,
+        target: Stored,
+        groups: Sequence[Sequence[Aligned | Reprojected]],
+        images: Images | None,
+        usual: float,
+    ) -> Sums | None:
+        """The means of a frame and its groups of neighbours; None where it fails."""
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Means over a frame's own and the samples that it reuses.
+
+    `passes` of the picture, each (H, W, C), `parts` that are lit (H, W, 3), `samples`
+    (H, W), and how many samples were `reused` in all.
+    """
+
+    passes: list[Array]
+    parts: list[Array]
+    samples: Array
+    reused: float
+
+
+def _by_rows(
+    target: Stored,
+    groups: Sequence[Sequence[Aligned | Reprojected]],
+    images: Images | None,
+    usual: float,
+    lit: tuple[str, ...],
+    threads: int | None,
+) -> Sums:
+    """Accumulate block by block, on the processor."""
+    height, width = target.shape
+    means = np.empty((height * width, target.picture.shape[1]), np.float32)
     parts = np.empty((height * width, 3 * len(lit)), np.float32)
     samples = np.empty(height * width, np.float32)
 
     def work(first: int) -> float:
         rows = slice(first, min(first + _ROWS, height))
         block = _Block(target, rows, usual, images, lit)
-        groups = [_block_sums(block, group) for group in (near, far) if group]
-        for group in groups:
-            group.finish()
-        found = _means(target, block, groups)
+        sums = [_block_sums(block, group) for group in groups if group]
+        for each in sums:
+            each.finish()
+        found = _means(target, block, sums)
         means[block.pixels], parts[block.pixels], samples[block.pixels] = found
-        return float(sum(group.reused.sum(dtype=np.float64) for group in groups))
+        return float(sum(each.reused.sum(dtype=np.float64) for each in sums))
 
     reused = sum(_in_threads(work, range(0, height, _ROWS), threads))
-    requested = sum(x.samples for x in others) * height * width
-    rejected = 1.0 - reused / requested if requested else 0.0
-    frames = tuple(sorted({target.number, *(x.number for x in others)}))
-    light = dict(zip(lit, _planes(target, parts), strict=True))
-    found = {
-        name: light[name] if name in light else np.zeros((height, width, 3), np.float32)
-        for name in target.parts
-    }
-    return _unpacked(target, means, found, samples, rejected, frames)
+    passes, light = _planes(target, means), _planes(target, parts)
+    return Sums(passes, light, samples.reshape(target.shape), reused)
 
 
 def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
@@ -131,7 +176,7 @@ def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
 
 def _neighbours(
     target: Stored, others: Sequence[Stored], movement: Movement
-) -> tuple[list[_Aligned | _Reprojected], list[_Aligned | _Reprojected]]:
+) -> tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]]:
     """Return the neighbours in two groups: the nearest ones, and those farther away."""
     rest = [x for x in others if not target.shows_same(x)]
     motions = dict(
@@ -139,14 +184,14 @@ def _neighbours(
     )
     depth_range = inverse_depth_range(target) if rest else None
     near = _nearest(target, others)
-    groups: tuple[list[_Aligned | _Reprojected], list[_Aligned | _Reprojected]] = (
+    groups: tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]] = (
         [],
         [],
     )
     for other in others:
-        neighbour: _Aligned | _Reprojected = _Aligned(other)
+        neighbour: Aligned | Reprojected = Aligned(other)
         if id(other) in motions:
-            neighbour = _Reprojected(
+            neighbour = Reprojected(
                 pair(target, other, motions[id(other)], depth_range)
             )
         groups[other.number not in near].append(neighbour)
@@ -191,7 +236,14 @@ class _Block:
         self.known = np.ones(len(self.own), bool)
         if target.invalid is not None:
             self.known = ~target.invalid[self.wide.pixels]
-        self.similarity = _similarity(target, self, usual) if target.has_light else None
+        self._target, self._usual = target, usual
+
+    @cached_property
+    def similarity(self) -> Similarity | None:
+        """The similarity weights; None where there is no light to compare."""
+        if not self._target.has_light:
+            return None
+        return _similarity(self._target, self, self._usual)
 
     def _void(self) -> Mask | None:
         if not self.own.shape[1] % 3:
@@ -288,7 +340,7 @@ class _Sums:
         self.reused *= factor
 
 
-def _block_sums(block: _Block, neighbours: Sequence[_Aligned | _Reprojected]) -> _Sums:
+def _block_sums(block: _Block, neighbours: Sequence[Aligned | Reprojected]) -> _Sums:
     """Return the sums of a group of neighbours over a block."""
     sums = _Sums(block)
     for neighbour in neighbours:
@@ -306,15 +358,17 @@ def _noise(
     return tuple(floats(x[pixels]) for x in (noise.brightness, noise.difference))
 
 
-class _Aligned:
+class Aligned:
     """A neighbour that shows the same in every pixel: no reprojection is needed."""
 
+    pair = None
+
     def __init__(self, other: Stored) -> None:
-        self._other = other
+        self.other = other
 
     def add(self, block: _Block, sums: _Sums) -> None:
-        """As `_Reprojected.add`."""
-        other, pixels = self._other, block.wide.pixels
+        """As `Reprojected.add`."""
+        other, pixels = self.other, block.wide.pixels
         weight = sample_counts(other, pixels, len(block.own))
         if other.invalid is not None:
             weight[other.invalid[pixels]] = 0.0
@@ -324,8 +378,12 @@ class _Aligned:
         sums.add(values, parts, weight, weight, _noise(other, pixels, block))
 
 
-class _Reprojected:
-    """A neighbour whose pixels are found by reprojection and weighted."""
+class Reprojected:
+    """A neighbour whose pixels are found by reprojection and weighted.
+
+    `tiles` are its weights by coarse rejection; `fall` times the squared distance is
+    the logarithm of a weight.
+    """
 
     def __init__(self, pair: Pair) -> None:
         target, other = pair.here, pair.there
@@ -338,26 +396,26 @@ class _Reprojected:
                 " give radiance, its parts and alpha for all frames of a shot or for "
                 "none"
             )
-        self._tiles = tile_weights(pair)
-        self.pair = pair
-        self._fall = np.float32(-0.5 * target.samples ** (2 / 3) / _SOFTNESS**2)
+        self.tiles = tile_weights(pair)
+        self.pair, self.other = pair, other
+        self.fall = np.float32(-0.5 * target.samples ** (2 / 3) / _SOFTNESS**2)
 
     @property
     def is_reused(self) -> bool:
         """Whether any of its tiles is."""
-        return bool(self._tiles.any())
+        return bool(self.tiles.any())
 
     def add(self, block: _Block, sums: _Sums) -> None:
         """Add its samples that the pixels of a block reuse."""
-        other = self.pair.there
+        other = self.other
         if not self.is_reused:
             return
         found = places(self.pair, block.wide)
-        tiles = pixel_weights(self._tiles, self.pair.here.shape, block.rows).ravel()
+        tiles = pixel_weights(self.tiles, self.pair.here.shape, block.rows).ravel()
         if block.images is not None:
             found.put(block.images.at, block.images.places(self.pair))
             # tiles compare surfaces; light that changes everywhere leaves none of them
-            tiles[block.images.at] = self._tiles.max()
+            tiles[block.images.at] = self.tiles.max()
         if other.invalid is not None:
             found.seen[...] &= ~other.invalid.take(found.pixel)
         values = floats(other.picture.take(found.pixel, axis=0))
@@ -367,7 +425,7 @@ class _Reprojected:
         weight *= tiles
         weight *= sample_counts(other, found.pixel, len(weight))
         reused = weight.copy()
-        weight *= np.exp(found.apart * self._fall)
+        weight *= np.exp(found.apart * self.fall)
         parts = block.parts_of(other, found.pixel)
         sums.add(values, parts, weight, reused, _noise(other, found.pixel, block))
 
@@ -415,24 +473,25 @@ def _means(
 
 def _unpacked(
     target: Stored,
-    means: Array,
-    parts: Mapping[str, Array],
-    samples: Array,
+    sums: Sums,
+    lit: tuple[str, ...],
     rejected: float,
     frames: tuple[int, ...],
 ) -> Accumulated:
-    passes = _planes(target, means)
-    alpha = passes.pop()[..., 0] if means.shape[1] % 3 else None
+    passes = list(sums.passes)
+    alpha = passes.pop()[..., 0] if target.picture.shape[1] % 3 else None
     *radiance, albedo, normal = passes
+    light = dict(zip(lit, sums.parts, strict=True))
+    dark = np.zeros((*target.shape, 3), np.float32)
     return Accumulated(
         radiance[0] if radiance else None,
         albedo,
         normal,
         alpha,
-        samples.reshape(target.shape),
+        sums.samples,
         rejected,
         frames,
-        parts,
+        {name: light.get(name, dark) for name in target.parts},
     )
 
 

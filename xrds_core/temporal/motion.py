@@ -49,9 +49,10 @@ _AS_DISTANCE_AT_RIMS, _MOST_AT_RIMS = 0.3, 1.0
 # whole pixels where a position is nearer to a centre than this, per frame between.
 _FEW_SAMPLES = 2.0
 _OFF, _WHOLE = 0.6, 0.02
-# Multiples of these spread evenly over a unit square (M. Roberts, R3 and R2 sequences).
-_SPREAD_X = np.array([0.8191725134, 0.6710436067, 0.5497004779], np.float32)
-_SPREAD_Y = np.array([0.7548776662, 0.5698402910, 0.6180339887], np.float32)
+# Multiples of these spread evenly over a unit square (M. Roberts, R3 and R2 sequences);
+# as fractions of 2^32, so that no rounding depends on the processor.
+_SPREAD_X = np.array([3518319155, 2882110345, 2360945575], np.uint32)
+_SPREAD_Y = np.array([3242174889, 2447445414, 2654435769], np.uint32)
 # Distance between spots along each axis, in small and large pictures.
 _STRIDES, _LARGE = (2, 4), 1_000_000
 
@@ -122,6 +123,19 @@ class Pair:
         turn = _axes(here) @ turn @ _axes(there).T
         same = np.allclose(turn, np.eye(3), atol=1e-7)
         return None if same else turn.astype(np.float32)
+
+    @property
+    def jitters(self) -> bool:
+        """Whether the pixels taken are jittered where places lie at pixel centres."""
+        here, there = self.here, self.there
+        is_static = here.camera.same(replace(there.camera, window=here.camera.window))
+        moment = here.number == there.number
+        return not (here.samples > _FEW_SAMPLES or is_static or moment)
+
+    @property
+    def whole_motion(self) -> float:
+        """The squared distance to a pixel's centre up to which a place lies there."""
+        return (_WHOLE * abs(self.there.number - self.here.number)) ** 2
 
 
 def _axes(camera: Camera) -> Matrix:
@@ -300,19 +314,30 @@ def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
 
 def _jitter(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
     """Jitter the pixel taken where places (n,) lie at pixel centres."""
-    here, there = pair.here, pair.there
-    frames = abs(there.number - here.number)
-    is_static = here.camera.same(replace(there.camera, window=here.camera.window))
-    if here.samples > _FEW_SAMPLES or is_static or not frames:
+    there = pair.there
+    if not pair.jitters:
         return
-    at = np.flatnonzero(found.seen & (found.apart < (_WHOLE * frames) ** 2))
-    pixel = np.stack([grid.x[at], grid.y[at], np.full(len(at), there.number)])
+    at = np.flatnonzero(found.seen & (found.apart < pair.whole_motion))
+    column, row = (x[at].astype(np.uint32) for x in (grid.x, grid.y))
+    number = np.uint32(there.number % (1 << 32))
     off_x, off_y = (
-        np.float32(2 * _OFF) * ((spread @ pixel) % 1.0 - np.float32(0.5))
-        for spread in (_SPREAD_X, _SPREAD_Y)
+        np.float32(2 * _OFF) * (_fraction(column, row, number, x) - np.float32(0.5))
+        for x in (_SPREAD_X, _SPREAD_Y)
     )
     other = nearest(x[at] + off_x, y[at] + off_y, there.shape)
     found.pixel[at[other.seen]] = other.pixel[other.seen]
+
+
+def _fraction(
+    column: NDArray[np.uint32],
+    row: NDArray[np.uint32],
+    number: np.uint32,
+    spread: NDArray[np.uint32],
+) -> Array:
+    """Return numbers (n,) in [0, 1) that spread over pixels and frames."""
+    with np.errstate(over="ignore"):  # the whole part goes
+        mixed = column * spread[0] + row * spread[1] + number * spread[2]
+    return (mixed >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
 
 
 def _penalise_rims(found: Places, pair: Pair, grid: Grid) -> None:

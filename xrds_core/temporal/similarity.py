@@ -70,6 +70,17 @@ def light_for_albedo(frame: Stored) -> float:
     return light / (squares + _DARKEST_ALBEDO)
 
 
+def penalties(samples: float) -> tuple[np.float32, np.float32]:
+    """Return those of errors seen in guides, and of light that changes."""
+    guides, changes = (max(x / samples, _LEAST) for x in (_GUIDES, _CHANGES))
+    return np.float32(guides), np.float32(changes)
+
+
+def guide_area(samples: float) -> int:
+    """Return over how many pixels across errors of guides are averaged."""
+    return next(area for most, area in _GUIDE_AREAS if samples <= most)
+
+
 class Similarity:
     """Compares a frame with its neighbours: `add` each of them, then get `weights`.
 
@@ -92,10 +103,7 @@ class Similarity:
     ) -> None:
         self._guides, self._known = guides_of(picture[..., 3:]), known
         self._brightness, self._noise = brightness, noise
-        self._penalties = [
-            np.float32(max(x / samples, _LEAST)) for x in (_GUIDES, _CHANGES)
-        ]
-        self._area = next(area for most, area in _GUIDE_AREAS if samples <= most)
+        self._penalties, self._area = penalties(samples), guide_area(samples)
         self._unsure = np.float32(_UNSURE) * box(noise, max(self._area, _NOISE_AREA))
         texture = root_of_luminance(picture[..., 3:6])
         self._variance = _variance(difference, texture)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from shots import World, camera, view
 
+from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.history import LONGEST, History
 from xrds_core.temporal.frame import Stored, store
-from xrds_core.temporal.vectors import Movement
 
 NOISE, RADIUS = 0.3, 2
 STILL = World(card=(0.0, 0.0))
@@ -19,7 +19,7 @@ def frame(number: int, world: World = STILL) -> Stored:
 
 def run(worlds: list[World]) -> History:
     """The history beside the last of some frames, with a radius."""
-    history = History(Movement())
+    history = History(Accumulator())
     frames = [frame(n, world) for n, world in enumerate(worlds)]
     for middle in range(len(frames)):
         around = frames[max(0, middle - RADIUS) : middle + RADIUS + 1]

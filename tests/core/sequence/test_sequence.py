@@ -21,13 +21,13 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import PictureError, UsageError
+from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.denoise import Files, denoise_sequence
 from xrds_core.sequence.file_errors import NotReusable, Unfit
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.sequence.names import PassNames
 from xrds_core.sequence.reading import Reading, read_frame
 from xrds_core.temporal.frame import store
-from xrds_core.temporal.vectors import Movement
 
 NUMBERS = range(1, 6)
 
@@ -58,7 +58,7 @@ def finished(numbers: Any, own: int, denoiser: Denoiser) -> Any:
     stored = {n: store(frame(n), np.float16) for n in numbers}
     near = sorted((n for n in numbers if n != own), key=lambda n: (abs(n - own), n))
     lenders = [stored[n] for n in near]
-    return finish_frame(stored[own], lenders, denoiser, Movement()).picture
+    return finish_frame(stored[own], lenders, denoiser, Accumulator()).picture
 
 
 def test_files_give_the_picture_that_frames_in_memory_give(
@@ -109,9 +109,11 @@ def test_where_nothing_is_reused_the_picture_is_that_of_the_frame_alone(
     own, other = (replace(frame(n), samples=4) for n in (1, 2))
     half = other.radiance.shape[1] // 2
     other.radiance[:, half:] = np.nan
-    alone = finish_frame(store(own), [], denoiser, Movement()).picture
+    alone = finish_frame(store(own), [], denoiser, Accumulator()).picture
     counting, told = Counting(denoiser), []
-    shot = finish_frame(store(own), [store(other)], counting, Movement(), told.append)
+    shot = finish_frame(
+        store(own), [store(other)], counting, Accumulator(), told.append
+    )
     assert len(counting.pictures) == 2
     assert told == [0.0, 0.5, 0.5, 1.0]
     lent = shot.accumulated.samples > 4.0
@@ -129,7 +131,7 @@ def test_what_is_lent_everywhere_or_nowhere_is_denoised_once(
     for own, *others in (still, (frame(1), nothing)):
         counting = Counting(denoiser)
         lenders = [store(other) for other in others]
-        finish_frame(store(own), lenders, counting, Movement())
+        finish_frame(store(own), lenders, counting, Accumulator())
         assert len(counting.pictures) == 1
 
 
@@ -140,7 +142,7 @@ def test_pixels_without_samples_are_no_holes_in_the_frame_alone(
     own.radiance[10:14, 20:24] = np.nan
     other.radiance[:, 50:] = np.nan  # so that both pictures are made
     counting = Counting(denoiser)
-    finish_frame(store(own), [store(other)], counting, Movement())
+    finish_frame(store(own), [store(other)], counting, Accumulator())
     assert len(counting.pictures) == 2
     assert all(np.isfinite(x[:20, :40]).all() for x in counting.pictures)
 
@@ -306,7 +308,7 @@ def test_data_windows(
     assert part.display_window == sequences.WINDOW
     stored = {n: store(frame(n, window=window, shape=shape)) for n in NUMBERS}
     others = [stored[n] for n in (2, 4, 1, 5)]
-    expected = finish_frame(stored[3], others, denoiser, Movement())
+    expected = finish_frame(stored[3], others, denoiser, Accumulator())
     assert told["frames"][2]["temporal"]["mean_samples"] > 1.5
     inside = (slice(8, -8), slice(8, -8))  # the denoiser looks beyond a crop's edges
     difference = np.abs(picture(path) - expected.picture)[inside]

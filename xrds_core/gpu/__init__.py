@@ -1,0 +1,1 @@
+"""Accumulation on a graphics card of any vendor, by WebGPU."""
