@@ -75,14 +75,9 @@ class Band:
 
     def _gathered(self, neighbour: Neighbour, offset: int, sums: Any) -> Iterator[Call]:
         """The samples of a neighbour, added to those of its group."""
-        here, pair, extent = self._here, None, None
-        step = here.step
-        if neighbour.pair is not None:
-            pair = here.pair(neighbour)
-            first, rows = self._rows
-            width = self._size[0]
-            part = pair.extent[first * width : (first + rows) * width]
-            step, extent = pair.step, here.card.upload(part)
+        here = self._here
+        pair = None if neighbour.pair is None else here.pair(neighbour)
+        step = here.step if pair is None else pair.step
         there = here.frames.of(neighbour.other)
         step = flagged(
             step,
@@ -98,7 +93,7 @@ class Band:
             there.picture,
             there.noise,
             there.counts,
-            extent,
+            pair and pair.extent,
             pair and pair.slots,
             pair and pair.moved,
             pair and pair.masks,

@@ -13,6 +13,7 @@ from .step import STEP, flagged
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from ..arrays import Array
     from ..temporal.accumulate import Reprojected
     from ..temporal.candidates import Images
     from ..temporal.frame import Stored
@@ -37,6 +38,7 @@ class Target:
         self.noise_of_guides = self.card.upload(frame.noise.guides.astype(np.float32))
         self.has_images = images is not None
         self.image = self.lattice = None
+        self._extent: Any | None = None
         self._slots: tuple[NDArray[np.intp], Any] | None = None
         self._pairs: dict[int, PairOnCard] = {}
         step = np.zeros((), STEP)
@@ -63,6 +65,15 @@ class Target:
             self._pairs[key] = PairOnCard(self, neighbour)
         return self._pairs[key]
 
+    def extent(self, extent: tuple[Array, Array]) -> Any:
+        """The range of inverse depth around each pixel; the same for all pairs."""
+        if self._extent is None:
+            both = np.empty((len(extent[0]), 2), np.float32)
+            for place, values in enumerate(extent):
+                both[:, place] = known(values)
+            self._extent = self.card.upload(both)
+        return self._extent
+
     def slots(self, pixels: NDArray[np.intp]) -> Any:
         """The place of each pixel among those that move; the same for all pairs."""
         if self._slots is None or not np.array_equal(self._slots[0], pixels):
@@ -81,11 +92,9 @@ class PairOnCard:
     def __init__(self, here: Target, neighbour: Reprojected) -> None:
         pair, card = neighbour.pair, here.card
         self.tiles = card.upload(neighbour.tiles)
-        self.extent = np.stack([known(x) for x in pair.extent], axis=-1)
+        self.extent = here.extent(pair.extent)
         self.slots = self.moved = self.masks = None
         motion = pair.object_motion
-        if motion is not None and not (len(motion.pixels) or motion.moving.any()):
-            motion = None
         if motion is not None:
             self._upload_motion(here, motion)
         step = here.step.copy()

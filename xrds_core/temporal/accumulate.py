@@ -88,7 +88,7 @@ def accumulate(
     PictureError where the frames hold different passes.
     """
     others = same_shot(target, others)
-    groups = _neighbours(target, others, movement or Movement())
+    groups = _neighbours(target, others, movement or Movement(), threads)
     usual = light_for_albedo(target) if others and target.has_light else 0.0
     pairs = [x.pair for group in groups for x in group if x.pair and x.is_reused]
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
@@ -175,7 +175,10 @@ def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
 
 
 def _neighbours(
-    target: Stored, others: Sequence[Stored], movement: Movement
+    target: Stored,
+    others: Sequence[Stored],
+    movement: Movement,
+    threads: int | None,
 ) -> tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]]:
     """Return the neighbours in two groups: the nearest ones, and those farther away."""
     rest = [x for x in others if not target.shows_same(x)]
@@ -184,17 +187,15 @@ def _neighbours(
     )
     depth_range = inverse_depth_range(target) if rest else None
     near = _nearest(target, others)
-    groups: tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]] = (
-        [],
-        [],
-    )
-    for other in others:
-        neighbour: Aligned | Reprojected = Aligned(other)
-        if id(other) in motions:
-            neighbour = Reprojected(
-                pair(target, other, motions[id(other)], depth_range)
-            )
-        groups[other.number not in near].append(neighbour)
+
+    def neighbour(other: Stored) -> Aligned | Reprojected:
+        if id(other) not in motions:
+            return Aligned(other)
+        return Reprojected(pair(target, other, motions[id(other)], depth_range))
+
+    groups: tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]] = ([], [])
+    for found in _in_threads(neighbour, others, threads):
+        groups[found.other.number not in near].append(found)
     return groups
 
 

@@ -103,6 +103,11 @@ class ObjectMotion:
     moving: NDArray[np.bool_]
     beside: NDArray[np.bool_] | None = None
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether neither frame shows anything that moves by itself."""
+        return not len(self.pixels) and not self.moving.any()
+
 
 @dataclass(frozen=True)
 class Pair:
@@ -211,6 +216,8 @@ def pair(
     """
     forth = reprojection(here.camera, there.camera)
     back = reprojection(there.camera, here.camera)
+    if object_motion is not None and object_motion.is_empty:
+        object_motion = None
     if object_motion is not None:
         object_motion = _with_rims(object_motion, here, there)
     return Pair(

@@ -125,7 +125,7 @@ fn rim_distance(here: u32, there: u32) -> f32 {
 }
 
 // As if only the camera moved.
-fn still_place(pixel: u32, at: u32) -> Place {
+fn still_place(pixel: u32) -> Place {
     let own = centre(pixel, step.size.x);
     let forth = reproject(step.forth, own.x, own.y, here_depth[pixel]);
     var found = nearest(forth.x, forth.y, forth.ahead);
@@ -142,7 +142,7 @@ fn still_place(pixel: u32, at: u32) -> Place {
         back.x + (forth.x - own.x - there.x), back.y + (forth.y - own.y - there.y)
     );
     let square = dot(left, left);
-    let range = extent[at];
+    let range = extent[pixel];
     let seen = found.seen && back.ahead && square < TOLERANCE * TOLERANCE
         && is_known(range.x) && back.depth >= range.x && back.depth <= range.y;
     if seen { found.apart += AS_DISTANCE * square; }
@@ -210,7 +210,7 @@ fn gather(@builtin(global_invocation_id) id: vec3u) {
     var found = Place(pixel, 0.0, true);
     var share = 1.0;
     if !has(ALIGNED) {
-        found = still_place(pixel, at);
+        found = still_place(pixel);
         if has(MOVING) { found = with_object_motion(found, pixel); }
         share = coarse_weight(id.x, row);
         if has(IMAGES) && is_known(image[pixel]) {
