@@ -18,10 +18,17 @@ _SELF = Path("/proc/self")
 def describe(device: str = "cpu") -> dict[str, Any]:
     """Processor, cores, memory and versions, for a report."""
     import bpy
-    import torch
 
-    from xrds_core import info
+    from xrds_core.version import package_version
 
+    networks: dict[str, Any] = {"torch": None, "torch_threads": None}
+    with suppress(ImportError):  # full size and shots need none
+        import torch
+
+        networks = {
+            "torch": torch.__version__,
+            "torch_threads": torch.get_num_threads(),
+        }
     return {
         "processor": _processor(),
         "cores": cores(),
@@ -30,9 +37,8 @@ def describe(device: str = "cpu") -> dict[str, Any]:
         "device": device,
         "python": platform.python_version(),
         "blender": bpy.app.version_string,
-        "torch": torch.__version__,
-        "torch_threads": torch.get_num_threads(),
-        "xrds": info.package_version(),
+        **networks,
+        "xrds": package_version(),
     }
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from xrds_blender.command import arguments
 from xrds_blender.command.deferred import need_blender, no_lines
-from xrds_blender.command.options import DEVICE_HELP, PRESETS
+from xrds_blender.command.options import DEVICE_HELP, PRESETS, add_accumulate_on
 from xrds_core.errors import UsageError, XRDSError
 
 from ..progress import report_line
@@ -230,6 +230,7 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     add("--weights", type=Path, help="folder of weights files")
     _add_shots(command.add_argument_group("shots, instead of single frames"))
     _add_gallery(command.add_argument_group("the gallery, instead of scenes"))
+    _add_device_report(command.add_argument_group("graphics cards, instead of scenes"))
     command.set_defaults(work=_bench, lines=_bench_lines)
     return command
 
@@ -293,20 +294,41 @@ def _add_gallery(group: Any) -> None:
     add("--references-only", action="store_true", help="render these, judge nothing")
 
 
+def _add_device_report(group: Any) -> None:
+    add = group.add_argument
+    add(
+        "--device-report",
+        action="store_true",
+        help="every stage on this machine's graphics card and on its processor",
+    )
+    add(
+        "--minutes",
+        type=arguments.factor,
+        default=20.0,
+        help="after which nothing more is begun; a second run goes on (default: 20)",
+    )
+    add_accumulate_on(group)
+
+
 def _bench(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("bench")
     if options.gallery is not None:
         return _bench_gallery(options)
+    if options.device_report:
+        return _device_report(options)
     if not options.scenes:
-        raise UsageError("no scenes: give files, or --gallery")
-    if options.same_picture:
-        return _bench_same_picture(options)
-    if options.light_parts:
-        return _bench_light_parts(options)
-    if options.shots:
-        return _bench_shots(options)
-    if options.low_budgets:
-        return _low_budgets(options)
+        raise UsageError("no scenes: give files, or --gallery, or --device-report")
+    kinds = {
+        "same_picture": _bench_same_picture,
+        "light_parts": _bench_light_parts,
+        "shots": _bench_shots,
+        "low_budgets": _low_budgets,
+    }
+    chosen = [work for name, work in kinds.items() if getattr(options, name)]
+    return (chosen or [_bench_frames])[0](options)
+
+
+def _bench_frames(options: argparse.Namespace) -> dict[str, Any]:
     from ..bench.bench import bench
     from ..bench.sweep import NOISE_THRESHOLDS
 
@@ -326,6 +348,20 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         model=options.model,
         weights=options.weights,
         device=options.device,
+    )
+
+
+def _device_report(options: argparse.Namespace) -> dict[str, Any]:
+    from ..cards.report import SAMPLES, SIZES, bench_devices
+
+    return bench_devices(
+        options.out,
+        sizes=(options.resolution,) if options.resolution else SIZES,
+        samples=options.samples or SAMPLES,
+        minutes=options.minutes,
+        rounds=options.rounds,
+        reference_samples=options.reference_samples or 512,
+        accumulate_on=options.accumulate_on,
     )
 
 

@@ -1,0 +1,54 @@
+"""`xrds bench --device-report`, without a card: its rows, its files, going on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from xrds_lab.cards.report import bench_devices
+
+SIZE = (160, 90)
+
+
+def run(out: Path, minutes: float = 20.0) -> dict:
+    return bench_devices(
+        out,
+        sizes=[SIZE],
+        samples=(2,),
+        radii=(1,),
+        minutes=minutes,
+        rounds=1,
+        reference_samples=8,
+        accumulate_on="cpu",
+    )
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("report")
+
+
+def test_without_minutes_nothing_is_begun_and_all_is_told(folder: Path) -> None:
+    found = run(folder, minutes=0.0)
+    assert found["rows"] == []
+    assert len(found["failures"]) == 3
+    assert all("run it again" in why for why in found["failures"].values())
+
+
+def test_a_second_run_goes_on_to_the_whole_report(folder: Path) -> None:
+    found = run(folder)
+    assert found["failures"] == {}
+    assert found["machine"]["accumulated_on"] == "cpu"
+    # for three shots: Cycles on both devices, the frame alone, radius 1
+    assert len(found["rows"]) == 3 * 4
+    for row in found["rows"]:
+        assert row["psnr"] > 10.0
+        if row["method"] == "xrds":
+            assert row["pixels_apart"] == 0.0  # the processor twice
+            assert row["cpu_total"] >= row["cpu_accumulate"] + row["cpu_denoise"] - 0.1
+    names = {path.name for path in folder.iterdir()}
+    assert {"results.json", "results.csv", "error-seconds.svg"} <= names
+    assert "XRDS, radius 1" in (folder / "error-seconds.svg").read_text()
+    again = run(folder, minutes=0.0)
+    assert again["rows"] == found["rows"]

@@ -1,0 +1,126 @@
+"""`xrds bench --device-report`: every stage on the card of this machine and beside it.
+
+Three shots of the gallery, which the project makes itself. Rows are kept as they are
+made, so a run that was stopped, or ran out of minutes, goes on where it was.
+"""
+
+from __future__ import annotations
+
+import time
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from xrds_blender.command import streams
+from xrds_core.atomic import read_json, write_json
+from xrds_core.sequence.accumulator import Accumulator
+
+from ..bench import machine
+from ..bench.journal import Journal
+from ..csv_table import write_table
+from ..progress import report_line
+from .cycles import use_card
+from .measure import CPU, Case, measure
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    Row = dict[str, Any]
+    Size = tuple[int, int]
+
+SHOTS = ("hand_held", "figure", "plane_mirror")
+SIZES = ((1920, 1080), (3840, 2160))
+SAMPLES = (16, 4, 1, 64)
+RADII = (1, 2, 4)
+MINUTES = 20.0
+
+
+def bench_devices(
+    out: Path,
+    *,
+    sizes: Sequence[Size] = SIZES,
+    samples: Sequence[int] = SAMPLES,
+    radii: Sequence[int] = RADII,
+    minutes: float = MINUTES,
+    rounds: int = 3,
+    reference_samples: int = 512,
+    accumulate_on: str = "auto",
+) -> dict[str, Any]:
+    """Measure what is missing within `minutes`, write the report and return it.
+
+    Times are of a whole frame, medians of `rounds`; `cpu` and `card` take turns. The
+    first of `samples` is timed by stage, the others give their pictures alone. Without
+    a card `card` is the processor, too. Raises UsageError for a card asked for that is
+    not here.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    kept = out / "cache"
+    kept.mkdir(exist_ok=True)
+    journal = Journal(kept / "journal.json", report_line)
+    ends = time.monotonic() + 60.0 * minutes
+    with streams.stdout_to(kept / "blender.log"):
+        cycles, card = use_card(), Accumulator(accumulate_on).device
+        about = {
+            **machine.describe(),
+            "cycles_device": cycles,
+            "accumulated_on": card,
+        }
+        report_line(f"Cycles on {cycles}, accumulation on {card}")
+        known: list[Row] = []
+        for case in _cases(sizes, samples, radii, cycles, card):
+            one = replace(case, rounds=rounds, reference_samples=reference_samples)
+            path = kept / f"{one.label}.json"
+            if not path.is_file():
+                if time.monotonic() > ends:
+                    journal.failures[one.label] = "no minutes were left: run it again"
+                    continue
+                with journal.attempt(one.label):
+                    report_line(one.label)
+                    write_json(path, measure(one, kept))
+            if path.is_file():
+                known += read_json(path)
+            _write(known, about, journal, out)
+    return _write(known, about, journal, out)
+
+
+def _cases(
+    sizes: Sequence[Size],
+    samples: Sequence[int],
+    radii: Sequence[int],
+    cycles: str,
+    card: str,
+) -> list[Case]:
+    """Every shot at the first size; the first one at larger sizes, which take long."""
+    return [
+        Case(
+            shot,
+            size,
+            count,
+            tuple(radii),
+            is_timed=count == samples[0],
+            cycles=cycles,
+            card=None if card == CPU else card,
+        )
+        for size in sizes
+        for shot in (SHOTS if size == sizes[0] else SHOTS[:1])
+        for count in samples
+    ]
+
+
+def _write(
+    rows: Sequence[Row], about: dict[str, Any], journal: Journal, out: Path
+) -> dict[str, Any]:
+    results = {"machine": about, "rows": list(rows), "failures": journal.failures}
+    write_json(out / "results.json", results)
+    write_table(out / "results.csv", [_flat(row) for row in rows])
+    with suppress(ImportError):  # a bare machine has no matplotlib: draw it elsewhere
+        from .plot import draw
+
+        draw(results, out / "error-seconds.svg")
+    return results
+
+
+def _flat(row: Row) -> Row:
+    width, height = row["size"]
+    return {**row, "size": f"{width}x{height}"}
