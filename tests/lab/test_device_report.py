@@ -40,8 +40,8 @@ def test_a_second_run_goes_on_to_the_whole_report(folder: Path) -> None:
     found = run(folder)
     assert found["failures"] == {}
     assert found["machine"]["accumulated_on"] == "cpu"
-    # for three shots: Cycles on both devices, the frame alone, radius 1
-    assert len(found["rows"]) == 3 * 4
+    # for three shots: Cycles on both devices, the frame alone, radius 1, a whole shot
+    assert len(found["rows"]) == 3 * 5
     for row in found["rows"]:
         assert row["psnr"] > 10.0
         if row["method"] == "xrds":

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from xrds_core.temporal.window import Shot, Window, place_of
@@ -21,6 +22,7 @@ from ..planning.request import Request
 from ..scene.cuts import cuts
 from .cache import SampleCache
 from .methods import Method
+from .overlap import Overlap, samples_on_card
 from .pace import pace_of
 from .render import method_of
 from .same_picture import Part, render_more
@@ -38,7 +40,8 @@ def render_shot(
 
     Frames that `is_done` says are there are neighbours alone, and only where they are
     needed. A `cache` stores the samples of every frame rendered; what it has already is
-    not rendered again, and may lie beyond the ends of these frames. Yields numbers and
+    not rendered again, and may lie beyond the ends of these frames. Where Cycles has a
+    card, a frame is finished while the next one is sampled. Yields numbers and
     pictures; the scene stays at the last frame rendered.
     What the request leaves open is chosen at the first frame to render. Raises what
     `render` raises.
@@ -62,20 +65,30 @@ def render_shot(
     if not cache:
         method.pace = pace_of(scene, request, shot)
     window = Window(shot, load)
-    for found in window:
-        number, own = found.number, found.own
-        if is_done(number):  # another machine was quicker
-            continue
-        others = list(found.neighbours.values())
-        own = _completed(scene, method, frames, own, others)
-        if own.views is not found.own.views:  # it lends what it has got as well
-            window.replace(number, replace(own, gathered={}))
-        if method.lacks(own, others):
-            own = _sample(scene, method, frames, number)
-        pictures = {view: method.finish(own, others, view) for view in own.views}
-        picture = joined(pictures, own.seconds)
-        picture.seconds["total"] = sum(picture.seconds.values())
-        yield number, chosen.described(picture)
+    # more samples of a frame are rendered, and judged, before it is finished
+    is_on = method.pace is None and samples_on_card(scene)
+    with Overlap[tuple[int, Picture]](is_on) as overlap:
+        for found in window:
+            number, own = found.number, found.own
+            if is_done(number):  # another machine was quicker
+                continue
+            others = list(found.neighbours.values())
+            own = _completed(scene, method, frames, own, others)
+            if own.views is not found.own.views:  # it lends what it has got as well
+                window.replace(number, replace(own, gathered={}))
+            if method.lacks(own, others):
+                own = _sample(scene, method, frames, number)
+            yield from overlap.put(partial(_finished, method, chosen, own, others))
+        yield from overlap.rest()
+
+
+def _finished(
+    method: Method, chosen: Chosen, own: Sampled, others: Sequence[Sampled]
+) -> tuple[int, Picture]:
+    pictures = {view: method.finish(own, others, view) for view in own.views}
+    picture = joined(pictures, own.seconds)
+    picture.seconds["total"] = sum(picture.seconds.values())
+    return own.number, chosen.described(picture)
 
 
 def _completed(

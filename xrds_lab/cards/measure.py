@@ -7,6 +7,7 @@ import time
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
+from unittest.mock import patch
 
 import numpy as np
 
@@ -30,6 +31,7 @@ T = TypeVar("T")
 
 CPU = "cpu"
 REACH = 4
+_FRAMES = range(1, 10)
 _REFERENCE_SEEDS = (2_000_003, 2_000_029)  # no noisy frame's is near
 
 
@@ -88,6 +90,8 @@ def measure(case: Case, folder: Path) -> list[Row]:
     for radius in (0, *case.radii):
         row = _ours(case, own, lenders[: 2 * radius])
         rows.append({"method": "xrds", "radius": radius, "sample": seconds, **row})
+    if case.is_timed:
+        rows.append({"method": "shot", "radius": REACH, **_whole_shot(scene, case)})
     about = {"shot": case.shot, "size": list(case.size), "samples": case.samples}
     peak = {"peak_memory": machine.peak(), "card_memory": memory_in_use()}
     return [about | _judged(row, alone, truth) | peak for row in rows]
@@ -184,6 +188,26 @@ def _ours(case: Case, own: Stored, lenders: Sequence[Stored]) -> Row:
         "pixels_apart": float((apart > 1e-3).mean()),
         "most_apart": float(apart.max()),
     }
+
+
+def _whole_shot(scene: Any, case: Case) -> Row:
+    """Seconds per frame of the whole shot, finished beside sampling and in turn."""
+    from xrds_blender.planning.request import render_request
+    from xrds_blender.shot import shot
+
+    job = render_request(
+        scale=1,
+        samples=case.samples,
+        temporal_radius=REACH,
+        accumulate_on=case.card or CPU,
+    )
+    found = {}
+    for name, is_on in (("in_turn", False), ("overlapped", case.cycles != "CPU")):
+        with patch.object(shot, "samples_on_card", lambda _, is_on=is_on: is_on):
+            pictures, taken = _clocked(list, shot.render_shot(scene, job, _FRAMES))
+        found[name] = taken / len(pictures)
+        radiance = np.asarray(pictures[len(pictures) // 2][1].radiance)
+    return {"radiance": radiance, **found}
 
 
 def _finishing(case: Case, devices: Mapping[str, str]) -> Callable[..., Any]:

@@ -1,0 +1,64 @@
+"""Finishing a frame while Cycles' card samples the next one.
+
+On the processor both would share the same cores: nothing is gained there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from types import TracebackType
+from typing import Any, Generic, TypeVar
+
+import bpy
+
+T = TypeVar("T")
+
+
+def samples_on_card(scene: Any) -> bool:
+    """Whether Cycles renders a scene on a graphics card."""
+    if scene.cycles.device != "GPU":
+        return False
+    cycles = bpy.context.preferences.addons.get("cycles")
+    return cycles is not None and bool(cycles.preferences.has_active_device())
+
+
+class Overlap(Generic[T]):
+    """Runs work beside what goes on here, one piece at a time, in order.
+
+    Without `is_on` it runs where it is put. Work that is left when an error ends the
+    `with` block is dropped: nobody waits for it.
+    """
+
+    def __init__(self, is_on: bool) -> None:
+        self._pool = ThreadPoolExecutor(1, "finish") if is_on else None
+        self._begun: Future[T] | None = None
+
+    def put(self, work: Callable[[], T]) -> Iterator[T]:
+        """Begin some work; yields what the piece before it has made.
+
+        What that piece raises is raised here.
+        """
+        if self._pool is None:
+            yield work()
+            return
+        yield from self.rest()
+        self._begun = self._pool.submit(work)
+
+    def rest(self) -> Iterator[T]:
+        """Yield what the last piece makes, if there is one."""
+        begun, self._begun = self._begun, None
+        if begun is not None:
+            yield begun.result()
+
+    def __enter__(self) -> Overlap[T]:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._pool is not None:
+            self._pool.shutdown(wait=kind is None, cancel_futures=True)
