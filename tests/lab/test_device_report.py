@@ -14,6 +14,7 @@ SIZE = (160, 90)
 def run(out: Path, minutes: float = 20.0) -> dict:
     return bench_devices(
         out,
+        shots=("hand_held",),
         sizes=[SIZE],
         samples=(2,),
         radii=(1,),
@@ -32,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_without_minutes_nothing_is_begun_and_all_is_told(folder: Path) -> None:
     found = run(folder, minutes=0.0)
     assert found["rows"] == []
-    assert len(found["failures"]) == 3
+    assert len(found["failures"]) == 1
     assert all("run it again" in why for why in found["failures"].values())
 
 
@@ -40,8 +41,8 @@ def test_a_second_run_goes_on_to_the_whole_report(folder: Path) -> None:
     found = run(folder)
     assert found["failures"] == {}
     assert found["machine"]["accumulated_on"] == "cpu"
-    # for three shots: Cycles on both devices, the frame alone, radius 1, a whole shot
-    assert len(found["rows"]) == 3 * 5
+    # Cycles on both devices, the frame alone, radius 1, a whole shot
+    assert len(found["rows"]) == 5
     for row in found["rows"]:
         assert row["psnr"] > 10.0
         if row["method"] == "xrds":

@@ -19,7 +19,7 @@ from ..gallery.judge import compare
 from .cycles import memory_in_use, render_on
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from xrds_core.arrays import Array
@@ -40,8 +40,8 @@ class Case:
     """A shot of the gallery at a size and some samples per pixel.
 
     Stages are timed where it `is_timed`: what follows sampling takes as long whatever
-    the samples. `cycles` is what `use_card` returned; `card` is what accumulates beside
-    the processor, or None.
+    the samples. `cycles` is the kind of Cycles' card, or CPU; `card` is what
+    accumulates beside the processor, or None.
     """
 
     shot: str
@@ -61,45 +61,50 @@ class Case:
         return f"{self.shot}-{width}x{height}-{self.samples}spp"
 
 
-def measure(case: Case, folder: Path) -> list[Row]:
-    """Rows of a case: one of each method; raises SceneError if it does not render."""
+def measure(case: Case, folder: Path) -> Iterator[Row]:
+    """Yield the rows of a case, one of each method.
+
+    Raises SceneError if it does not render.
+    """
     from xrds_blender.interface.registration import ensure_registered
 
     from ..gallery.table import SHOTS
 
     ensure_registered()
-
     shot = SHOTS[case.shot]
-    scene = shot.build(folder, case.size)
-    render_on(scene, case.cycles)
+    scene, middle = shot.build(folder, case.size), shot.judged[0]
+    about = {
+        "shot": case.shot,
+        "size": list(case.size),
+        "samples": case.samples,
+        "cycles_device": render_on(scene, case.cycles),
+    }
     scene.render.use_persistent_data = True
     scene.cycles.samples = case.samples
-    numbers = shot.frames
-    middle = shot.judged[0]
     machine.forget_peak()
-    sampled, seconds = _sample(scene, case, numbers)
-    truth = _references(scene, case, middle)
-    rivals = _cycles(scene, case, middle)
-    own = sampled[middle]
-    lenders = sorted(
-        (x for n, x in sampled.items() if n != middle),
-        key=lambda x: abs(x.number - middle),
-    )
-    rows = [{"method": name, "radius": 0, **row} for name, row in rivals.items()]
+    truth, rivals = _references(scene, case, middle), _cycles(scene, case, middle)
     alone = rivals["cycles_oidn"]["radiance"]
+
+    def judged(method: str, radius: int, row: Row) -> Row:
+        found = _judged(row, alone, truth)
+        peaks = {"peak_memory": machine.peak(), "card_memory": memory_in_use()}
+        return {**about, "method": method, "radius": radius, **found, **peaks}
+
+    for name, row in rivals.items():
+        yield judged(name, 0, {**row})
+    sampled, seconds = _sample(scene, case, shot.frames)
+    own = sampled.pop(middle)
+    lenders = sorted(sampled.values(), key=lambda x: abs(x.number - middle))
     for radius in (0, *case.radii):
         row = _ours(case, own, lenders[: 2 * radius])
-        rows.append({"method": "xrds", "radius": radius, "sample": seconds, **row})
+        yield judged("xrds", radius, {"sample": seconds, **row})
     if case.is_timed:
-        rows.append({"method": "shot", "radius": REACH, **_whole_shot(scene, case)})
-    about = {"shot": case.shot, "size": list(case.size), "samples": case.samples}
-    peak = {"peak_memory": machine.peak(), "card_memory": memory_in_use()}
-    return [about | _judged(row, alone, truth) | peak for row in rows]
+        yield judged("shot", REACH, _whole_shot(scene, case))
 
 
 def _sample(
     scene: Any, case: Case, numbers: Sequence[int]
-) -> tuple[Mapping[int, Stored], float]:
+) -> tuple[dict[int, Stored], float]:
     """The frames' samples, and the median of their seconds."""
     from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.request import render_request

@@ -1,7 +1,7 @@
 """`xrds bench --device-report`: every stage on the card of this machine and beside it.
 
-Three shots of the gallery, which the project makes itself. Rows are kept as they are
-made, so a run that was stopped, or ran out of minutes, goes on where it was.
+Three shots of the gallery, which the project makes itself. Cases are kept as they are
+done, so a run that was stopped, or ran out of minutes, goes on where it was.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..bench import machine
 from ..bench.journal import Journal
 from ..csv_table import write_table
 from ..progress import report_line
-from .cycles import use_card
+from .cycles import find_card
 from .measure import CPU, Case, measure
 
 if TYPE_CHECKING:
@@ -39,6 +39,7 @@ MINUTES = 20.0
 def bench_devices(
     out: Path,
     *,
+    shots: Sequence[str] = SHOTS,
     sizes: Sequence[Size] = SIZES,
     samples: Sequence[int] = SAMPLES,
     radii: Sequence[int] = RADII,
@@ -49,6 +50,7 @@ def bench_devices(
 ) -> dict[str, Any]:
     """Measure what is missing within `minutes`, write the report and return it.
 
+    `shots` are of the gallery; at further sizes the first of them is measured.
     Times are of a whole frame, medians of `rounds`; `cpu` and `card` take turns. The
     first of `samples` is timed by stage, the others give their pictures alone. Without
     a card `card` is the processor, too. Raises UsageError for a card asked for that is
@@ -60,7 +62,7 @@ def bench_devices(
     journal = Journal(kept / "journal.json", report_line)
     ends = time.monotonic() + 60.0 * minutes
     with streams.stdout_to(kept / "blender.log"):
-        cycles, card = use_card(), Accumulator(accumulate_on).device
+        cycles, card = find_card(), Accumulator(accumulate_on).device
         about = {
             **machine.describe(),
             "cycles_device": cycles,
@@ -68,7 +70,7 @@ def bench_devices(
         }
         report_line(f"Cycles on {cycles}, accumulation on {card}")
         known: list[Row] = []
-        for case in _cases(sizes, samples, radii, cycles, card):
+        for case in _cases(shots, sizes, samples, radii, cycles, card):
             one = replace(case, rounds=rounds, reference_samples=reference_samples)
             path = kept / f"{one.label}.json"
             if not path.is_file():
@@ -76,15 +78,25 @@ def bench_devices(
                     journal.failures[one.label] = "no minutes were left: run it again"
                     continue
                 with journal.attempt(one.label):
-                    report_line(one.label)
-                    write_json(path, measure(one, kept))
+                    rows = []
+                    for row in measure(one, kept):
+                        rows.append(row)
+                        report_line(_line(one, row))
+                        _write([*known, *rows], about, journal, out)
+                    write_json(path, rows)
             if path.is_file():
                 known += read_json(path)
             _write(known, about, journal, out)
     return _write(known, about, journal, out)
 
 
+def _line(case: Case, row: Row) -> str:
+    radius = f", radius {row['radius']}" if row["radius"] else ""
+    return f"{case.label}: {row['method']}{radius}, {row['psnr']:.2f} dB"
+
+
 def _cases(
+    shots: Sequence[str],
     sizes: Sequence[Size],
     samples: Sequence[int],
     radii: Sequence[int],
@@ -103,7 +115,7 @@ def _cases(
             card=None if card == CPU else card,
         )
         for size in sizes
-        for shot in (SHOTS if size == sizes[0] else SHOTS[:1])
+        for shot in (shots if size == sizes[0] else shots[:1])
         for count in samples
     ]
 
