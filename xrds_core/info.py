@@ -10,6 +10,7 @@ from typing import Any
 import torch
 
 from .errors import WeightsError
+from .gpu.card import card_names
 from .superres.weights import DIRECTORY, available, guide_filter_record
 from .version import package_version
 
@@ -50,6 +51,7 @@ def info(
         "torch": torch.__version__,
         "blender": blender,
         "devices": devices(),
+        "accumulation": [*card_names(), "cpu"],
         **shipped_costs(),
         "weights": available(weights),
         "guide_filter": guide_filter_record(weights),
@@ -63,6 +65,7 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
         f"Blender {result['blender'] or 'not found'}"
     )
     yield f"devices: {', '.join(result['devices'])}"
+    yield f"accumulation: {', '.join(result['accumulation'])}"
     yield "the paper's network, x4, 1024 x 1024 output:"
     yield "  RDST  XDG  parameters    MACs  with attention   FLOPs"
     for row in result["paper_table"]:

@@ -82,6 +82,7 @@ def test_lines_show_missing_blender_and_weights() -> None:
         "torch": "2.0",
         "blender": None,
         "devices": ["cpu"],
+        "accumulation": ["Radeon", "cpu"],
         "paper_table": [],
         "presets": {},
         "weights": [],
@@ -90,4 +91,5 @@ def test_lines_show_missing_blender_and_weights() -> None:
     text = "\n".join(info.lines(told))
     assert "Blender not found" in text
     assert "weights: none" in text
+    assert "accumulation: Radeon, cpu" in text
     assert "own.safetensors  sha256 0123456789abcdef" in text
