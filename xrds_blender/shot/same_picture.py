@@ -58,6 +58,7 @@ FEWEST_FRAMES = 16
 """Frames of a shot from which it pays: the first costs more than the file asks for."""
 _FIRST = 0.25  # share that the first frames have; less was not tried by then
 _FALL = 0.5  # the next share over the present one, at least, where frames add up
+_LEAST_AREA = 200_000  # pixels that are measured in, where there are more
 _LEAST = 2  # samples of a frame, which has halves then
 # Blocks with less than this share of what they need get more samples, and frames.
 _LACKING, _ENOUGH = 0.75, 0.9
@@ -222,9 +223,12 @@ class SamePicture:
         share = self._shares.get(own.number, 1.0)
         gained = gain(accumulated[view], own.views[view])
         spent = _Seconds({"accumulate": time.perf_counter() - started})
+        shape = own.views[view].shape
         extra: dict[str, ExtraSamples] = {}
+        regions: list[Region] = []
         if self._worth.is_due(len(beside)):
-            ratio, extra = self._measure(method, own, others, spent.of(more))
+            regions = measured_regions(shape)
+            ratio, extra = self._measure(method, own, others, regions, spent.of(more))
             whole = gained.of(gained.errors > 0.0)
             self._worth.add(ratio, share, whole, len(beside))
             self._measured_in, self._tried = own.number, share
@@ -232,13 +236,12 @@ class SamePicture:
         lacks = self._lacks(share, gained)
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
         self._choose_next(share, gained.of(rest), beside)
-        everywhere = bool(extra)
-        if not everywhere:
-            shape = own.views[view].shape
-            extra = self._top_up(shape, share, gained, lacks, spent.of(more))
+        for part in _rest(lacks, regions):  # where it was measured it has all now
+            further = self._top_up(shape, share, gained, part, spent.of(more))
+            extra = _together(extra, further)
         own = _with_more(own, extra, self._weight)
         share *= own.views[view].samples / before
-        if everywhere:
+        if len(regions) == 1:  # all of the picture
             self._shares[own.number] = share
         return replace(
             own,
@@ -291,30 +294,42 @@ class SamePicture:
         method: Finishing,
         own: Sampled,
         others: Sequence[Sampled],
+        regions: Sequence[Region],
         more: _More,
     ) -> tuple[Ratio, dict[str, ExtraSamples]]:
         """The squared error of a frame with its neighbours over that of all samples.
 
-        By two renders of half of the file's samples, of two seeds: halves of one
-        sequence would not be independent. The frame has them from then on.
+        In some regions, by two renders of half of the file's samples, of two seeds:
+        halves of one sequence would not be independent. The frame has them from then
+        on.
         """
         view, length = next(iter(own.views)), max(1, self.samples // 2)
-        halves = [more(Part(0, length, 0.5, other=other)) for other in (1, 2)]
-        parts = []
-        for found in (each[view] for each in halves):
-            denoised = method.denoised(found.radiance, found.albedo, found.normal)
-            parts.append(Rendered(found.radiance, denoised))
-        pair = parts[0], parts[1]
-        together = method.finish(own, others, view).radiance
-        alone = method.finish(replace(own, gathered={}), (), view).radiance
+        shape = own.views[view].shape
+        cells: list[list[Rendered]] = []
+        extra: dict[str, ExtraSamples] = {}
+        for region in regions:
+            place = None if (region.height, region.width) == shape else region
+            halves = [more(Part(0, length, 0.5, place, other=i)) for i in (1, 2)]
+            cells.append([_rendered(method, each[view]) for each in halves])
+            for name in own.views:
+                found = mean_of([each[name] for each in halves])
+                whole = extra.setdefault(name, _nothing(shape, found.parts))
+                _put(whole, region, found)
+        parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
         # with the neighbours' samples: what may be wrong in them has nothing to do with
         # what denoising takes, and the frame's own few are far noisier
         noisy = own.gathered[view].radiance
         assert noisy is not None
-        share = self._shares.get(own.number, 1.0)
-        fall = error_fall(alone, share, noisy, pair)
-        ratio = error_ratio(together, noisy, pair, fall)
-        return ratio, {v: mean_of([x[v] for x in halves]) for v in own.views}
+        together, alone, noisy = (
+            np.concatenate([x[_pixels(region)] for region in regions])
+            for x in (
+                method.finish(own, others, view).radiance,
+                method.finish(replace(own, gathered={}), (), view).radiance,
+                noisy,
+            )
+        )
+        fall = error_fall(alone, self._shares.get(own.number, 1.0), noisy, parts)
+        return error_ratio(together, noisy, parts, fall), extra
 
     def _top_up(
         self,
@@ -421,12 +436,79 @@ def _nothing(shape: tuple[int, int], parts: Iterable[str]) -> ExtraSamples:
 
 def _put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:
     """Write the samples of a region into those of the whole picture."""
-    rows = slice(region.y, region.y + region.height)
-    columns = slice(region.x, region.x + region.width)
+    place = _pixels(region)
     for name in ("radiance", "albedo", "normal", "alpha", "samples"):
-        getattr(whole, name)[rows, columns] = getattr(part, name)
+        getattr(whole, name)[place] = getattr(part, name)
     for name, pixels in part.parts.items():
-        whole.parts[name][rows, columns] = pixels
+        whole.parts[name][place] = pixels
+
+
+def _together(
+    one: Mapping[str, ExtraSamples], two: Mapping[str, ExtraSamples]
+) -> dict[str, ExtraSamples]:
+    """Both, by view."""
+    names = one.keys() | two.keys()
+    return {v: mean_of([x[v] for x in (one, two) if v in x]) for v in names}
+
+
+def measured_regions(shape: tuple[int, int]) -> list[Region]:
+    """The parts of a picture (H, W) that show how large its errors are.
+
+    Two strips from top to bottom, a quarter of a large picture and half of a smaller
+    one; all where that would leave too few blocks.
+    """
+    height, width = shape
+    for share in (0.25, 0.5):
+        across = int(width * share / 2) // BLOCK * BLOCK
+        if across >= BLOCK and across * height * 2 >= _LEAST_AREA:
+            middles = (width // 4, 3 * width // 4)
+            starts = [(x - across // 2) // BLOCK * BLOCK for x in middles]
+            return [Region(x, 0, across, height) for x in starts]
+    return [Region(0, 0, width, height)]
+
+
+def _rest(
+    blocks: NDArray[np.bool_], regions: Sequence[Region]
+) -> list[NDArray[np.bool_]]:
+    """The blocks that are not in any of these strips, left, between and right."""
+    if not regions:
+        return [blocks]
+    places = [_blocks(region)[1] for region in regions]
+    ends = [0, *(x.stop for x in places)]
+    starts = [*(x.start for x in places), blocks.shape[1]]
+    found = []
+    for first, last in zip(ends, starts, strict=True):
+        part = np.zeros_like(blocks)
+        part[:, first:last] = blocks[:, first:last]
+        found.append(part)
+    return found
+
+
+def _pixels(region: Region) -> tuple[slice, slice]:
+    rows = slice(region.y, region.y + region.height)
+    return rows, slice(region.x, region.x + region.width)
+
+
+def _blocks(region: Region) -> tuple[slice, slice]:
+    """The blocks that a region covers; it begins with one, and ends with one."""
+    rows, columns = _pixels(region)
+    return (
+        slice(rows.start // BLOCK, -(-rows.stop // BLOCK)),
+        slice(columns.start // BLOCK, -(-columns.stop // BLOCK)),
+    )
+
+
+def _rendered(method: Finishing, samples: ExtraSamples) -> Rendered:
+    radiance = samples.radiance
+    return Rendered(radiance, method.denoised(radiance, samples.albedo, samples.normal))
+
+
+def _joined(cells: Sequence[Rendered]) -> Rendered:
+    """One picture of several, one below the other."""
+    return Rendered(
+        np.concatenate([x.noisy for x in cells]),
+        np.concatenate([x.denoised for x in cells]),
+    )
 
 
 def _region(rows: slice, columns: slice, shape: tuple[int, int]) -> Region:

@@ -198,3 +198,53 @@ def test_the_plan_of_a_shot_says_so(
     words = ["plan", str(shot), "--scale", "1", "--same-picture", "--frames", frames]
     assert main.main(words) == 0
     assert ("same picture: as few samples" in capsys.readouterr().out) == is_said
+
+
+@pytest.mark.parametrize(
+    ("shape", "share"),
+    [((1080, 1920), 0.25), ((2160, 3840), 0.25), ((540, 960), 0.5), ((300, 400), 1.0)],
+)
+def test_large_pictures_are_measured_in_parts_from_top_to_bottom(
+    shape: tuple[int, int], share: float
+) -> None:
+    regions = same_picture.measured_regions(shape)
+    covered = np.zeros(shape, int)
+    for region in regions:
+        assert share == 1.0 or region.x % 32 == region.width % 32 == 0
+        assert region.height == shape[0]
+        covered[same_picture._pixels(region)] += 1
+    assert covered.max() == 1
+    assert covered.mean() == pytest.approx(share, abs=0.04)
+    blocks = np.ones([-(-side // 32) for side in shape], bool)
+    rest = np.sum(same_picture._rest(blocks, regions), axis=0)
+    assert rest.max(initial=0) == (share < 1.0)
+    for region in regions:
+        assert not rest[same_picture._blocks(region)].any()
+
+
+def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    render_settings = bpy.context.scene.render
+    render_settings.resolution_x, render_settings.resolution_y = 128, 96
+    bpy.ops.wm.save_mainfile()
+    monkeypatch.setattr(same_picture, "_LEAST_AREA", 2000)
+    assert len(same_picture.measured_regions((96, 128))) == 2
+    sizes: list[int] = []
+
+    def noted(ours: Any, noisy: Any, parts: Any, fall: float) -> Ratio:
+        sizes.append(ours.shape[0] * ours.shape[1])
+        assert ours.shape == noisy.shape == parts[0].noisy.shape
+        return Ratio(float("inf"), 0.0, 0.7)
+
+    monkeypatch.setattr(same_picture, "error_ratio", noted)
+    frames = render(shot, "same")
+    assert sizes == [2 * 32 * 96] * 2
+    shares = {number: x["share"] for number, x in zip(FRAMES, frames, strict=True)}
+    for number in FRAMES:
+        # all samples everywhere, and a quarter more where it was measured
+        if number in MEASURED:
+            assert shares[number] == pytest.approx(1.125), shares
+        else:
+            assert shares[number] == pytest.approx(1.0)
