@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import importlib
+import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -206,3 +208,86 @@ def test_an_open_job_renders_chunks_as_animations(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stdout + done.stderr
     assert (tmp_path / "frames").read_text().splitlines() == ["8 10 1", "11 12 1"]
+
+
+# --- Deadline -------------------------------------------------------------------------
+
+DEADLINE = EXAMPLES / "xrds_shot.deadline.py"
+# Stands in for Deadline's own command: notes the files it is given, and names the job.
+DEADLINE_COMMAND = """#!/bin/bash
+n=$(ls {notes} | wc -l)
+mkdir {notes}/$n
+cp "$1" {notes}/$n/job
+cp "$2" {notes}/$n/plugin
+echo Deadline Command 10; echo "JobID=id-$n"
+"""
+
+
+def submitted(tmp_path: Path, *words: str) -> list[dict[str, str]]:
+    """What Deadline gets for a shot, job and plugin of each as one table."""
+    notes, command = tmp_path / "notes", tmp_path / "bin" / "deadlinecommand"
+    notes.mkdir()
+    command.parent.mkdir()
+    command.write_text(DEADLINE_COMMAND.format(notes=notes))
+    command.chmod(0o755)
+    shot = ["/shots/a.blend", "--frames", "1-20", "--samples", "/out/my samples"]
+    subprocess.run(
+        [sys.executable, str(DEADLINE), *shot, "--out", "/out/####.exr", *words],
+        env={"PATH": f"{command.parent}:/usr/bin:/bin"},
+        check=True,
+    )
+    found = []
+    for number in sorted(notes.iterdir()):
+        text = "".join((number / kind).read_text() for kind in ("job", "plugin"))
+        found.append(dict(line.split("=", 1) for line in text.splitlines()))
+    return found
+
+
+def of_task(job: dict[str, str], first: int, last: int) -> Any:
+    """What our command understands of one task, its words filled in by Deadline."""
+    words = job["Arguments"].replace("<STARTFRAME>", str(first))
+    words = words.replace("<ENDFRAME>", str(last)).replace("<QUOTE>", '"')
+    return parsed(shlex.split(words))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a shell script")
+def test_a_deadline_frame_waits_for_all_that_lend_to_it(tmp_path: Path) -> None:
+    samples, frames = submitted(tmp_path, "--temporal-radius", "3", "--chunk", "4")
+    assert samples["ChunkSize"] == frames["ChunkSize"] == "4"
+    assert samples["Frames"] == frames["Frames"] == "1-20"
+    assert frames["JobDependencies"] == "id-0"
+    assert frames["IsFrameDependent"] == "true"
+    reach = [int(frames[f"FrameDependencyOffset{x}"]) for x in ("Start", "End")]
+    chunks = [(n, n + 3) for n in range(1, 20, 4)]
+    rendered = {chunk: of_task(samples, *chunk) for chunk in chunks}
+    for chunk in chunks:
+        asked = of_task(frames, *chunk)
+        assert asked.source == "/out/my samples/####.exr"
+        assert asked.temporal_radius == rendered[chunk].temporal_radius == 3
+        # Deadline: frames first + start to last + end of the other job must be done
+        waits = {
+            n
+            for each in rendered.values()
+            for n in each.frames
+            if chunk[0] + reach[0] <= n <= chunk[1] + reach[1]
+        }
+        needed = {n for f in asked.frames for n in range(f - 3, f + 4) if 1 <= n <= 20}
+        assert needed == waits
+    assert of_task(samples, 1, 4).sample_cache == Path("/out/my samples")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="the stand-in is a shell script")
+def test_a_deadline_that_takes_no_job_is_one_line(tmp_path: Path) -> None:
+    command = tmp_path / "deadlinecommand"
+    command.write_text("#!/bin/bash\necho Error: no repository >&2; exit 1\n")
+    command.chmod(0o755)
+    words = ["a.blend", "--frames", "1", "--samples", "s", "--out", "####.exr"]
+    done = subprocess.run(
+        [sys.executable, str(DEADLINE), *words],
+        env={"PATH": f"{tmp_path}:/usr/bin:/bin"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert done.stderr.strip() == "Deadline took no job: Error: no repository"
