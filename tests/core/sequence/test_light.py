@@ -222,3 +222,52 @@ def test_files_of_another_size_are_no_part_of_a_frame(
     files = Files(str(shot / "in/####.exr"), str(shot / "out/####.exr"), also=also)
     with pytest.raises(PictureError, match=r"key_0001.exr is no part of .*0001.exr"):
         denoise_sequence(files, denoiser, reading=Reading(also=also))
+
+
+# Passes of these renderers; their picture is R, G, B without a layer.
+OTHERS = {
+    "Arnold": (
+        ("diffuse_direct", "diffuse_indirect", "specular_direct", "emission"),
+        ("RGBA_key", "RGBA_fill"),
+    ),
+    "RenderMan": (
+        ("directDiffuse", "indirectDiffuse", "directSpecular", "emissive"),
+        ("lightgroup_key", "lightgroup_fill"),
+    ),
+}
+
+
+@pytest.mark.parametrize("renderer", OTHERS)
+def test_files_of_other_renderers_add_up(
+    renderer: str, tmp_path: Path, denoiser: Denoiser
+) -> None:
+    lobes, groups = OTHERS[renderer]
+    names = {
+        "radiance": "RGB",
+        "albedo": "albedo.RGB",
+        "normal": "N.XYZ",
+        "depth": "Z",
+        "id": "crypto00.RGB",
+    } | {name: f"{name}.RGB" for name in (*lobes, *groups)}
+    for number in range(1, 4):
+        made = frame(number)
+        light = made.radiance
+        assert light is not None
+        shares = np.random.default_rng(number).dirichlet(np.ones(4), light.shape[:2])
+        parts = {n: light * shares[..., i, None] for i, n in enumerate(lobes)}
+        parts |= {n: light * share for n, share in zip(groups, (0.3, 0.7), strict=True)}
+        write(tmp_path / "in", made, names, id=np.full_like(light, 0.25), **parts)
+    files = Files(str(tmp_path / "in/####.exr"), str(tmp_path / "out/####.exr"))
+    result = denoise_sequence(
+        files, denoiser, reading=Reading(light=Wanted((ALL,))), radius=0
+    )
+    assert result["left_out"] == []
+    out, noisy = tmp_path / "out/0002.exr", tmp_path / "in/0002.exr"
+    whole = picture(out)
+    for kind in (lobes, groups):
+        added = sum(picture(out, name) for name in kind)
+        assert added == pytest.approx(whole, rel=1e-3, abs=1e-4)
+        for name in kind:
+            assert picture(out, name).min() >= 0.0
+            assert np.std(picture(out, name)) < np.std(picture(noisy, name))
+    assert np.array_equal(picture(out, "crypto00"), picture(noisy, "crypto00"))
