@@ -50,13 +50,14 @@ class CardAccumulator:
         groups: Sequence[Sequence[Aligned | Reprojected]],
         images: Images | None,
         usual: float,
+        lit: Sequence[str] = (),
     ) -> Sums | None:
-        """Return the means of a frame and of its groups of neighbours.
+        """Return the means of a frame, its neighbours, and its parts that are lit.
 
         None where the card fails, which is said once: the processor goes on.
         """
         try:
-            return self._sums(target, groups, images, usual)
+            return self._sums(target, groups, images, usual, lit)
         except CardLost as error:
             self.is_lost = True
             self._frames.clear()
@@ -69,6 +70,7 @@ class CardAccumulator:
         groups: Sequence[Sequence[Aligned | Reprojected]],
         images: Images | None,
         usual: float,
+        lit: Sequence[str],
     ) -> Sums:
         here = Target(self._frames, target, images, usual)
         height, width = target.shape
@@ -76,11 +78,13 @@ class CardAccumulator:
         parts = []
         for first in range(0, height, rows):
             band = Band(here, first, min(first + rows, height))
-            parts.append(band.sums(groups))
-        passes = zip(*(part.passes for part in parts), strict=True)
+            parts.append(band.sums(groups, lit))
+        planes = zip(*(part.passes + part.parts for part in parts), strict=True)
+        found = [_joined(each).reshape(height, width, -1) for each in planes]
+        count = len(parts[0].passes)
         return Sums(
-            [_joined(each).reshape(height, width, -1) for each in passes],
-            [],
+            found[:count],
+            found[count:],
             _joined([part.samples for part in parts]).reshape(height, width),
             sum(part.reused for part in parts),
         )

@@ -46,24 +46,60 @@ class Band:
         self._by_level = empty(4 * _LEVELS * tiles), empty(2 * _LEVELS * tiles)
         self._step = self._uniform(here.step)
 
-    def sums(self, groups: Sequence[Sequence[Neighbour]]) -> Sums:
-        """Return the means over the band's rows; raises CardLost."""
+    def sums(self, groups: Sequence[Sequence[Neighbour]], lit: Sequence[str]) -> Sums:
+        """Return the means over the band's rows, and of the parts that are `lit`.
+
+        Raises CardLost.
+        """
         wide = (self._channels + SUMS_BESIDE) * self._count
         empty = self._here.card.empty
         sums, result = empty(wide * len(groups)), empty(wide)
+        factors = empty(self._count * len(groups))
         means = empty((self._channels + 2) * self._count)
         calls = list(self._own())
+        lent: list[tuple[int, Neighbour, Any]] = []
         for number, group in enumerate(groups):
             for neighbour in group:
-                calls += self._gathered(neighbour, number * wide, sums)
+                # those of parts are read again once their weights are known
+                taken = empty(4 * self._count) if lit else self._taken
+                lent.append((number, neighbour, taken))
+                calls += self._gathered(neighbour, number * wide, sums, taken)
         one, two = self._by_level
         calls.append(self._by_tiles("find", {3: one, 4: two, 5: self._changes}))
-        calls += self._weighed(len(groups), wide, sums, result)
+        calls += self._weighed(len(groups), wide, sums, result, factors)
         here = self._here.buffers
         used = {1: here.picture, 2: here.counts, 3: result, 4: means}
         calls.append(Call("means", "mean", self._size, self._step, used))
         self._here.card.start(calls)
-        return self._found(self._here.card.download(means))
+        parts = [self._part(name, lent, factors, result) for name in lit]
+        return self._found(self._here.card.download(means), parts)
+
+    def _part(
+        self,
+        name: str,
+        lent: Sequence[tuple[int, Neighbour, Any]],
+        factors: Any,
+        weights: Any,
+    ) -> Array:
+        """The mean of one part of the light, (n, 3) of the inner rows."""
+        here, card = self._here, self._here.card
+        sums, means = card.empty(3 * self._count), card.empty(3 * self._count)
+        calls = []
+        for number, neighbour, taken in lent:
+            part = here.frames.part(neighbour.other, name)
+            if part is None:
+                continue
+            there = here.frames.of(neighbour.other)
+            step = flagged(here.step, there_half=there.is_half)
+            step["offset"] = number * self._count
+            used = {1: part, 2: taken, 3: factors, 4: sums}
+            calls.append(Call("parts", "add", self._size, self._uniform(step), used))
+        own = here.frames.part(here.frame, name)
+        step = self._uniform(flagged(here.step, dark=own is None))
+        used = {1: own, 4: sums, 5: here.buffers.counts, 6: weights, 7: means}
+        calls.append(Call("parts", "mean", self._size, step, used))
+        card.start(calls)
+        return card.download(means).reshape(-1, 3)[self._inner]
 
     def _own(self) -> Iterator[Call]:
         """What similarity needs to know of the frame itself."""
@@ -73,7 +109,9 @@ class Band:
         used = {3: here.noise_of_guides, 4: plain, 5: self._bounds, 6: self._light}
         yield Call("own", "prepare", self._size, self._step, used)
 
-    def _gathered(self, neighbour: Neighbour, offset: int, sums: Any) -> Iterator[Call]:
+    def _gathered(
+        self, neighbour: Neighbour, offset: int, sums: Any, taken: Any
+    ) -> Iterator[Call]:
         """The samples of a neighbour, added to those of its group."""
         here = self._here
         pair = None if neighbour.pair is None else here.pair(neighbour)
@@ -102,11 +140,11 @@ class Band:
             pair and pair.tiles,
             self._light,
             sums,
-            self._taken,
+            taken,
         )
         used = dict(enumerate(buffers, 1))
         yield Call("gather", "gather", self._size, self._uniform(step), used)
-        yield self._by_tiles("tile", {1: self._taken, 2: self._areas})
+        yield self._by_tiles("tile", {1: taken, 2: self._areas})
         one, two = self._by_level
         yield self._by_tiles("add", {2: self._areas, 3: one, 4: two})
 
@@ -114,7 +152,7 @@ class Band:
         return Call("changes", entry, self._tiles, self._step, buffers)
 
     def _weighed(
-        self, groups: int, wide: int, sums: Any, result: Any
+        self, groups: int, wide: int, sums: Any, result: Any, factors: Any
     ) -> Iterator[Call]:
         """The sums of all groups, each by its similarity."""
         here, card = self._here, self._here.card
@@ -130,6 +168,7 @@ class Band:
             apart,
             likeness,
             result,
+            factors,
         )
         for number in range(groups):
             step = flagged(here.step, first_group=number == 0)
@@ -144,7 +183,7 @@ class Band:
         step["band"] = self._rows
         return self._here.card.upload(step, uniform=True)
 
-    def _found(self, means: Array) -> Sums:
+    def _found(self, means: Array, parts: list[Array]) -> Sums:
         """The inner rows of what the last kernel has laid one after another."""
         count, inner = self._count, self._inner
         passes = []
@@ -155,8 +194,11 @@ class Band:
         samples, reused = means[self._channels * count :].reshape(2, -1)[:, inner]
         if not samples.all():
             nothing = samples[:, None] == 0.0
-            passes = [np.where(nothing, np.float32(np.nan), x) for x in passes]
-        return Sums(passes, [], samples, float(reused.sum(dtype=np.float64)))
+            passes, parts = (
+                [np.where(nothing, np.float32(np.nan), x) for x in planes]
+                for planes in (passes, parts)
+            )
+        return Sums(passes, parts, samples, float(reused.sum(dtype=np.float64)))
 
 
 # Bindings of each kernel of weigh.wgsl, in the order in which they run.
@@ -164,5 +206,5 @@ _WEIGH = {
     "compare": (1, 2, 3, 4, 7, 8),
     "compare_light": (5, 8),
     "liken": (5, 6, 8, 9),
-    "weigh": (1, 2, 7, 8, 9, 10),
+    "weigh": (1, 2, 7, 8, 9, 10, 11),
 }

@@ -23,7 +23,8 @@ _MEMORY = 2 << 30  # bytes of frames that are kept on a card
 class FrameOnCard:
     """The buffers of a frame; those that it does not have are None.
 
-    `counts` are samples per pixel, negative where the pixel is invalid.
+    `counts` are samples per pixel, negative where the pixel is invalid. `parts` of its
+    light are there once they were asked for.
     """
 
     def __init__(self, frame: Stored, card: Card) -> None:
@@ -40,6 +41,7 @@ class FrameOnCard:
         given = {name: x for name, x in arrays.items() if x is not None}
         self.bytes = sum(x.nbytes for x in given.values())
         found = {name: card.upload(x) for name, x in given.items()}
+        self.parts: dict[str, Any] = {}
         self.picture, self.noise = found["picture"], found["noise"]
         self.depth, self.counts = found["depth"], found.get("counts")
 
@@ -60,18 +62,31 @@ class FramesOnCard:
         self._known[frame] = found
         return found
 
+    def part(self, frame: Stored, name: str) -> Any | None:
+        """The buffer of a part of a frame's light; None where it is dark."""
+        values = frame.parts[name]
+        if values is None:
+            return None
+        found = self.of(frame)
+        if name not in found.parts:
+            found.parts[name] = self.card.upload(values)
+            found.bytes += values.nbytes
+            self._make_room(0, keep=frame)
+        return found.parts[name]
+
     def clear(self) -> None:
         """Give their memory back."""
         self._known.clear()
 
-    def _make_room(self, wanted: int) -> None:
+    def _make_room(self, wanted: int, keep: Stored | None = None) -> None:
         kept = list(self._known.items())
         total = wanted + sum(each.bytes for _, each in kept)
         for frame, each in kept:
             if total <= _MEMORY:
                 break
-            del self._known[frame]
-            total -= each.bytes
+            if frame is not keep:
+                del self._known[frame]
+                total -= each.bytes
 
 
 def known(x: Array) -> Array:

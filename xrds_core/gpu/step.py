@@ -47,6 +47,7 @@ _FLAGS = (
     "turned",
     "orthographic",
     "first_group",
+    "dark",
 )
 
 

@@ -94,8 +94,8 @@ def accumulate(
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
     lit = _lit(target, others)
     sums = None
-    if card is not None and card.takes(target, others) and not lit:
-        sums = card.sums(target, [x for x in groups if x], images, usual)
+    if card is not None and card.takes(target, others):
+        sums = card.sums(target, [x for x in groups if x], images, usual, lit)
     if sums is None:
         sums = _by_rows(target, groups, images, usual, lit, threads)
     height, width = target.shape
@@ -117,8 +117,9 @@ class OnCard(Protocol):
         groups: Sequence[Sequence[Aligned | Reprojected]],
         images: Images | None,
         usual: float,
+        lit: Sequence[str],
     ) -> Sums | None:
-        """The means of a frame and its groups of neighbours; None where it fails."""
+        """The means of a frame, its neighbours and parts; None where it fails."""
 
 
 @dataclass(frozen=True)

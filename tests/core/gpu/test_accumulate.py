@@ -137,6 +137,30 @@ def test_a_card_finds_what_the_processor_does(
     check_alike(expected, found)
 
 
+@pytest.mark.parametrize("dtype", [np.float16, np.float32])
+def test_parts_of_the_light_have_the_weights_of_the_whole(
+    card: CardAccumulator, dtype: type, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    frames = spoilt(shot(0.05, samples=4.0))
+    for k, frame in enumerate(frames):
+        assert frame.radiance is not None
+        light = np.nan_to_num(frame.radiance)
+        share = np.random.default_rng(k).uniform(size=(*frame.shape, 1))
+        parts = {"key": light * share, "rest": light * (1 - share)}
+        parts["late"] = light * (k > 4)  # dark in the frame itself
+        parts["never"] = light * 0
+        parts = {name: x.astype(np.float32) for name, x in parts.items()}
+        frames[k] = replace(frame, parts=parts)
+    for band in (1 << 30, 64 * 40):
+        monkeypatch.setattr(on_card, "_BAND", band)
+        expected, found = both_ways(card, frames, dtype)
+        check_alike(expected, found)
+        assert list(found.parts) == list(expected.parts)
+        for name, part in expected.parts.items():
+            assert part.any() == (name != "never")
+            np.testing.assert_allclose(found.parts[name], part, rtol=1e-4, atol=1e-6)
+
+
 def test_a_picture_in_bands_is_the_same(
     card: CardAccumulator, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -23,7 +23,7 @@ struct Step {
     guides: f32,        // penalties
     changes: f32,
     area: i32,          // pixels around one over which errors of guides are averaged
-    offset: u32,        // of this group in the sums
+    offset: u32,        // of this group in the sums, or in the factors
 };
 
 @group(0) @binding(0) var<uniform> step: Step;
@@ -40,6 +40,7 @@ const IMAGES = 256u;
 const TURNED = 512u;
 const ORTHOGRAPHIC = 1024u;
 const FIRST_GROUP = 2048u;
+const DARK = 4096u;
 
 const TINY = 1e-9;
 const LUMINANCE = vec3f(0.2126, 0.7152, 0.0722);  // Rec.709

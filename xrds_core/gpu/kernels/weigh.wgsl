@@ -11,6 +11,7 @@
 @group(0) @binding(8) var<storage, read_write> apart: array<vec4f>;
 @group(0) @binding(9) var<storage, read_write> likeness: array<f32>;
 @group(0) @binding(10) var<storage, read_write> result: array<f32>;
+@group(0) @binding(11) var<storage, read_write> factors: array<f32>;
 
 const BRIGHTEST = 4.0;
 const NORMAL_SHARE = 0.31622776;  // square root of 0.1
@@ -146,6 +147,7 @@ fn weigh(@builtin(global_invocation_id) id: vec3u) {
     }
     var weight = select(1.0, total / max(valid, TINY), is_valid(pixel));
     if !(sums[sum] > 0.0) || is_void(id) { weight = 0.0; }
+    factors[step.offset / (step.channels + 3u) + at] = weight;
     let to = at * (step.channels + 3u);
     for (var i = 0u; i < step.channels + 3u; i++) {
         let value = weight * sums[sum + i];
