@@ -106,6 +106,28 @@ class EngineFrames:
                     passes.put_back(self.ahead.pop(number))
             return self._completed(engine, depsgraph, found)
 
+    def sample_next(self, engine: Any, depsgraph: Any) -> None:
+        """Sample what the frame after this one needs, while this one is finished.
+
+        The render result afterwards holds the passes that it held before. Raises
+        Cancelled when the user stops it.
+        """
+        number = depsgraph.scene_eval.frame_current
+        later = [n for n in self.window.shot.frames if n > number]
+        missing = self.window.missing(min(later)) if later else []
+        if not missing:
+            return
+        with CyclesPasses(engine, depsgraph) as passes:
+            before = passes.all_passes()
+            self._call = _Call(engine, depsgraph, passes, number, None)
+            try:
+                for each in missing:
+                    self.window.load(each)
+            finally:
+                self._call = None
+                go_to(engine, depsgraph, number)
+                passes.put_back(before)
+
     def _completed(
         self, engine: Any, depsgraph: Any, found: Neighbourhood[Sampled]
     ) -> Neighbourhood[Sampled]:

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import takewhile
 from typing import Any
 
@@ -27,7 +28,8 @@ from ..planning.request import Request, render_request
 from .cycles_only import CyclesOnly
 from .engine_frames import EngineFrames
 from .full_size import FullSize
-from .methods import Method
+from .methods import Method, Report
+from .overlap import Overlap, samples_on_card
 from .sampling import OnSampled, Sampled, has_neighbours
 from .super_resolution import SuperResolution
 
@@ -145,7 +147,10 @@ def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Pictu
                 _leave_stopped(engine, key[1], frames.method, own)
             raise
         others = list(found.neighbours.values())
-        picture = _finish(engine, key[1], frames.method, found.own, others)
+        ahead = None
+        if frames.method.pace is None and samples_on_card(depsgraph.scene_eval):
+            ahead = partial(frames.sample_next, engine, depsgraph)
+        picture = _finish(engine, key[1], frames.method, found.own, others, ahead)
     finally:
         stages.end()
     return _described(animation.chosen, picture, layer, start)
@@ -168,11 +173,26 @@ def _finish(
     method: Method,
     own: Sampled,
     others: Sequence[Sampled] = (),
+    ahead: Callable[[], None] | None = None,
 ) -> Picture:
-    """Make the picture of each view and write it; returns the first view's."""
+    """Make the picture of each view and write it; returns the first view's.
+
+    What there is to do `ahead` is done meanwhile.
+    """
+
+    def finish(report: Report | None) -> dict[str, Picture]:
+        return {v: method.finish(own, others, v, report) for v in own.views}
+
     try:
         report = method.begin_finishing(engine)
-        pictures = {v: method.finish(own, others, v, report) for v in own.views}
+        if ahead is None:
+            pictures = finish(report)
+        else:
+            # Blender's progress is for its own thread alone
+            with Overlap[dict[str, Picture]](True) as overlap:
+                list(overlap.put(partial(finish, None)))
+                ahead()
+                (pictures,) = overlap.rest()
         session.stop_if_cancelled(engine)
     except NetworkFailed:
         _write(engine, layer_name, method, own, method.stopped(own))

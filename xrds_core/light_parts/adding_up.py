@@ -11,6 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..arrays import Array
+from ..temporal.local_filters import box
 
 _TINY = np.float32(1e-9)
 _ROWS = 128  # at a time, so that memory does not grow with the picture
@@ -44,6 +45,19 @@ def add_up(
             by_weight = whole * (weights[name] / total)
             found[name][rows] = np.where(made > 0.0, part * scale, by_weight)
     return found
+
+
+def completed(colour: Array) -> Array:
+    """Return a colour pass (H, W, 3) that is 0 only where it is around a pixel, too.
+
+    Where a pixel's few samples have missed a lobe, its colour is 0, but not the light
+    that is denoised there. It becomes the mean of the 3x3 pixels around.
+    """
+    known = np.maximum(np.nan_to_num(colour, posinf=0.0), np.float32(0.0))
+    if known.all():
+        return known
+    around = np.dstack([box(known[..., i], 3) for i in range(known.shape[2])])
+    return np.where(known > 0.0, known, around)
 
 
 def _held(part: Array) -> Array:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..light_parts.adding_up import completed
 from ..light_parts.sums import added_up, light_in
 from ..temporal.accumulate import Accumulated
 from ..temporal.local_filters import box
@@ -107,10 +108,8 @@ def finish_frame(
                 inner = part[area.within]
                 whole[area.place] = inner + (whole[area.place] - inner) * weight
         denoised = replace(denoised, radiance=mixed)
-    colours = _cropped(
-        {x.colour_name: accumulated.parts[x.colour_name] for x in light if x.colour},
-        region,
-    )
+    names = dict.fromkeys(x.colour_name for x in light if x.colour)
+    colours = {x: completed(accumulated.parts[x][region]) for x in names}
     found = colours | added_up(denoised.radiance, denoised.parts, light, colours)
     seconds = {
         "accumulate": denoise_started - started,

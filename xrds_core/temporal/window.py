@@ -123,13 +123,18 @@ class Window(Generic[Loaded]):
         for old in [x for x in self._loaded if x < first]:
             del self._loaded[old]
         for new in self.missing(number):
-            self._loaded[new] = self._load(new)
+            self.load(new)
         own = self._loaded[number]
         if own is None:
             return None
         found = {x: self._loaded[x] for x in numbers}
         neighbours = {x: frame for x, frame in found.items() if frame is not None}
         return Neighbourhood(number, own, neighbours)
+
+    def load(self, number: int) -> None:
+        """Load a frame ahead of its turn, unless it is in memory already."""
+        if number not in self._loaded:
+            self._loaded[number] = self._load(number)
 
     def get(self, number: int) -> Loaded | None:
         """Return a frame if it is in memory."""

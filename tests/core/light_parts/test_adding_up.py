@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from xrds_core.light_parts.adding_up import add_up
+from xrds_core.light_parts.adding_up import add_up, completed
 
 Array = NDArray[np.float32]
 SHAPE = (140, 5, 3)
@@ -69,3 +69,18 @@ def test_a_part_that_is_dark_everywhere_stays_so() -> None:
     found = add_up(picture, parts)
     assert not found["off"].any()
     assert found["key"] == pytest.approx(picture, rel=1e-5)
+
+
+def test_a_colour_that_few_samples_missed_is_that_around() -> None:
+    colour = np.full((6, 8, 3), 0.5, np.float32)
+    colour[2, 3] = 0.0
+    colour[2, 3, 1] = 0.2
+    colour[:, 5:] = 0.0  # nothing of the lobe at all
+    colour[0, 0] = np.nan
+    found = completed(colour)
+    assert found[2, 3] == pytest.approx([0.5 * 8 / 9, 0.2, 0.5 * 8 / 9])
+    assert not found[:, 6:].any()
+    assert (found[:, 5] > 0.0).all()
+    assert (found[0, 0] > 0.0).all()
+    known = (colour > 0.0) & np.isfinite(colour)
+    assert np.array_equal(found[known], colour[known])
