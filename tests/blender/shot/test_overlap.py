@@ -5,12 +5,16 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
+import bpy
 import numpy as np
 import pytest
+from channels import read_channels
 
 from xrds_blender.planning.request import render_request
+from xrds_blender.shot import render as renders
 from xrds_blender.shot import shot as shots
 from xrds_blender.shot.full_size import FullSize
 from xrds_blender.shot.overlap import Overlap, samples_on_card
@@ -96,3 +100,61 @@ def test_a_shot_is_the_same_and_finished_while_the_next_is_sampled(
         np.testing.assert_array_equal(picture.radiance, expected[number].radiance)
     assert len(threads) == len(FRAMES)
     assert all(name.startswith("finish") for name in threads)
+
+
+def test_an_animation_of_the_engine_is_the_same(
+    life: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pictures and passes, with frames sampled while the one before is finished."""
+    life.render.engine = "XRDS"
+    life.xrds.mode, life.xrds.temporal_radius = "full_size", 1
+    life.frame_start, life.frame_end = 1, 5
+    life.view_layers[0].use_pass_normal = True
+    for number in (1, 5):
+        life.camera.location.x = 0.2 * number
+        life.camera.keyframe_insert("location", frame=number)
+    settings = life.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    began: list[tuple[str, str]] = []
+    finish, sample = FullSize.finish, FullSize.sample
+
+    def noted(self: Any, own: Any, *more: Any, **choices: Any) -> Any:
+        began.append((f"finish {own.number}", threading.current_thread().name))
+        return finish(self, own, *more, **choices)
+
+    def sampled(self: Any, engine: Any, depsgraph: Any, *more: Any, **how: Any) -> Any:
+        number = depsgraph.scene_eval.frame_current
+        began.append((f"sample {number}", threading.current_thread().name))
+        return sample(self, engine, depsgraph, *more, **how)
+
+    monkeypatch.setattr(FullSize, "finish", noted)
+    monkeypatch.setattr(FullSize, "sample", sampled)
+    orders = []
+    for folder, is_on in (("turn", False), ("beside", True)):
+        monkeypatch.setattr(renders, "samples_on_card", lambda _, on=is_on: on)
+        life.render.filepath = str(tmp_path / folder / "#.exr")
+        began.clear()
+        bpy.ops.render.render(animation=True)
+        orders.append([name for name, _ in began])
+        threads = {thread for name, thread in began if name.startswith("finish")}
+        assert all(thread.startswith("finish") == is_on for thread in threads)
+    for number in FRAMES:
+        pair = [
+            read_channels(tmp_path / x / f"{number}.exr") for x in ("turn", "beside")
+        ]
+        assert pair[0].keys() == pair[1].keys()
+        for name, channel in pair[0].items():
+            np.testing.assert_array_equal(channel, pair[1][name], err_msg=name)
+    # each frame is sampled once, and a frame earlier
+    for order in orders:
+        assert sorted(x for x in order if x.startswith("sample")) == [
+            f"sample {n}" for n in FRAMES
+        ]
+    # "finish 1" is put before "sample 3" begins, and "finish 2" comes after it
+    turn, beside = orders
+    assert turn.index("sample 3") > turn.index("finish 1")
+    assert turn.index("sample 4") > turn.index("finish 2")
+    assert beside.index("sample 4") < beside.index("finish 3")
+    assert len(beside) == len(turn) == 2 * len(FRAMES)
