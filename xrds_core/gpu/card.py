@@ -7,7 +7,7 @@ Direct3D 12. Source: https://wgpu-py.readthedocs.io.
 from __future__ import annotations
 
 import os
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module, resources
 from typing import TYPE_CHECKING, Any
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 # Storage buffers that the largest kernel has; what WebGPU promises everywhere is 8.
 _BUFFERS = 15
 _GROUP = 8  # pixels across that one group of a kernel covers
+_EXTRAS = "wgpu.backends.wgpu_native.extras"
+# Without OpenGL, which could meet Blender's own.
+_INTERFACES = ("Vulkan", "Metal", "DX12")
 _KINDS = ("DiscreteGPU", "IntegratedGPU")  # the faster kind first
 _LIMITS = ("max-buffer-size", "max-storage-buffer-binding-size")
 
@@ -39,11 +42,12 @@ def find_adapters(software: bool = False) -> list[Any]:
 
     `software` returns those that the processor plays instead, for tests.
     """
-    # wgpu asks for a window system, which is not needed, and says so
-    os.environ.setdefault("XDG_RUNTIME_DIR", os.devnull)
     try:
-        wgpu = import_module("wgpu")
-        every = wgpu.gpu.enumerate_adapters_sync()
+        wgpu, extras = (import_module(name) for name in ("wgpu", _EXTRAS))
+        with suppress(RuntimeError):  # someone else in this process uses wgpu already
+            extras.set_instance_extras(backends=_INTERFACES)
+        with _without_windows():
+            every = wgpu.gpu.enumerate_adapters_sync()
     except (ImportError, OSError, RuntimeError):
         return []
     kinds = ("CPU",) if software else _KINDS
@@ -51,10 +55,24 @@ def find_adapters(software: bool = False) -> list[Any]:
         each
         for each in every
         if each.info["adapter_type"] in kinds
-        and each.info["backend_type"] != "OpenGL"
+        and each.info["backend_type"] != "OpenGL"  # where someone else asked for it
         and each.limits["max-storage-buffers-per-shader-stage"] >= _BUFFERS
     ]
     return sorted(found, key=lambda x: kinds.index(x.info["adapter_type"]))
+
+
+@contextmanager
+def _without_windows() -> Iterator[None]:
+    """Keep drivers from complaining that there is no window system."""
+    name = "XDG_RUNTIME_DIR"
+    if name in os.environ:
+        yield
+        return
+    os.environ[name] = os.devnull
+    try:
+        yield
+    finally:
+        del os.environ[name]
 
 
 def card_names() -> list[str]:

@@ -28,17 +28,22 @@ class Accumulator:
 
     def __init__(self, device: str = "auto") -> None:
         self._asked, self._movement = device, Movement()
+        self.device = PROCESSOR
+        """What accumulated last: a card's name, or `cpu`."""
 
     def __call__(self, target: Stored, others: Sequence[Stored] = ()) -> Accumulated:
         """`accumulate`; raises UsageError for a card asked for that is not here."""
-        card = open_card(self._asked) if others else None
-        return accumulate(target, others, self._movement, card=card)
-
-    @property
-    def device(self) -> str:
-        """The card's name, or `cpu`."""
+        if not others:
+            return accumulate(target, others)
         card = open_card(self._asked)
-        return PROCESSOR if card is None or card.is_lost else card.card.name
+        found = accumulate(target, others, self._movement, card=card)
+        self.device = device_of(card)
+        return found
+
+
+def device_of(card: CardAccumulator | None) -> str:
+    """Return the name of what accumulates."""
+    return PROCESSOR if card is None or card.is_lost else card.card.name
 
 
 @cache

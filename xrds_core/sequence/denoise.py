@@ -154,13 +154,13 @@ def denoise_sequence(
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
     accumulate = accumulate or Accumulator()
-    entries = _entries(files, denoiser, accumulate, shot, loader, resume, say)
+    entries = list(_entries(files, denoiser, accumulate, shot, loader, resume, say))
     devices = {"device": denoiser.device, "accumulated_on": accumulate.device}
     return {
         "output": files.output,
         "temporal_radius": radius,
         **devices,
-        "frames": list(entries),
+        "frames": entries,
         "kept": sorted(done),
         "left_out": _left_out(loader, [n for n in numbers if n not in done]),
     }

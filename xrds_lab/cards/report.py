@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_blender.command import streams
 from xrds_core.atomic import read_json, write_json
-from xrds_core.sequence.accumulator import Accumulator
+from xrds_core.sequence.accumulator import device_of, open_card
 
 from ..bench import machine
 from ..bench.journal import Journal
@@ -62,7 +62,7 @@ def bench_devices(
     journal = Journal(kept / "journal.json", report_line)
     ends = time.monotonic() + 60.0 * minutes
     with streams.stdout_to(kept / "blender.log"):
-        cycles, card = find_card(), Accumulator(accumulate_on).device
+        cycles, card = find_card(), device_of(open_card(accumulate_on))
         about = {
             **machine.describe(),
             "cycles_device": cycles,

@@ -11,6 +11,7 @@ from xrds_core.errors import UsageError
 from xrds_core.gpu import choose as choosing
 from xrds_core.gpu.accumulate import CardAccumulator
 from xrds_core.gpu.card import CardLost, find_adapters
+from xrds_core.sequence import accumulator
 from xrds_core.temporal.accumulate import Sums
 
 SOFTWARE = find_adapters(software=True)
@@ -74,3 +75,16 @@ def test_nothing_is_loaded_before_frames_are_accumulated() -> None:
         "a.Accumulator(); assert 'wgpu' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+@needs_card
+def test_an_accumulator_says_what_it_has_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    play(monkeypatch, 1)
+    accumulator.open_card.cache_clear()
+    frames = [choosing._frame(number) for number in range(3)]
+    accumulate = accumulator.Accumulator("gpu")
+    accumulate(frames[1])
+    assert accumulate.device == "cpu"  # nothing to accumulate: no card was opened
+    accumulate(frames[1], frames[::2])
+    assert accumulate.device == SOFTWARE[0].info["device"]
+    accumulator.open_card.cache_clear()
