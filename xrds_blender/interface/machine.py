@@ -19,8 +19,6 @@ class Machine:
     """The preferences as plain values; the defaults hold where there is no add-on."""
 
     device: str = "auto"
-    accumulate_on: str = "auto"
-    """What neighbours' samples are accumulated on; as in `Accumulator`."""
     memory_limit: int | None = None
     """Bytes that the network may add; None leaves it to the device."""
     weights: Path | None = None
@@ -31,6 +29,8 @@ class Machine:
     """Whether a render that the user stops leaves the picture so far, denoised."""
     torch: Path | None = None
     """Folder that PyTorch is taken from; None means the one that Python finds."""
+    accumulate_on: str = "auto"
+    """What neighbours' samples are accumulated on; as in `Accumulator`."""
 
 
 def machine() -> Machine:

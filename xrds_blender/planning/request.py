@@ -50,10 +50,10 @@ class Machine:
     """
 
     device: str = "auto"
-    accumulate_on: str = "auto"
     memory_limit: int | None = None
     threads: int | None = None
     weights: str | Path | None = None
+    accumulate_on: str = "auto"
 
 
 @dataclass(frozen=True)

@@ -407,10 +407,11 @@ def test_machine_without_add_on_has_defaults() -> None:
 
 
 def test_job_takes_the_preferences(monkeypatch: pytest.MonkeyPatch) -> None:
-    here = machine.Machine("cuda:1", 1 << 30, Path("folder"))
+    here = machine.Machine("cuda:1", 1 << 30, Path("folder"), accumulate_on="Radeon")
     monkeypatch.setattr(properties, "machine", lambda: here)
     settings = bpy.context.scene.xrds
     found = properties.request_of(settings).machine
+    assert found.accumulate_on == "Radeon"
     assert (found.device, found.memory_limit, found.weights) == (
         here.device,
         here.memory_limit,
