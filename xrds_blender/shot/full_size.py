@@ -47,6 +47,8 @@ class FullSize(Method):
         self._quality = self.settings.quality
         self._denoiser = load_denoiser(self._quality, request.machine)
         self._accumulate = Accumulator(request.machine.accumulate_on)
+        if self.settings.temporal_radius:
+            self._accumulate.prepare()
 
     def sample(
         self,

@@ -116,6 +116,8 @@ class SuperResolution(Method):
         radius, quality = settings.temporal_radius, settings.quality
         self._denoiser = load_denoiser(quality, machine) if radius else None
         self._accumulate = Accumulator(machine.accumulate_on)
+        if radius:
+            self._accumulate.prepare()
 
     def sample(
         self,

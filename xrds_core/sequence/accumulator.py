@@ -22,14 +22,20 @@ class Accumulator:
     """Accumulates the frames of one shot; what it finds of their motion is kept.
 
     `device` is `auto` (a graphics card that is fit for it, else the processor), `cpu`,
-    `gpu`, or a part of a card's name. Nothing of a card is loaded before two frames are
-    accumulated.
+    `gpu`, or a part of a card's name. Nothing of a card is loaded before `prepare`, or
+    before two frames are accumulated.
     """
 
     def __init__(self, device: str = "auto") -> None:
         self._asked, self._movement = device, Movement()
         self.device = PROCESSOR
         """What accumulated last: a card's name, or `cpu`."""
+
+    def prepare(self) -> None:
+        """Open the card, which takes seconds, before anything is timed; raises as
+        `__call__`.
+        """
+        open_card(self._asked)
 
     def __call__(self, target: Stored, others: Sequence[Stored] = ()) -> Accumulated:
         """`accumulate`; raises UsageError for a card asked for that is not here."""
