@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 # Storage buffers that the largest kernel has; what WebGPU promises everywhere is 8.
 _BUFFERS = 15
 _GROUP = 8  # pixels across that one group of a kernel covers
+_OF_ONE_PICTURE = ("own", "weigh", "means")  # modules that read the frame's alone
 _EXTRAS = "wgpu.backends.wgpu_native.extras"
 # Without OpenGL, which could meet Blender's own.
 _INTERFACES = ("Vulkan", "Metal", "DX12")
@@ -183,7 +184,8 @@ class Call:
 @cache
 def _source(module: str) -> str:
     folder = resources.files(__package__) / "kernels"
-    parts = (folder / f"{name}.wgsl" for name in ("common", module))
+    shared = ("common", "picture") if module in _OF_ONE_PICTURE else ("common",)
+    parts = (folder / f"{name}.wgsl" for name in (*shared, module))
     return "\n".join(part.read_text("utf-8") for part in parts)
 
 

@@ -66,29 +66,22 @@ fn nearer(one: f32, other: f32) -> f32 {
     return select(max(one, other), min(one, other), has(ORTHOGRAPHIC));
 }
 
-fn nearest_here(pixel: u32) -> f32 {
-    let x = i32(pixel % step.size.x);
-    let y = i32(pixel / step.size.x);
-    var found = UNKNOWN;
-    for (var i = -1; i <= 1; i++) {
-        let row = clamp(y + i, 0, i32(step.size.y) - 1) * i32(step.size.x);
-        for (var j = -1; j <= 1; j++) {
-            let column = clamp(x + j, 0, i32(step.size.x) - 1);
-            found = nearer(found, here_depth[row + column]);
-        }
-    }
-    return found;
+fn depth_at(is_here: bool, pixel: i32) -> f32 {
+    if is_here { return here_depth[pixel]; }
+    return there_depth[pixel];
 }
 
-fn nearest_there(pixel: u32) -> f32 {
-    let x = i32(pixel % step.there_size.x);
-    let y = i32(pixel / step.there_size.x);
+// The nearest surface in the 3 x 3 pixels around one, here or in the neighbour.
+fn nearest_around(is_here: bool, pixel: u32) -> f32 {
+    let size = vec2i(select(step.there_size, step.size, is_here));
+    let x = i32(pixel) % size.x;
+    let y = i32(pixel) / size.x;
     var found = UNKNOWN;
     for (var i = -1; i <= 1; i++) {
-        let row = clamp(y + i, 0, i32(step.there_size.y) - 1) * i32(step.there_size.x);
+        let row = clamp(y + i, 0, size.y - 1) * size.x;
         for (var j = -1; j <= 1; j++) {
-            let column = clamp(x + j, 0, i32(step.there_size.x) - 1);
-            found = nearer(found, there_depth[row + column]);
+            let column = clamp(x + j, 0, size.x - 1);
+            found = nearer(found, depth_at(is_here, row + column));
         }
     }
     return found;
@@ -111,12 +104,12 @@ fn parallax(m: array<vec4f, 4>, at: vec2f, depth: f32, nearest: f32) -> f32 {
 fn rim_distance(here: u32, there: u32) -> f32 {
     var apart = 0.0;
     let own = here_depth[here];
-    let own_nearest = nearest_here(here);
+    let own_nearest = nearest_around(true, here);
     if is_rim(own, own_nearest) {
         apart = parallax(step.forth, centre(here, step.size.x), own, own_nearest);
     }
     let other = there_depth[there];
-    let other_nearest = nearest_there(there);
+    let other_nearest = nearest_around(false, there);
     if is_rim(other, other_nearest) {
         let at = centre(there, step.there_size.x);
         apart = max(apart, parallax(step.back, at, other, other_nearest));

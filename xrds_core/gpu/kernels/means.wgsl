@@ -1,15 +1,9 @@
 // The mean of a frame's own and the reused samples: passes, one after another, then the
 // number of samples and how many of them are reused.
 
-@group(0) @binding(1) var<storage, read> picture: array<u32>;
 @group(0) @binding(2) var<storage, read> counts: array<f32>;
 @group(0) @binding(3) var<storage, read> sums: array<f32>;
 @group(0) @binding(4) var<storage, read_write> means: array<f32>;
-
-fn channel(at: u32) -> f32 {
-    if !has(HERE_HALF) { return bitcast<f32>(picture[at]); }
-    return unpack2x16float(picture[at >> 1u])[at & 1u];
-}
 
 @compute @workgroup_size(8, 8)
 fn mean(@builtin(global_invocation_id) id: vec3u) {

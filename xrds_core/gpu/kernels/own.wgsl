@@ -1,6 +1,5 @@
 // What the similarity weights need to know of the frame itself, as in similarity.py.
 
-@group(0) @binding(1) var<storage, read> picture: array<u32>;
 @group(0) @binding(2) var<storage, read> noise: array<u32>;
 @group(0) @binding(3) var<storage, read> noise_of_guides: array<f32>;
 @group(0) @binding(4) var<storage, read_write> plain: array<vec4f>;
@@ -13,11 +12,6 @@ const EVEN_NOISE = 0.1;
 const DARKEST_ALBEDO = 0.02;
 const DARKEST_ROOT = 0.1;
 const NOISE_AREA = 3;  // pixels to each side
-
-fn channel(at: u32) -> f32 {
-    if !has(HERE_HALF) { return bitcast<f32>(picture[at]); }
-    return unpack2x16float(picture[at >> 1u])[at & 1u];
-}
 
 fn noise_at(pixel: u32) -> vec2f {
     if has(HERE_HALF) { return unpack2x16float(noise[pixel]); }

@@ -1,7 +1,6 @@
 // The similarity weights of a group of neighbours, as in similarity.py, and its sums
 // weighted by them.
 
-@group(0) @binding(1) var<storage, read> picture: array<u32>;
 @group(0) @binding(2) var<storage, read> counts: array<f32>;
 @group(0) @binding(3) var<storage, read> noise_of_guides: array<f32>;
 @group(0) @binding(4) var<storage, read> plain: array<vec4f>;
@@ -18,11 +17,6 @@ const NORMAL_SHARE = 0.31622776;  // square root of 0.1
 const UNSURE = 6.0 / 9.0;
 const LIGHT = 4.0;
 const LIGHT_AREA = 2;  // pixels to each side
-
-fn channel(at: u32) -> f32 {
-    if !has(HERE_HALF) { return bitcast<f32>(picture[at]); }
-    return unpack2x16float(picture[at >> 1u])[at & 1u];
-}
 
 fn is_valid(pixel: u32) -> bool {
     return !has(HERE_COUNTS) || counts[pixel] >= 0.0;
