@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..notices import warn
-from ..temporal.accumulate import Sums
+from ..temporal.accumulate import Means
 from ..temporal.similarity import MARGIN
 from .band import SUMS_BESIDE, Band
 from .card import CardLost
@@ -44,45 +44,45 @@ class CardAccumulator:
         flat = target.has_light and target.camera.sphere is None
         return flat and bool(others) and not self.is_lost
 
-    def sums(
+    def means(
         self,
         target: Stored,
         groups: Sequence[Sequence[Aligned | Reprojected]],
         images: Images | None,
         usual: float,
         lit: Sequence[str] = (),
-    ) -> Sums | None:
+    ) -> Means | None:
         """Return the means of a frame, its neighbours, and its parts that are lit.
 
         None where the card fails, which is said once: the processor goes on.
         """
         try:
-            return self._sums(target, groups, images, usual, lit)
+            return self._means(target, groups, images, usual, lit)
         except CardLost as error:
             self.is_lost = True
             self._frames.clear()
             warn(f"{error}; the processor accumulates instead")
             return None
 
-    def _sums(
+    def _means(
         self,
         target: Stored,
         groups: Sequence[Sequence[Aligned | Reprojected]],
         images: Images | None,
         usual: float,
         lit: Sequence[str],
-    ) -> Sums:
+    ) -> Means:
         here = Target(self._frames, target, images, usual)
         height, width = target.shape
         rows = self._rows(width, target.picture.shape[1])
         parts = []
         for first in range(0, height, rows):
             band = Band(here, first, min(first + rows, height))
-            parts.append(band.sums(groups, lit))
+            parts.append(band.means(groups, lit))
         planes = zip(*(part.passes + part.parts for part in parts), strict=True)
         found = [_joined(each).reshape(height, width, -1) for each in planes]
         count = len(parts[0].passes)
-        return Sums(
+        return Means(
             found[:count],
             found[count:],
             _joined([part.samples for part in parts]).reshape(height, width),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..temporal.accumulate import Sums
+from ..temporal.accumulate import Means
 from ..temporal.changes import TILE
 from ..temporal.similarity import MARGIN
 from .card import Call
@@ -46,7 +46,7 @@ class Band:
         self._by_level = empty(4 * _LEVELS * tiles), empty(2 * _LEVELS * tiles)
         self._step = self._uniform(here.step)
 
-    def sums(self, groups: Sequence[Sequence[Neighbour]], lit: Sequence[str]) -> Sums:
+    def means(self, groups: Sequence[Sequence[Neighbour]], lit: Sequence[str]) -> Means:
         """Return the means over the band's rows, and of the parts that are `lit`.
 
         Raises CardLost.
@@ -183,7 +183,7 @@ class Band:
         step["band"] = self._rows
         return self._here.card.upload(step, uniform=True)
 
-    def _found(self, means: Array, parts: list[Array]) -> Sums:
+    def _found(self, means: Array, parts: list[Array]) -> Means:
         """The inner rows of what the last kernel has laid one after another."""
         count, inner = self._count, self._inner
         passes = []
@@ -198,7 +198,7 @@ class Band:
                 [np.where(nothing, np.float32(np.nan), x) for x in planes]
                 for planes in (passes, parts)
             )
-        return Sums(passes, parts, samples, float(reused.sum(dtype=np.float64)))
+        return Means(passes, parts, samples, float(reused.sum(dtype=np.float64)))
 
 
 # Bindings of each kernel of weigh.wgsl, in the order in which they run.

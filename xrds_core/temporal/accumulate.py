@@ -93,16 +93,16 @@ def accumulate(
     pairs = [x.pair for group in groups for x in group if x.pair and x.is_reused]
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
     lit = _lit(target, others)
-    sums = None
+    means = None
     if card is not None and card.takes(target, others):
-        sums = card.sums(target, [x for x in groups if x], images, usual, lit)
-    if sums is None:
-        sums = _by_rows(target, groups, images, usual, lit, threads)
+        means = card.means(target, [x for x in groups if x], images, usual, lit)
+    if means is None:
+        means = _by_rows(target, groups, images, usual, lit, threads)
     height, width = target.shape
     requested = sum(x.samples for x in others) * height * width
-    rejected = 1.0 - sums.reused / requested if requested else 0.0
+    rejected = 1.0 - means.reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(x.number for x in others)}))
-    return _unpacked(target, sums, lit, rejected, frames)
+    return _unpacked(target, means, lit, rejected, frames)
 
 
 class OnCard(Protocol):
@@ -111,19 +111,19 @@ class OnCard(Protocol):
     def takes(self, target: Stored, others: Sequence[Stored]) -> bool:
         """Whether it can accumulate these frames."""
 
-    def sums(
+    def means(
         self,
         target: Stored,
         groups: Sequence[Sequence[Aligned | Reprojected]],
         images: Images | None,
         usual: float,
         lit: Sequence[str],
-    ) -> Sums | None:
+    ) -> Means | None:
         """The means of a frame, its neighbours and parts; None where it fails."""
 
 
 @dataclass(frozen=True)
-class Sums:
+class Means:
     """Means over a frame's own and the samples that it reuses.
 
     `passes` of the picture, each (H, W, C), `parts` that are lit (H, W, 3), `samples`
@@ -143,7 +143,7 @@ def _by_rows(
     usual: float,
     lit: tuple[str, ...],
     threads: int | None,
-) -> Sums:
+) -> Means:
     """Accumulate block by block, on the processor."""
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
@@ -162,7 +162,7 @@ def _by_rows(
 
     reused = sum(_in_threads(work, range(0, height, _ROWS), threads))
     passes, light = _planes(target, means), _planes(target, parts)
-    return Sums(passes, light, samples.reshape(target.shape), reused)
+    return Means(passes, light, samples.reshape(target.shape), reused)
 
 
 def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
@@ -475,22 +475,22 @@ def _means(
 
 def _unpacked(
     target: Stored,
-    sums: Sums,
+    means: Means,
     lit: tuple[str, ...],
     rejected: float,
     frames: tuple[int, ...],
 ) -> Accumulated:
-    passes = list(sums.passes)
+    passes = list(means.passes)
     alpha = passes.pop()[..., 0] if target.picture.shape[1] % 3 else None
     *radiance, albedo, normal = passes
-    light = dict(zip(lit, sums.parts, strict=True))
+    light = dict(zip(lit, means.parts, strict=True))
     dark = np.zeros((*target.shape, 3), np.float32)
     return Accumulated(
         radiance[0] if radiance else None,
         albedo,
         normal,
         alpha,
-        sums.samples,
+        means.samples,
         rejected,
         frames,
         {name: light.get(name, dark) for name in target.parts},

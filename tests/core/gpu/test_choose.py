@@ -12,7 +12,7 @@ from xrds_core.gpu import choose as choosing
 from xrds_core.gpu.accumulate import CardAccumulator
 from xrds_core.gpu.card import CardLost, find_adapters
 from xrds_core.sequence import accumulator
-from xrds_core.temporal.accumulate import Sums
+from xrds_core.temporal.accumulate import Means
 
 SOFTWARE = find_adapters(software=True)
 needs_card = pytest.mark.skipif(not SOFTWARE, reason="no software Vulkan here")
@@ -55,14 +55,14 @@ def test_a_card_that_computes_wrongly_is_not_used(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     play(monkeypatch, 1)
-    right = CardAccumulator._sums
+    right = CardAccumulator._means
 
-    def wrong(self: CardAccumulator, *args: object) -> Sums:
+    def wrong(self: CardAccumulator, *args: object) -> Means:
         found = right(self, *args)  # type: ignore[arg-type]
         found.passes[0][:, :32] *= 1.1
         return found
 
-    monkeypatch.setattr(CardAccumulator, "_sums", wrong)
+    monkeypatch.setattr(CardAccumulator, "_means", wrong)
     assert choosing.choose("auto") is None
     assert "computes something else than the processor" in capsys.readouterr().err
     with pytest.raises(CardLost, match="update its driver"):
