@@ -148,6 +148,18 @@ def size(text: str) -> tuple[int, int]:
     return width, height
 
 
+def crop(text: str) -> tuple[tuple[int, int], tuple[int, int]]:
+    """A part of a picture, such as 640x360+100+50: first and last pixel."""
+    match = re.fullmatch(r"(\d{1,6})x(\d{1,6})([+-]\d{1,6})([+-]\d{1,6})", text)
+    if not match or not int(match[1]) or not int(match[2]):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a part of a picture such as 640x360+100+50: width, "
+            "height, and how far it is from the left and from the top"
+        )
+    width, height, left, top = (int(x) for x in match.groups())
+    return (left, top), (left + width - 1, top + height - 1)
+
+
 def sizes(text: str) -> tuple[tuple[int, int], ...]:
     """Sizes, such as 960x540,1920x1080."""
     return tuple(size(part) for part in text.split(","))

@@ -48,6 +48,12 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         help="quality of the denoiser (default: high)",
     )
     _add_inputs(command)
+    add(
+        "--crop",
+        type=arguments.crop,
+        metavar="WxH+X+Y",
+        help="denoise and write this part of the picture alone, as 640x360+100+50",
+    )
     add("--resume", action="store_true", help="skip frames whose files are complete")
     add(
         "--picture-only",
@@ -174,6 +180,7 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
             others,
             options.halves,
             tuple(options.also),
+            options.crop,
         ),
         denoiser,
         frames=options.frames,

@@ -6,7 +6,7 @@ bounds what the header of a hostile file may claim.
 
 from __future__ import annotations
 
-from .openexr_io import Part
+from .openexr_io import Part, Window
 from .render_passes import (
     CYCLES,
     Beauty,
@@ -14,9 +14,9 @@ from .render_passes import (
     Guides,
     Names,
     copy_picture,
-    display_size,
     read_beauty,
     read_guides,
+    windows,
     write_part,
     write_picture,
 )
@@ -28,10 +28,11 @@ __all__ = [
     "Guides",
     "Names",
     "Part",
+    "Window",
     "copy_picture",
-    "display_size",
     "read_beauty",
     "read_guides",
+    "windows",
     "write_part",
     "write_picture",
 ]

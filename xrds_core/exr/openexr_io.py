@@ -106,23 +106,25 @@ def copy(
     planes: Mapping[int, Mapping[str, Pixels]],
     *,
     alone: bool = False,
+    window: Window | None = None,
 ) -> None:
     """Write `source` to `path` with some channels replaced or added, by part.
 
     All others, the windows and attributes stay as they are; a plane that replaces
     another gets its number format. `alone`: only the `planes`, of one part, are
-    written, with its windows and attributes. Raises PictureError.
+    written, with its windows and attributes. With a `window` all parts are cropped to
+    it, and planes are of it. Raises PictureError.
     """
     limit = limit_of(check_input(Path(source)))
     if not _is_shadowed():
-        _copy(source, path, planes, alone, limit)
+        _copy(source, path, planes, alone, window, limit)
         return
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
-        window = ((0, 0), (0, 0))  # not read: the source has them
-        options = {"source": os.fspath(source), "alone": alone}
+        unread = ((0, 0), (0, 0))  # the source has them
+        options = {"source": os.fspath(source), "alone": alone, "window": window}
         parts = [
-            Part("", window, window, dict(each), options | {"part": number})
+            Part("", unread, unread, dict(each), options | {"part": number})
             for number, each in planes.items()
         ]
         _pack(archive, parts)
@@ -234,9 +236,8 @@ def _write(path: str | Path, part: Part, codec: str) -> None:
     for name, value in part.attributes.items():
         matrix = isinstance(value, list)
         header[name] = np.asarray(value, np.float32) if matrix else value
-    for name in ("data_window", "display_window"):
-        corners = tuple(np.array(x, np.int32) for x in getattr(part, name))
-        header["dataWindow" if name == "data_window" else "displayWindow"] = corners
+    header["dataWindow"] = _corners(part.data_window)
+    header["displayWindow"] = _corners(part.display_window)
     # the library reads other arrays as if they were contiguous
     planes = {name: np.ascontiguousarray(x) for name, x in part.channels.items()}
     try:
@@ -251,6 +252,7 @@ def _copy(
     path: str | Path,
     planes: Mapping[int, Mapping[str, Pixels]],
     alone: bool,
+    window: Window | None,
     limit: int,
 ) -> None:
     import OpenEXR
@@ -260,10 +262,14 @@ def _copy(
         whole = _whole_headers(source)[number].header
         header = {k: v for k, v in whole.items() if k not in _OF_CHANNELS}
         header["type"] = OpenEXR.scanlineimage
+        if window is not None:
+            header["dataWindow"] = _corners(window)
         channels: dict[str, Any] = {}
         _put(channels, only)
     else:
         file = _opened(source, limit)
+        if window is not None:
+            _crop(file.parts, window)
         for number, each in planes.items():
             _put(file.parts[number].channels, each)
     try:
@@ -275,6 +281,31 @@ def _copy(
             file.write(str(path))
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
+
+
+def _crop(parts: Any, window: Window) -> None:
+    """Leave of each part what lies in a window; raises PictureError where it cannot."""
+    (left, top), (right, bottom) = window
+    for part in parts:
+        (x, y), (last_x, last_y) = _window(part.header["dataWindow"])
+        if left < x or top < y or right > last_x or bottom > last_y:
+            raise PictureError(
+                f"a part of it does not cover the crop, {part.header.get('name', '')!r}"
+            )
+        for channel in part.channels.values():
+            if (channel.xSampling, channel.ySampling) != (1, 1):
+                raise PictureError(
+                    f"channel {channel.name} has pixels left out: it cannot be cropped"
+                )
+            inner = channel.pixels[top - y : bottom - y + 1, left - x : right - x + 1]
+            channel.pixels = np.ascontiguousarray(inner)
+        part.header["dataWindow"] = _corners(window)
+
+
+def _corners(window: Window) -> tuple[Any, Any]:
+    """A window as the library takes it."""
+    first, last = (np.array(corner, np.int32) for corner in window)
+    return first, last
 
 
 def _put(channels: dict[str, Any], planes: Mapping[str, Pixels]) -> None:
@@ -383,7 +414,8 @@ def _main(task: str, path: str, archive: str, how: str) -> int:
         else:
             options = parts[0].attributes
             planes = {part.attributes["part"]: part.channels for part in parts}
-            _copy(options["source"], path, planes, options["alone"], int(how))
+            window = options["window"] and _window(options["window"])
+            _copy(options["source"], path, planes, options["alone"], window, int(how))
     except PictureError as error:
         print(error, file=sys.stderr)
         return 1

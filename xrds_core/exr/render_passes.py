@@ -109,19 +109,20 @@ def copy_picture(
     channels: Mapping[int, Mapping[str, Array]],
     *,
     alone: bool = False,
+    window: Window | None = None,
 ) -> None:
     """Write `source` to `path` with other pixels in some channels, by part.
 
-    The (H, W) planes are of the part's data window. What is not in `channels` stays as
-    it is, or is left out if they stand `alone`: those of one part can. Raises
-    PictureError as `write_picture`.
+    The (H, W) planes are of the part's data window, or of `window`, to which the file
+    is cropped. What is not in `channels` stays as it is, or is left out if they stand
+    `alone`: those of one part can. Raises PictureError as `write_picture`.
     """
     planes = {
         part: {k: np.ascontiguousarray(v, np.float32) for k, v in each.items()}
         for part, each in channels.items()
     }
     with _whole(path) as unfinished:
-        openexr_io.copy(source, unfinished, planes, alone=alone)
+        openexr_io.copy(source, unfinished, planes, alone=alone, window=window)
 
 
 def write_part(path: str | Path, part: Part) -> None:
@@ -139,14 +140,14 @@ def _whole(path: str | Path) -> Iterator[Path]:
         raise PictureError(f"cannot write {path}: {error}") from error
 
 
-def display_size(path: str | Path, *, whole: bool = False) -> tuple[int, int]:
-    """Return width and height of a file's display window.
+def windows(path: str | Path, *, whole: bool = False) -> tuple[Window, set[Window]]:
+    """Return a file's display window and the data windows of its parts.
 
     Raises PictureError where it cannot be read; for `whole`, also where pixels cannot.
     """
     read = openexr_io.read if whole else openexr_io.read_headers
-    (left, top), (right, bottom) = read(path)[0].display_window
-    return right - left + 1, bottom - top + 1
+    parts = read(path)
+    return parts[0].display_window, {part.data_window for part in parts}
 
 
 class File:

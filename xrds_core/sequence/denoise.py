@@ -19,7 +19,7 @@ from ..light_parts.light import passes_of
 from ..temporal.window import Shot, Window
 from ..time_left import Clock
 from .accumulator import Accumulator
-from .finishing import Finished, finish_frame
+from .finishing import AROUND, Finished, finish_frame
 from .loading import Loader
 from .neighbour_frames import NeighbourSelection
 from .reading import FrameFile, Reading
@@ -27,6 +27,8 @@ from .reading import FrameFile, Reading
 if TYPE_CHECKING:
     from ..arrays import Array
     from ..denoising import Denoiser
+    from ..exr import Window as PixelWindow
+    from .rectangles import Rectangle
 
 Say = Callable[[str], object]
 
@@ -38,7 +40,8 @@ class Files:
     `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
     the input as well, unchanged. `others` are files that are read besides the frames,
     `halves` is the pattern of their second half buffers, `also` those of further files
-    of each frame.
+    of each frame. `crop` is the part of the picture that is denoised and written, first
+    and last pixel in the coordinates of the files.
     """
 
     source: str
@@ -47,9 +50,10 @@ class Files:
     others: tuple[Path, ...] = ()
     halves: str | None = None
     also: tuple[str, ...] = ()
+    crop: PixelWindow | None = None
 
     def write(self, number: int, frame: FrameFile, finished: Finished) -> Path:
-        """Write a finished frame, whole or not at all; raises PictureError."""
+        """Write a finished frame, or none of it; raises PictureError."""
         names = list("RGBA") if self.picture_only else frame.channels
         planes = dict(zip(names, np.moveaxis(finished.picture, 2, 0), strict=False))
         by_part: dict[int, dict[str, Array]] = {frame.part: planes}
@@ -59,7 +63,9 @@ class Files:
                 by_part.setdefault(part, {})[own] = plane
         path = frame_path(self.output, number)
         source = frame_path(self.source, number)
-        exr.copy_picture(source, path, by_part, alone=self.picture_only)
+        exr.copy_picture(
+            source, path, by_part, alone=self.picture_only, window=self.crop
+        )
         return path
 
     def is_done(self, number: int, neighbours: Iterable[int] = ()) -> bool:
@@ -78,8 +84,11 @@ class Files:
         if not output.is_file() or output.stat().st_mtime_ns < max(times, default=0):
             return False
         try:
-            size = exr.display_size(output, whole=True)
-            return not source.is_file() or size == exr.display_size(source)
+            display, areas = exr.windows(output, whole=True)
+            if not source.is_file():
+                return True
+            whole, there = exr.windows(source)
+            return display == whole and areas <= ({self.crop} if self.crop else there)
         except PictureError:
             return False
 
@@ -187,12 +196,15 @@ def _entries(
         if resume and files.is_done(number, shot.neighbours(number)):
             continue
         others = selection.select(number, own, found.neighbours)
-        finished = finish_frame(
-            own.stored, others, denoiser, accumulate, region=own.inner, light=own.light
-        )
         started = time.perf_counter()
         try:
-            path, fails = files.write(number, own, finished), False
+            region, within = _regions(own, files.crop)
+            finished = finish_frame(
+                own.stored, others, denoiser, accumulate, region=region, light=own.light
+            )
+            started = time.perf_counter()
+            path = files.write(number, own, finished.within(within))
+            fails = False
         except PictureError as error:
             if fails:
                 raise
@@ -206,6 +218,27 @@ def _entries(
         say(f"frame {number}: {path}, {clock.lap(left)}")
         yield _entry(number, path, shot.radius, finished, seconds)
     selection.report()
+
+
+def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Rectangle]:
+    """What to denoise of a frame's arrays, and which part of that to write.
+
+    A crop is denoised with what a denoiser sees around it. Raises PictureError where
+    the frame does not cover it.
+    """
+    if crop is None:
+        return own.inner, (slice(None), slice(None))
+    region, within = [], []
+    for axis, inner in ((1, own.inner[0]), (0, own.inner[1])):
+        first, last = (corner[axis] for corner in crop)
+        begin, end = (corner[axis] for corner in own.data_window)
+        if first < begin or last > end:
+            raise PictureError("the crop lies outside of what the file holds")
+        around = max(first - AROUND, begin), min(last + AROUND, end)
+        offset = inner.start - begin
+        region.append(slice(around[0] + offset, around[1] + offset + 1))
+        within.append(slice(first - around[0], last - around[0] + 1))
+    return (region[0], region[1]), (within[0], within[1])
 
 
 def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:

@@ -34,9 +34,10 @@ _ENOUGH, _IN_ALL = 1.0, 3.0
 # few noisy pixels are.
 _LEAST_FACTOR, _MOST_FACTOR = 1.0, 2.0
 _SMOOTH = 3  # pixels across
-# The frame alone is denoised in parts where these are less than this much of it; each
-# with so many pixels around it as a denoiser's network sees.
-_PART, _AROUND = 0.75, 96
+# The frame alone is denoised in parts where these are less than this much of it.
+_PART = 0.75
+AROUND = 96
+"""Pixels around a part that a denoiser's network sees."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,11 @@ class Finished:
     def picture(self) -> Array:
         """Radiance and alpha, where there is one: (H, W, 3) or (H, W, 4)."""
         return self.denoised.radiance
+
+    def within(self, region: Rectangle) -> Finished:
+        """The same of a part of what was denoised."""
+        picture = replace(self.denoised, radiance=self.picture[region])
+        return replace(self, denoised=picture, parts=_cropped(self.parts, region))
 
 
 def finish_frame(
@@ -159,9 +165,9 @@ def _area(blocks: Rectangle, shape: tuple[int, ...]) -> _Area:
     place, around, within = [], [], []
     for part, side in zip(blocks, shape, strict=True):
         first, last = part.start * BLOCK, min(part.stop * BLOCK, side)
-        before = max(first - _AROUND, 0)
+        before = max(first - AROUND, 0)
         place.append(slice(first, last))
-        around.append(slice(before, min(last + _AROUND, side)))
+        around.append(slice(before, min(last + AROUND, side)))
         within.append(slice(first - before, last - before))
     return _Area(*((x[0], x[1]) for x in (place, around, within)))
 

@@ -72,16 +72,17 @@ class FrameFile:
 
     `stored` covers the display window and all that the picture's data window has
     beyond it, or, of a frame that is not to be reused, the data window alone; `inner`
-    crops its arrays to the latter. `part` is the file's part with the picture and
-    `channels` are those of the picture, R, G, B and, where the file has alpha, A.
-    Frames with the same `key` have the same render settings; "" if unknown. `radius`
-    is the one that the file recommends, or None. `reusable` is False where the frame
-    cannot be reprojected. `light` are the parts of its light that were read; `places`
-    says in which part of the file a channel lies, and what it is called there.
+    crops its arrays to the latter, `data_window`. `part` is the file's part with the
+    picture and `channels` are those of the picture, R, G, B and, where the file has
+    alpha, A. Frames with the same `key` have the same render settings; "" if unknown.
+    `radius` is the one that the file recommends, or None. `reusable` is False where the
+    frame cannot be reprojected. `light` are the parts of its light that were read;
+    `places` says in which part of the file a channel lies, and what it is called there.
     """
 
     stored: Stored
     inner: tuple[slice, slice]
+    data_window: Window
     part: int
     channels: list[str]
     key: str
@@ -129,6 +130,7 @@ def read_frame(
     return FrameFile(
         stored=stored,
         inner=_inner(file.window, part.data_window),
+        data_window=part.data_window,
         part=number_of_part,
         channels=channels,
         key=str(part.attributes.get(KEY, "")),

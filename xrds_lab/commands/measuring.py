@@ -454,5 +454,5 @@ def _inputs(options: argparse.Namespace) -> dict[str, Any]:
 
 def _bench_lines(result: dict[str, Any]) -> list[str]:
     failed = [f"left out: {name}: {why}" for name, why in result["failures"].items()]
-    points = result.get("points") or result["shots"]
+    points = next(result[x] for x in ("points", "shots", "parts") if x in result)
     return [f"{len(points)} points", *failed]

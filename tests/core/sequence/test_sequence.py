@@ -315,6 +315,47 @@ def test_data_windows(
     assert np.median(difference) < 2e-3
 
 
+CROP = ((24, 8), (55, 39))
+
+
+def test_a_crop_is_the_picture_of_that_place(shot: Path, denoiser: Denoiser) -> None:
+    """All channels of all parts are of it; the window of the whole picture stays."""
+    denoise(shot, denoiser, frames=[3])
+    denoise(shot, denoiser, "crop", frames=[3], to={"crop": CROP})
+    file = exr.File(shot / "crop" / "0003.exr")
+    (part,) = file.parts
+    assert (part.data_window, part.display_window) == (CROP, sequences.WINDOW)
+    place = (slice(8, 40), slice(24, 56))
+    whole = exr.File(shot / "out" / "0003.exr")
+    for name in set(file.names.names) - set("RGB"):
+        np.testing.assert_array_equal(file.pixels(name), whole.pixels(name)[place])
+    inside = picture(shot / "out" / "0003.exr")[place]
+    # the library judges the exposure by what it is given
+    ours = np.stack([file.pixels(x) for x in "RGB"], -1)
+    assert np.abs(ours - inside).mean() < 0.01 * inside.mean()
+
+
+def test_a_crop_of_the_picture_alone(shot: Path, denoiser: Denoiser) -> None:
+    to = {"crop": CROP, "picture_only": True}
+    denoise(shot, denoiser, "alone", frames=[3], to=to)
+    (part,) = exr.File(shot / "alone" / "0003.exr").parts
+    assert set(part.channels) == set("RGB")
+    assert part.data_window == CROP
+
+
+def test_another_crop_is_not_resumed_from(shot: Path, denoiser: Denoiser) -> None:
+    for crop, kept in ((CROP, []), (CROP, [3]), (None, []), (CROP, [])):
+        told = denoise(shot, denoiser, frames=[3], to={"crop": crop}, resume=True)
+        assert told["kept"] == kept
+
+
+def test_a_crop_outside_of_the_picture(shot: Path, denoiser: Denoiser) -> None:
+    to = {"crop": ((50, 8), (90, 39))}
+    with pytest.raises(PictureError, match="crop lies outside"):
+        denoise(shot, denoiser, frames=[2, 3], to=to)
+    assert not list((shot / "out").iterdir())
+
+
 # --- frames that are not as they should be --------------------------------------------
 
 
