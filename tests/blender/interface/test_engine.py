@@ -13,6 +13,8 @@ from xrds_lab.weights import save_network
 
 bpy = pytest.importorskip("bpy")
 
+from compositing import compositor
+
 from xrds_blender import render, run_job
 from xrds_blender.frame.denoisers import in_process
 from xrds_blender.planning.request import Machine
@@ -197,23 +199,6 @@ def is_diffuse(name: str, layer: str, channel: str) -> bool:
     return name in {
         f"{layer}.{kind}.{channel}" for kind in ("DiffDir", "Diffuse Direct")
     }
-
-
-def compositor(scene: Any) -> tuple[Any, Any]:
-    """A compositor whose only node so far is the end; (tree, its image socket)."""
-    if BLENDER_5:
-        tree = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
-        scene.compositing_node_group = tree
-        tree.interface.new_socket(
-            "Image", in_out="OUTPUT", socket_type="NodeSocketColor"
-        )
-        end = tree.nodes.new("NodeGroupOutput")
-    else:
-        scene.use_nodes = True
-        tree = scene.node_tree
-        tree.nodes.clear()
-        end = tree.nodes.new("CompositorNodeComposite")
-    return tree, end.inputs[0]
 
 
 def test_the_compositor_gets_the_picture(life: Any, network: Any, written: Any) -> None:

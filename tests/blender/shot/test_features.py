@@ -15,6 +15,8 @@ from channels import read_channels
 
 bpy = pytest.importorskip("bpy")
 
+from compositing import compositor
+
 from xrds_blender import render, run_job
 from xrds_blender.cycles import session
 from xrds_blender.frame.denoisers import in_process
@@ -251,23 +253,6 @@ def test_two_scenes_in_one_compositor(life: Any, network: Any, written: Any) -> 
     assert len(network) == 1  # the first scene's own layers are not asked for
     sky = np.broadcast_to((0.25, 0.35, 0.5), (33, 45, 3))
     np.testing.assert_allclose(picture[..., :3], sky, atol=0.05)
-
-
-def compositor(scene: Any) -> tuple[Any, Any]:
-    """A compositor whose only node so far is the end; (tree, its image socket)."""
-    if BLENDER_5:
-        tree = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
-        scene.compositing_node_group = tree
-        tree.interface.new_socket(
-            "Image", in_out="OUTPUT", socket_type="NodeSocketColor"
-        )
-        end = tree.nodes.new("NodeGroupOutput")
-    else:
-        scene.use_nodes = True
-        tree = scene.node_tree
-        tree.nodes.clear()
-        end = tree.nodes.new("CompositorNodeComposite")
-    return tree, end.inputs[0]
 
 
 def file_output(tree: Any, folder: Path) -> Any:
