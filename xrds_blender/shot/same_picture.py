@@ -139,7 +139,8 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     history = None
     if can_continue(scene, request):
         history = History(Accumulator(request.machine.accumulate_on))
-    found = SamePicture(scene.cycles.samples, history)
+    neighbours = 2 * request.settings.temporal_radius
+    found = SamePicture(scene.cycles.samples, history, neighbours=neighbours)
     found.share = found.possible(_FIRST)
     return found
 
@@ -182,12 +183,14 @@ class SamePicture:
 
     `samples` are the file's, with a noise threshold the most that a pixel takes. Under
     a camera that stands still frames that have left the window count, as `history`. The
-    next frame to be sampled takes a `share` of them.
+    next frame to be sampled takes a `share` of them. Frames have so many `neighbours`,
+    but fewer near the ends of the shot.
     """
 
     samples: int
     history: History | None = None
     share: float = _FIRST
+    neighbours: int = 0
     _worth: Worth = field(default_factory=Worth)
     _measured_in: int = 0
     _tried: float = 1.0
@@ -366,8 +369,9 @@ class SamePicture:
         `gain` is what a frame of `share` has from `others`, which may have another.
         """
         beside = [self._shares.get(number, 1.0) for number in others]
-        if beside:
-            gain = 1.0 + (gain - 1.0) * share / float(np.mean(beside))
+        if beside:  # the first frames have fewer than those that are sampled next
+            more = max(self.neighbours / len(beside), 1.0)
+            gain = 1.0 + (gain - 1.0) * share / float(np.mean(beside)) * more
         least = _FIRST if self.history is None else self.share * _FALL
         needed = self.possible(max(1.0 / float(self._equal(1.0, gain)), least))
         if not _TOO_MUCH <= needed / self.share <= _TOO_LITTLE:

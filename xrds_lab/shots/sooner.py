@@ -2,8 +2,8 @@
 
 Each scene is made a shot, or moves as its file says. Cycles + OIDN renders frames of it
 with all samples, XRDS the whole shot with as few as it chooses, and nine frames with
-all. Seconds are wall clock, so a quiet machine is needed; the three take turns within a
-case, never at once.
+all. Seconds are wall clock, which needs a quiet machine, and the processor's own, which
+suffer less from others at work. The three take turns within a case, never at once.
 """
 
 from __future__ import annotations
@@ -75,11 +75,13 @@ class Case:
 class Made:
     """A method's middle frame (H, W, 3), seen at `stops`, and what it took.
 
-    `seconds` are of a frame, `shares` of the file's samples, one for each frame.
+    `seconds` are of a frame by the clock, `processor` of all cores; `shares` of the
+    file's samples, one for each frame.
     """
 
     radiance: Array
     seconds: float
+    processor: float
     stops: float
     shares: tuple[float, ...] = ()
 
@@ -160,7 +162,9 @@ class _Scene:
         shown, alone, *truth = (metrics.to_srgb(x, made.stops) for x in pictures)
         verdict = compare(shown, alone, truth)
         error = metrics.flip(made.radiance, self.pictures.reference(), made.stops)
-        cycles = self.rows.get(f"{case.label}-{CYCLES}", {"seconds": made.seconds})
+        own = {"seconds": made.seconds, "processor_seconds": made.processor}
+        cycles = self.rows.get(f"{case.label}-{CYCLES}", own)
+        ratios = {name: round(x / cycles[name], 3) for name, x in own.items()}
         return {
             "scene": self.shot.name,
             "motion": case.motion,
@@ -168,7 +172,9 @@ class _Scene:
             "noise_threshold": case.noise_threshold,
             "method": method,
             "seconds": round(made.seconds, 3),
-            "ratio": round(made.seconds / cycles["seconds"], 3),
+            "ratio": ratios["seconds"],
+            "processor_seconds": round(made.processor, 3),
+            "processor_ratio": ratios["processor_seconds"],
             "mean_share": round(float(np.mean(made.shares or [1.0])), 3),
             "shares": [round(x, 3) for x in made.shares],
             "psnr": round(verdict.psnr, 3),
@@ -199,16 +205,18 @@ def _cycles(shot: Shot, case: Case, frames: int) -> Made:
     from xrds_blender import render
 
     scene = _opened(shot, case, frames // 2)
-    seconds, radiance = [], np.empty(0)
+    seconds, processor, radiance = [], [], np.empty(0)
     middle = scene.frame_current
     for number in range(middle - _TIMED // 2, middle + _TIMED // 2 + 1):
         scene.frame_set(number)
-        started = time.perf_counter()
+        started, busy = time.perf_counter(), time.process_time()
         picture = render(scene, plain=True, denoiser=DEFAULT_DENOISING)
         seconds.append(time.perf_counter() - started)
+        processor.append(time.process_time() - busy)
         if number == middle:
             radiance = np.asarray(picture.radiance, np.float32)
-    return Made(radiance, statistics.median(seconds), _stops(scene))
+    taken = statistics.median(seconds), statistics.median(processor)
+    return Made(radiance, *taken, _stops(scene))
 
 
 def _same_picture(shot: Shot, case: Case, frames: int) -> Made:
@@ -231,14 +239,15 @@ def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     numbers = range(middle - reach, middle + reach + 1)
     job = render_request(scale=1, temporal_radius=REACH, **choices)
     radiance, shares = np.empty(0), []
-    started = time.perf_counter()
+    started, busy = time.perf_counter(), time.process_time()
     for number, picture in render_shot(scene, job, numbers):
         assert picture.settings is not None
         shares.append(float(picture.settings.share))
         if number == middle:
             radiance = np.asarray(picture.radiance, np.float32)
     seconds = (time.perf_counter() - started) / len(numbers)
-    return Made(radiance, seconds, _stops(scene), tuple(shares))
+    processor = (time.process_time() - busy) / len(numbers)
+    return Made(radiance, seconds, processor, _stops(scene), tuple(shares))
 
 
 def _stops(scene: Any) -> float:
@@ -252,6 +261,7 @@ _COLUMNS = {
     "method": "method",
     "seconds": "s a frame",
     "ratio": "of Cycles'",
+    "processor_ratio": "of its processor seconds",
     "mean_share": "share of samples",
     "psnr": "PSNR",
     "gain": "gain",
