@@ -31,10 +31,14 @@ class Layer:
 
 @dataclass(frozen=True)
 class LastRender:
-    """What the last render was, with nothing left open, and its seconds by stage."""
+    """What the last render was, with nothing left open, and its seconds by stage.
+
+    `devices` are what its stages ran on, as far as that is known.
+    """
 
     settings: Settings
     seconds: Mapping[str, float]
+    devices: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass
@@ -68,11 +72,16 @@ def _denoising(scene: Any) -> Denoising | None:
     return Denoising(f"{cycles.denoising_quality}-{cycles.denoising_prefilter}")
 
 
-def remember(layer: Layer, settings: Settings, seconds: Mapping[str, float]) -> None:
-    """Remember a finished render."""
+def remember(
+    layer: Layer,
+    settings: Settings,
+    seconds: Mapping[str, float],
+    devices: Mapping[str, str] | None = None,
+) -> None:
+    """Remember a finished render, `devices` as of `LastRender`."""
     settings, seconds = resolved(settings, layer.settings), dict(seconds)
-    known = FILE.of(_Known)
-    known.last.setdefault(layer.scene, {})[layer.name] = LastRender(settings, seconds)
+    known, last = FILE.of(_Known), LastRender(settings, seconds, devices or {})
+    known.last.setdefault(layer.scene, {})[layer.name] = last
     layers = known.measured.setdefault(layer.scene, {})
     before, model = layers.get(layer.name), budget.shipped()
     layers[layer.name] = learn(before, settings, layer.pixels, seconds, model)

@@ -194,7 +194,9 @@ def temporal(settings: Settings, accumulated: Accumulated) -> Temporal:
     """What neighbours added to a picture, as it reports."""
     samples = float(accumulated.samples.mean())
     radius = settings.temporal_radius
-    return Temporal(radius, accumulated.frames, samples, accumulated.rejected)
+    return Temporal(
+        radius, accumulated.frames, samples, accumulated.rejected, accumulated.device
+    )
 
 
 def accumulation(accumulated: Accumulated) -> Decision:

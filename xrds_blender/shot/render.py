@@ -163,8 +163,18 @@ def _described(
     picture = choice.described(picture)
     picture.seconds["total"] = time.perf_counter() - start
     assert picture.settings is not None
-    history.remember(layer, picture.settings, picture.seconds)
+    history.remember(layer, picture.settings, picture.seconds, _devices(picture))
     return picture
+
+
+def _devices(picture: Picture) -> dict[str, str]:
+    """What the stages of a picture ran on."""
+    assert picture.settings is not None
+    stage = "network" if picture.settings.is_enlarged else "denoise"
+    found = {stage: picture.device}
+    if picture.temporal is not None:
+        found["accumulate"] = picture.temporal.device
+    return found
 
 
 def _finish(

@@ -39,6 +39,11 @@ class CardAccumulator:
         self.is_lost = False
         self._frames = FramesOnCard(card)
 
+    @property
+    def name(self) -> str:
+        """The card's."""
+        return self.card.name
+
     def takes(self, target: Stored, others: Sequence[Stored]) -> bool:
         """Whether it can accumulate these: neither guides alone nor panoramas."""
         flat = target.has_light and target.camera.sphere is None

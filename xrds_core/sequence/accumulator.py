@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING
 
-from ..temporal.accumulate import accumulate
+from ..temporal.accumulate import PROCESSOR, accumulate
 from ..temporal.vectors import Movement
 
 if TYPE_CHECKING:
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from ..gpu.accumulate import CardAccumulator
     from ..temporal.accumulate import Accumulated
     from ..temporal.frame import Stored
-
-PROCESSOR = "cpu"
 
 
 class Accumulator:
@@ -43,7 +41,7 @@ class Accumulator:
             return accumulate(target, others)
         card = open_card(self._asked)
         found = accumulate(target, others, self._movement, card=card)
-        self.device = device_of(card)
+        self.device = found.device
         return found
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
+PROCESSOR = "cpu"
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 # Standard deviation, in pixels, of the weight by distance where frames have one sample
@@ -59,7 +60,7 @@ class Accumulated:
     `rejected` is the share of the neighbours' samples that were left out: of pixels
     that a neighbour does not show, or shows in other light. `frames` are the numbers of
     the frames that were considered, the frame itself included: those of its shot,
-    between two shot cuts.
+    between two shot cuts. `device` accumulated them: a graphics card's name, or `cpu`.
     """
 
     radiance: Array | None
@@ -70,6 +71,7 @@ class Accumulated:
     rejected: float
     frames: tuple[int, ...]
     parts: Mapping[str, Array] = field(default_factory=dict)
+    device: str = PROCESSOR
 
 
 def accumulate(
@@ -93,20 +95,27 @@ def accumulate(
     pairs = [x.pair for group in groups for x in group if x.pair and x.is_reused]
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
     lit = _lit(target, others)
-    means = None
+    means, device = None, PROCESSOR
     if card is not None and card.takes(target, others):
         means = card.means(target, [x for x in groups if x], images, usual, lit)
+    if card is not None and means is not None:
+        device = card.name
     if means is None:
         means = _by_rows(target, groups, images, usual, lit, threads)
     height, width = target.shape
     requested = sum(x.samples for x in others) * height * width
     rejected = 1.0 - means.reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(x.number for x in others)}))
-    return _unpacked(target, means, lit, rejected, frames)
+    found = _unpacked(target, means, lit, rejected, frames)
+    return replace(found, device=device)
 
 
 class OnCard(Protocol):
     """What accumulates on a graphics card."""
+
+    @property
+    def name(self) -> str:
+        """The card's."""
 
     def takes(self, target: Stored, others: Sequence[Stored]) -> bool:
         """Whether it can accumulate these frames."""

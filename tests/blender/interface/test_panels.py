@@ -332,6 +332,21 @@ def test_seconds_of_an_animation_are_those_of_its_frames() -> None:
     FILE.end()
 
 
+def test_the_last_render_tells_its_card() -> None:
+    scene = bpy.context.scene
+    request = properties.request_of(scene.xrds)
+    layer = history.Layer(scene.name, "ViewLayer", 64, history.scene_settings(scene))
+    seconds = {"beauty": 1.0, "accumulate": 0.3, "denoise": 2.0, "total": 3.3}
+    devices = {"accumulate": "Card of Tests", "denoise": "cpu"}
+    history.remember(layer, request.settings, seconds, devices)
+    last = history.last(scene)
+    assert last is not None
+    rows = dict(summary.last_render(last))
+    assert rows["Neighbouring Frames"] == "0.3 s, Card of Tests"
+    assert rows["Denoising"] == "2.0 s"
+    FILE.end()
+
+
 def test_cycles_users_see_it_too() -> None:
     pytest.importorskip("mitsuba_oidn")
     moving(bpy.context.scene)

@@ -153,7 +153,10 @@ def last_render(last: LastRender) -> list[Row]:
     for stage, name in _STAGES.items():
         spent = last.seconds.get(stage, 0.0)
         if spent >= 0.05 or stage == "total":
-            rows.append((_stage(stage, name, last.settings.mode), f"{spent:.1f} s"))
+            shown, device = f"{spent:.1f} s", last.devices.get(stage, "")
+            if device not in ("", "cpu"):
+                shown += f", {device}"
+            rows.append((_stage(stage, name, last.settings.mode), shown))
     return rows
 
 
