@@ -186,7 +186,7 @@ def nearest(low: np.ndarray, scale: int, height: int, width: int) -> np.ndarray:
 class NearestUpscaler:
     """Stands for the network: repeats pixels, so that every value can be foretold."""
 
-    device = "stand-in"
+    device_name = "stand-in"
 
     def __init__(self, scale: int) -> None:
         self.scale = scale

@@ -38,9 +38,10 @@ def unregister() -> None:
     registration.unregister()
 
 
-def render(scene: Any, scale: int = 2, **choices: Any) -> Picture:
+def render(scene: Any, scale: int = 1, **choices: Any) -> Picture:
     """Render the current frame of `scene` and return its picture.
 
+    It is rendered at full size, or at 1 / `scale` of it (2, 4, 8) and enlarged.
     `choices` are `layer`, the name of a view layer (the first that is used by default),
     and the others of `xrds_blender.planning.request.render_request`. The scene's own
     `xrds` settings and its compositor play no part, and everything in it is as before

@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from .errors import (
+    GET_NETWORK,
     Cancelled,
     OutOfMemory,
     PictureError,
@@ -54,10 +55,19 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name that needs torch on first access."""
+    """Import a public name that needs torch on first access.
+
+    Raises XRDSError, saying what to install, where torch or safetensors is missing.
+    """
     if name not in _LAZY:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_LAZY[name], __name__), name)
+    try:
+        module = import_module(_LAZY[name], __name__)
+    except ModuleNotFoundError as error:
+        raise XRDSError(
+            f"{name} needs {error.name}, which is not installed: run {GET_NETWORK}"
+        ) from error
+    value = getattr(module, name)
     globals()[name] = value
     return value
 

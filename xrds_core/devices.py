@@ -8,6 +8,8 @@ import torch
 
 from .errors import UsageError
 
+_TORCH_NAMES = {"metal": "mps"}
+"""Where torch's name of a device is not ours, which the denoiser has as well."""
 PRECISIONS = {"fp32": torch.float32, "bf16": torch.bfloat16}
 
 
@@ -20,8 +22,10 @@ def choose_device(name: str = "auto") -> torch.device:
         kinds = (("cuda", torch.cuda), ("mps", torch.backends.mps))
         present = [kind for kind, backend in kinds if backend.is_available()]
         return torch.device(present[0] if present else "cpu")
+    if name in _TORCH_NAMES.values():
+        raise UsageError(f"device {name!r} is unknown; use {', '.join(_TORCH_NAMES)}")
     try:
-        device = torch.device(name)
+        device = torch.device(_TORCH_NAMES.get(name, name))
         torch.zeros(1, device=device).cpu()  # "meta" holds no numbers
     except (RuntimeError, AssertionError, NotImplementedError) as error:
         # torch's own text runs over many lines
@@ -30,6 +34,12 @@ def choose_device(name: str = "auto") -> torch.device:
             f"device {name!r} is not available ({reason}); use auto"
         ) from error
     return device
+
+
+def device_name(device: torch.device) -> str:
+    """What commands call a device: `cpu`, `cuda:1`, `metal`."""
+    ours = {torchs: name for name, torchs in _TORCH_NAMES.items()}
+    return ours.get(device.type, str(device))
 
 
 def choose_precision(name: str, device: torch.device) -> torch.dtype:

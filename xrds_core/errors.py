@@ -14,6 +14,10 @@ def printable(text: str) -> str:
     )
 
 
+GET_NETWORK = "pip install xrds[network]"
+"""The command that brings what super-resolution needs beside the rest."""
+
+
 class XRDSError(Exception):
     """Base of every error of this project; its text can be shown to a user."""
 

@@ -7,24 +7,49 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import torch
-
-from .errors import WeightsError
+from .denoising import oidn_device
+from .errors import GET_NETWORK, WeightsError, XRDSError
 from .gpu.card import card_names
-from .superres.weights import DIRECTORY, available, guide_filter_record
+from .superres.weights_header import DIRECTORY, available, guide_filter_record
 from .version import package_version
 
 COSTS = DIRECTORY / "costs.json"
 """Parameters and operations of the networks, counted before: counting takes seconds."""
 
 
-def devices() -> list[str]:
-    """The names that `--device` accepts here, the processor first."""
-    names = ["cpu"]
-    names += [f"cuda:{i}" for i in range(torch.cuda.device_count())]
+def network_devices() -> list[str]:
+    """The names that `--device` accepts for a network here, the processor first.
+
+    Raises whatever a missing or broken torch raises.
+    """
+    import torch
+
+    from .devices import device_name
+
+    found = [torch.device("cuda", i) for i in range(torch.cuda.device_count())]
     if torch.backends.mps.is_available():
-        names.append("mps")
-    return names
+        found.append(torch.device("mps"))
+    return ["cpu", *map(device_name, found)]
+
+
+def denoiser_devices() -> list[str]:
+    """The names that `xrds denoise --device` accepts here, the fastest first."""
+    try:
+        return oidn_device.devices()
+    except XRDSError:
+        return []
+
+
+def _network() -> dict[str, Any]:
+    """What there is of the network: version of torch, devices, or what is wrong."""
+    try:
+        devices = network_devices()
+        import safetensors  # noqa: F401  # only asked whether it is there
+        import torch
+    except Exception as error:  # OSError, AttributeError: a broken one raises all
+        reason = " ".join(str(error).split()) or type(error).__name__
+        return {"torch": None, "torch_error": reason, "devices": []}
+    return {"torch": torch.__version__, "torch_error": None, "devices": devices}
 
 
 def shipped_costs() -> dict[str, Any]:
@@ -48,9 +73,9 @@ def info(
         raise WeightsError(f"{weights} is no folder of weights files")
     return {
         "version": package_version(),
-        "torch": torch.__version__,
         "blender": blender,
-        "devices": devices(),
+        **_network(),
+        "denoiser": denoiser_devices(),
         "accumulation": [*card_names(), "cpu"],
         **shipped_costs(),
         "weights": available(weights),
@@ -60,12 +85,13 @@ def info(
 
 def lines(result: dict[str, Any]) -> Iterator[str]:
     """The result of `info` for people to read."""
-    yield (
-        f"XRDS {result['version']}, torch {result['torch']}, "
-        f"Blender {result['blender'] or 'not found'}"
-    )
-    yield f"devices: {', '.join(result['devices'])}"
+    yield f"XRDS {result['version']}, Blender {result['blender'] or 'not found'}"
     yield f"accumulation: {', '.join(result['accumulation'])}"
+    yield f"denoiser: {', '.join(result['denoiser']) or 'not found'}"
+    if result["torch"] is None:
+        yield f"network: none ({result['torch_error']}); {GET_NETWORK} brings it"
+    else:
+        yield f"network: torch {result['torch']} on {', '.join(result['devices'])}"
     yield "the paper's network, x4, 1024 x 1024 output:"
     yield "  RDST  XDG  parameters    MACs  with attention   FLOPs"
     for row in result["paper_table"]:

@@ -12,8 +12,8 @@ const JOB_TYPE = {
             description: "Frames to render, as 47, 1-30 or 1, 3, 5-10",
         },
         {
-            key: "chunk_size", type: "int32", default: 1,
-            description: "Frames of one task: a worker loads the scene once for all",
+            key: "chunk_size", type: "int32", default: 8,
+            description: "Frames of one task, which lend each other samples",
         },
         {
             key: "render_output_root", type: "string", subtype: "dir_path",

@@ -77,7 +77,7 @@ def main() -> None:
     folder = options.folder or Path(tempfile.mkdtemp())
     name, radius = Path(options.blend).stem, options.temporal_radius
     both = ["--frames", "<STARTFRAME>-<ENDFRAME>", "--temporal-radius", str(radius)]
-    render = ["render", options.blend, "--scale", "1", *both]
+    render = ["render", options.blend, *both]
     render += ["--sample-cache", options.samples]
     finish = ["denoise", f"{options.samples}/####.exr", "--out", options.out, *both]
     finish += ["--picture-only", "--resume"]

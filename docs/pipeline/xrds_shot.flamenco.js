@@ -46,7 +46,7 @@ function compileJob(job) {
     const radius = `${settings.temporal_radius}`;
     const chunks = frameChunker(settings.frames, settings.chunk_size);
     const rendered = chunks.map((chunk) => addTask(job, `render-${chunk}`, [
-        "render", settings.blendfile, "--scale", "1",
+        "render", settings.blendfile,
         "--frames", chunk, "--temporal-radius", radius,
         "--sample-cache", settings.samples_path,
     ]));

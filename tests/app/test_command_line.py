@@ -237,7 +237,7 @@ except RuntimeError as error:
     script.write_text(code)
     done = bare.run("blender", "-b", "--python", bare.seen(script))
     error = told(done.stdout, "error")
-    assert "XRDS needs PyTorch" in error
+    assert "super-resolution needs PyTorch" in error
     assert "add-on's preferences" in error
 
 

@@ -15,11 +15,20 @@ import pytest
 from flamenco import compile_job
 
 from xrds_blender.command import main
+from xrds_core.frames import RADIUS
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "pipeline"
 TEMPLATE = EXAMPLES / "xrds_render.template.yaml"
 SHOT = EXAMPLES / "xrds_shot.template.yaml"
 OPENJD = str(Path(sys.executable).with_name("openjd"))
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.iterdir()), ids=lambda p: p.name)
+def test_the_frames_of_a_chunk_lend_each_other_samples(path: Path) -> None:
+    """A chunk of one frame would lend nothing, and be no shot."""
+    given = r"chunk.{0,60}?default(?:=|: *)(\d+)"
+    (size,) = re.findall(given, path.read_text("utf-8"), re.IGNORECASE | re.DOTALL)
+    assert int(size) >= 2 * RADIUS
 
 
 @pytest.mark.parametrize("template", [TEMPLATE, SHOT], ids=lambda path: path.stem)

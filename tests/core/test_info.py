@@ -5,10 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+import torch
 
 from xrds_core import info
-from xrds_core.errors import WeightsError
+from xrds_core.denoising import oidn_device
+from xrds_core.devices import choose_device, device_name
+from xrds_core.errors import UsageError, WeightsError
+from xrds_core.superres import weights_header
 from xrds_core.superres.network import PRESETS, NetworkConfig, preset_config
+from xrds_core.superres.weights_header import DIRECTORY
 from xrds_lab import operations
 
 # (RDST per XDG, XDG): parameters (M), MACs (G), FLOPs (T) as the paper prints them.
@@ -79,9 +84,11 @@ def test_a_folder_that_is_not_there_is_an_error(tmp_path: Path) -> None:
 def test_lines_show_missing_blender_and_weights() -> None:
     told = {
         "version": "1.2",
-        "torch": "2.0",
         "blender": None,
-        "devices": ["cpu"],
+        "torch": "2.0",
+        "torch_error": None,
+        "devices": ["cpu", "metal"],
+        "denoiser": ["metal", "cpu"],
         "accumulation": ["Radeon", "cpu"],
         "paper_table": [],
         "presets": {},
@@ -91,5 +98,43 @@ def test_lines_show_missing_blender_and_weights() -> None:
     text = "\n".join(info.lines(told))
     assert "Blender not found" in text
     assert "weights: none" in text
+    assert "denoiser: metal, cpu" in text
+    assert "network: torch 2.0 on cpu, metal" in text
     assert "accumulation: Radeon, cpu" in text
     assert "own.safetensors  sha256 0123456789abcdef" in text
+
+
+def test_a_torch_that_cannot_be_loaded_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(
+        info, "network_devices", lambda: (_ for _ in ()).throw(OSError("no\nlibrary"))
+    )
+    told = info.info()
+    assert (told["torch"], told["devices"]) == (None, [])
+    assert told["denoiser"][-1] == "cpu"
+    assert {each["preset"] for each in told["weights"]} == set(PRESETS)
+    text = "\n".join(info.lines(told))
+    assert "network: none (no library); pip install xrds[network] brings it" in text
+
+
+def test_an_apple_chip_has_one_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(torch.backends.mps, "is_available", lambda: True)
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    monkeypatch.setattr(torch.cuda, "device_count", lambda: 0)
+    assert info.network_devices() == ["cpu", "metal"]
+    assert device_name(choose_device("auto")) == "metal"
+    assert "metal" in oidn_device.DEVICES
+    with pytest.raises(UsageError, match="use metal"):
+        choose_device("mps")
+
+
+def test_a_weights_file_that_is_cut_short_is_an_error(tmp_path: Path) -> None:
+    whole = (DIRECTORY / "fast_x2.safetensors").read_bytes()
+    (tmp_path / "fast_x2.safetensors").write_bytes(whole[:-1])
+    with pytest.raises(WeightsError, match=r"fast_x2.safetensors is not a complete"):
+        info.info(weights=tmp_path)
+
+
+def test_names_of_networks_are_those_of_their_classes() -> None:
+    assert set(weights_header.PRESETS) == set(PRESETS)

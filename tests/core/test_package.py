@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import sys
+
 import pytest
 
 import xrds_core
@@ -10,6 +12,18 @@ def test_every_public_name_is_there() -> None:
     for name in xrds_core.__all__:
         assert callable(getattr(xrds_core, name))
         assert name in dir(xrds_core)
+
+
+def test_what_a_missing_torch_costs_is_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for name in [name for name in sys.modules if name.startswith("xrds_core.superres")]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.delitem(vars(xrds_core), "Upscaler", raising=False)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    told = r"^Upscaler needs torch, which is not installed: run pip install xrds\[net"
+    with pytest.raises(xrds_core.XRDSError, match=told):
+        _ = xrds_core.Upscaler
 
 
 def test_other_names_are_not() -> None:

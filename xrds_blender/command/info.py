@@ -25,9 +25,9 @@ def add_info(commands: Any) -> argparse.ArgumentParser:
 
 
 def _info(options: argparse.Namespace) -> dict[str, Any]:
-    from ..frame.torch_folder import load
+    from xrds_core.info import info
 
-    return load("info").info(_blender_version(), options.weights)
+    return info(_blender_version(), options.weights)
 
 
 def _blender_version() -> str | None:

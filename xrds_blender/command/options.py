@@ -11,14 +11,15 @@ from xrds_core.errors import UsageError
 from xrds_core.exr.encoding import CODECS, FLOAT_ZIP, Encoding
 from xrds_core.frames import RADIUS
 from xrds_core.light_parts.find import NONE
+from xrds_core.superres.weights_header import PRESETS
 
 from ..planning.plan import SAVINGS
 from ..planning.request import Request, render_request
-from ..planning.settings import PRESETS, QUALITIES, SCALES
+from ..planning.settings import QUALITIES, SCALES
 from . import arguments
 from .scene_file import SceneChoice
 
-DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, mps"
+DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, metal"
 
 
 def add_request(command: argparse.ArgumentParser) -> None:
@@ -91,8 +92,9 @@ def _add_mode(command: argparse.ArgumentParser) -> None:
         "--scale",
         type=int,
         choices=SCALES,
-        default=2,
-        help="enlargement along each side; 1 is full size (default: 2)",
+        default=1,
+        help="enlargement along each side by super-resolution; 1 is full size "
+        "(default: 1)",
     )
     size.add_argument("--plain", action="store_true", help="render with Cycles alone")
     size.add_argument(

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from xrds_core.errors import UsageError, XRDSError
+from xrds_core.errors import GET_NETWORK, UsageError, XRDSError
 
 from ..internals.lifetimes import PROCESS
 
@@ -165,6 +165,7 @@ def load(module: str) -> Any:
         missing = [title for name, title in NEEDED.items() if _where(name) is None]
         what = " and ".join(missing or ["PyTorch"])
         raise XRDSError(
-            f"XRDS needs {what}, which cannot be loaded ({reason}); check the PyTorch "
-            "folder in the add-on's preferences, or render at full size"
+            f"super-resolution needs {what}, which cannot be loaded ({reason}): run "
+            f"{GET_NETWORK}, or choose a PyTorch folder in the add-on's preferences; "
+            "full size needs none"
         ) from error

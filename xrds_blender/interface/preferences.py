@@ -19,7 +19,7 @@ from .self_test import XRDS_OT_self_test
 # Numbers stay with their devices: a preference holds the number.
 _AUTOMATIC = ("auto", "Automatic", "The fastest device that PyTorch finds", 0)
 _CPU = ("cpu", "CPU", "The processor, for the denoiser too", 1)
-_METAL = ("mps", "Metal", "The GPU of an Apple chip", 2)
+_METAL = ("metal", "Metal", "The GPU of an Apple chip", 2)
 _CARDS = ("CUDA", "ROCm")
 _MOST_CARDS = 16
 _offered: list[tuple[str, str, str, int]] = []

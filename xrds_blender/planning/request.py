@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,8 @@ class Machine:
 
     `device` as `xrds info` lists them, or auto; `accumulate_on` as in `Accumulator`;
     `memory_limit` in bytes; `weights` is a
-    folder of weights files or one file, in the place of the shipped ones.
+    folder of weights files or one file, in the place of the shipped ones. Raises
+    UsageError for a device that has no such name.
     """
 
     device: str = "auto"
@@ -54,6 +56,12 @@ class Machine:
     threads: int | None = None
     weights: str | Path | None = None
     accumulate_on: str = "auto"
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"auto|cpu|metal|(cuda|xpu)(:\d+)?", self.device):
+            raise UsageError(
+                f"device {self.device!r} is not among auto, cpu, cuda, cuda:1, metal"
+            )
 
 
 @dataclass(frozen=True)
@@ -117,7 +125,7 @@ class Request:
 
 
 def render_request(
-    scale: int = 2,
+    scale: int = 1,
     *,
     plain: bool = False,
     denoise: str = "high",
@@ -140,8 +148,9 @@ def render_request(
         raise UsageError(f"denoise {denoise!r} is not one of {', '.join(QUALITIES)}")
     mode = Mode.CYCLES_ONLY if plain else Mode.of(scale)
     denoising = Denoising.ours(denoise)
-    if denoiser is not None and mode is not Mode.FULL_SIZE:
-        denoising = _of_cycles(denoiser)
+    if denoiser is not None:
+        cycles = _of_cycles(denoiser)
+        denoising = denoising if mode is Mode.FULL_SIZE else cycles
     goal = None
     if (time_budget, quality) != (None, None):
         goal = Goal(time_budget, quality)

@@ -6,8 +6,6 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple
 
-PRESETS = ("fast", "balanced", "paper")
-
 
 class Network(NamedTuple):
     """What a weights file is for."""
@@ -118,7 +116,7 @@ class Settings:
     Under a still camera they `begin` after so many of the shot's; None is by its place.
     """
 
-    mode: Mode = Mode.X2
+    mode: Mode = Mode.FULL_SIZE
     samples: int | None = None
     denoising: Denoising | None = Denoising.XRDS_HIGH
     preset: str = "fast"

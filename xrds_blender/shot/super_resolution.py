@@ -189,7 +189,7 @@ class SuperResolution(Method):
             seconds=inputs.seconds | seconds,
             plan=inputs.decisions,
             peak_memory=peak_memory(),
-            device=str(self._upscaler.device),
+            device=self._upscaler.device_name,
             temporal=inputs.temporal,
         )
 

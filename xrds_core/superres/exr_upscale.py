@@ -88,7 +88,7 @@ def _metadata(upscaler: Upscaler, seconds: float) -> dict[str, str]:
         "mode": "super-resolution",
         "scale": upscaler.scale,
         "preset": upscaler.preset,
-        "device": upscaler.device,
+        "device": upscaler.device_name,
         "seconds": f"{seconds:.1f}",
     }
     return {f"xrds.{name}": str(value) for name, value in record.items()}

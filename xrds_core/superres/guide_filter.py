@@ -13,7 +13,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-FILE_NAME = "guide_filter.safetensors"
 FEW_SAMPLES = 4
 """Guides of fewer samples per pixel are filtered; of more, it removes fine texture
 that is worth as much as the noise."""

@@ -12,7 +12,13 @@ import torch
 from torch import Tensor
 
 from ..arrays import Array
-from ..devices import choose_device, choose_precision, free_memory, is_out_of_memory
+from ..devices import (
+    choose_device,
+    choose_precision,
+    device_name,
+    free_memory,
+    is_out_of_memory,
+)
 from ..errors import OutOfMemory, WeightsError
 from ..progress import Callback, Progress
 from . import guide_noise, tiling
@@ -62,7 +68,7 @@ class Upscaler:
     Args:
         preset: `paper`, `balanced` or `fast`.
         scale: output pixels per low-resolution pixel along one axis.
-        device: `auto`, or what torch knows: `cpu`, `cuda`, `cuda:1`, `mps`.
+        device: `auto`, `cpu`, `metal`, or what torch knows: `cuda`, `cuda:1`.
         precision: `auto`, `fp32` or `bf16`; only the layers of the network
             ever run in bf16.
         weights: a folder of presets, a file, or a network, in place of the shipped;
@@ -91,6 +97,11 @@ class Upscaler:
     def scale(self) -> int:
         """Output pixels per low-resolution pixel along one axis."""
         return self.network.config.scale
+
+    @property
+    def device_name(self) -> str:
+        """Where it runs, as commands call it: `cpu`, `cuda:1`, `metal`."""
+        return device_name(self.device)
 
     @cached_property
     def cost(self) -> Cost:
@@ -282,8 +293,9 @@ class Upscaler:
                 raise
             size = f"{tile.columns.size}x{tile.rows.size}"
             raise OutOfMemory(
-                f"{self.device} has too little memory for a tile of {size} pixels: "
-                "close other programs, or use a smaller preset or another device"
+                f"{self.device_name} has too little memory for a tile of {size} "
+                "pixels: close other programs, or use a smaller preset or another "
+                "device"
             ) from error
         return to_picture(result)
 

@@ -10,23 +10,18 @@ for it serves every network.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import torch
 from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from ..errors import WeightsError
-from .guide_filter import FILE_NAME, GuideFilter
-from .network import PRESETS, XRDS, NetworkConfig
-from .weights_header import GUIDES
-
-DIRECTORY = Path(__file__).with_name("weights")
-GUIDE_FILTER = DIRECTORY / FILE_NAME
+from .guide_filter import GuideFilter
+from .network import XRDS, NetworkConfig
+from .weights_header import DIRECTORY, GUIDES, guide_filter_file, network_files
 
 FACTORS = ".factors"
 _LARGEST_SETTING = 4096  # far above any real width or count; bounds hostile files
@@ -68,24 +63,12 @@ def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:
     return network.eval().requires_grad_(False), metadata
 
 
-def guide_filter_record(directory: str | Path | None = None) -> dict[str, str]:
-    """Return {file, sha256} of the filter that `directory`'s networks go with."""
-    path = _guide_filter_file(directory)
-    return {"file": path.name, "sha256": _digest(path)}
-
-
-def _guide_filter_file(directory: str | Path | None) -> Path:
-    """Return the file of `directory`'s filter, or of the shipped one without."""
-    own = None if directory is None else Path(directory) / FILE_NAME
-    return own if own is not None and own.is_file() else GUIDE_FILTER
-
-
 def load_guide_filter(directory: str | Path | None = None) -> GuideFilter:
     """Return the filter in `directory`, or the shipped one if it has none.
 
     Raises WeightsError if the file is missing or damaged.
     """
-    path = _guide_filter_file(directory)
+    path = guide_filter_file(directory)
     tensors, _ = _read(path)
     guide_filter = GuideFilter()
     shapes = {k: v.shape for k, v in guide_filter.state_dict().items()}
@@ -169,7 +152,7 @@ def load_preset(
     folder = Path(directory or DIRECTORY)
     path = folder / file_name(preset, scale)
     if not path.is_file():
-        known = ", ".join(sorted(p.stem for p in _files(folder))) or "none"
+        known = ", ".join(sorted(p.stem for p in network_files(folder))) or "none"
         raise WeightsError(
             f"no weights for preset {preset!r} at scale {scale} in {folder}; "
             f"it holds: {known}"
@@ -201,32 +184,3 @@ def choose_network(preset: str, scale: int, weights: str | Path | XRDS | None) -
             f"not for scale {scale}; choose others"
         )
     return network
-
-
-def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
-    """Return records {preset, scale, file, sha256, blender_series}.
-
-    Raises WeightsError if a file named as a preset's is damaged.
-    """
-    return [_record(path) for path in _files(Path(directory or DIRECTORY))]
-
-
-def _files(folder: Path) -> list[Path]:
-    paths = sorted(folder.glob("*_x*.safetensors"))
-    return [path for path in paths if path.name.split("_x")[0] in PRESETS]
-
-
-def _record(path: Path) -> dict[str, Any]:
-    tensors, metadata = _read(path)
-    config, _ = _described(path, metadata, len(tensors))
-    return {
-        "preset": path.name.split("_")[0],
-        "scale": config.scale,
-        "file": path.name,
-        "sha256": _digest(path),
-        "blender_series": metadata.get("blender_series"),
-    }
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,17 +1,25 @@
-"""What weights files say they are for, read from their headers alone.
+"""Which weights files there are and what they are for, by their headers alone.
 
-Neither torch nor safetensors is needed, so a panel can use it. A safetensors file
-begins with the length of its header (8 bytes, little-endian) and the header, JSON.
+Neither torch nor safetensors is needed, so a panel and `xrds info` can use it. A
+safetensors file begins with the length of its header (8 bytes, little-endian) and the
+header, JSON.
 """
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
+from ..errors import WeightsError
+
+PRESETS = ("fast", "balanced", "paper")
+"""The names of networks, the quickest first."""
 DIRECTORY = Path(__file__).with_name("weights")
+GUIDE_FILTER = DIRECTORY / "guide_filter.safetensors"
 GUIDES = "fast"
 """What a configuration calls albedo and normal: the only guides there are."""
 _LARGEST_HEADER = 1 << 20  # far above any real one; bounds hostile files
@@ -29,6 +37,49 @@ class WeightsHeader:
     blender_series: str = ""
 
 
+def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
+    """Return records {preset, scale, file, sha256, blender_series} of a folder.
+
+    Raises WeightsError if a file named as a preset's is damaged.
+    """
+    return [_record(path) for path in network_files(Path(directory or DIRECTORY))]
+
+
+def network_files(folder: Path) -> list[Path]:
+    """The files in a folder that are named as a preset's."""
+    paths = sorted(folder.glob("*_x*.safetensors"))
+    return [path for path in paths if path.name.split("_x")[0] in PRESETS]
+
+
+def guide_filter_record(directory: str | Path | None = None) -> dict[str, str]:
+    """Return {file, sha256} of the filter that `directory`'s networks go with."""
+    path = guide_filter_file(directory)
+    return {"file": path.name, "sha256": _digest(path)}
+
+
+def guide_filter_file(directory: str | Path | None) -> Path:
+    """Return the file of `directory`'s filter, or of the shipped one without."""
+    own = None if directory is None else Path(directory) / GUIDE_FILTER.name
+    return own if own is not None and own.is_file() else GUIDE_FILTER
+
+
+def _record(path: Path) -> dict[str, Any]:
+    header = read_header(path)
+    if header is None:
+        raise WeightsError(f"{path} is not a complete weights file; download it again")
+    return {
+        "preset": header.preset,
+        "scale": header.scale,
+        "file": path.name,
+        "sha256": _digest(path),
+        "blender_series": header.blender_series or None,
+    }
+
+
+def _digest(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
 def headers(folder: Path | None = None) -> list[WeightsHeader]:
     """Those of the networks in a folder, the shipped ones by default.
 
@@ -40,20 +91,25 @@ def headers(folder: Path | None = None) -> list[WeightsHeader]:
 
 
 def read_header(path: Path) -> WeightsHeader | None:
-    """That of one file; None where it holds no network."""
+    """That of one file; None where it holds no network, or is cut short."""
     try:
-        return _read(path, path.stat().st_mtime_ns)
+        told = path.stat()
+        return _read(path, told.st_size, told.st_mtime_ns)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 
 
 @lru_cache(maxsize=64)
-def _read(path: Path, _changed: int) -> WeightsHeader:
+def _read(path: Path, size: int, _changed: int) -> WeightsHeader:
     with path.open("rb") as file:
         length = int.from_bytes(file.read(8), "little")
         if length > _LARGEST_HEADER:
             raise ValueError(f"a header of {length} bytes")
-        metadata = json.loads(file.read(length))["__metadata__"]
+        header = json.loads(file.read(length))
+    metadata = header.pop("__metadata__")
+    end = max((tensor["data_offsets"][1] for tensor in header.values()), default=0)
+    if size != 8 + length + end:
+        raise ValueError(f"{size} bytes, but its header tells of {8 + length + end}")
     config = json.loads(metadata["config"])
     if config.get("guides", GUIDES) != GUIDES:
         raise ValueError("guides that are not rendered")

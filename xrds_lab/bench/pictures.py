@@ -44,7 +44,7 @@ class Networks:
     """Upscalers by network, each loaded once."""
 
     def __init__(self, weights: Path | None, device: str) -> None:
-        from xrds_core.superres import weights as files
+        from xrds_core.superres import weights_header as files
 
         self.weights, self.device = weights, device
         self._loaded: dict[Network, Any] = {}

@@ -8,8 +8,9 @@ from typing import Any
 
 from xrds_blender.command import arguments
 from xrds_blender.command.deferred import need_blender, no_lines
-from xrds_blender.command.options import DEVICE_HELP, PRESETS, add_accumulate_on
+from xrds_blender.command.options import DEVICE_HELP, add_accumulate_on
 from xrds_core.errors import UsageError, XRDSError
+from xrds_core.superres.weights_header import PRESETS
 
 from ..progress import report_line
 

@@ -93,7 +93,7 @@ def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
             scale=subject.scale,
             samples=2,
             preset=subject.preset,
-            device=str(subject.upscaler.device),
+            device=subject.device,
             weights=weights,
         )
     frames = settled(frames)

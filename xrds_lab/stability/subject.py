@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.superres import weights
 from xrds_core.superres.upscaler import Upscaler
+from xrds_core.superres.weights_header import available
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -45,7 +45,7 @@ class Subject:
     @property
     def device(self) -> str:
         """What it runs on."""
-        return str(self.upscaler.device)
+        return self.upscaler.device_name
 
     def __call__(self, inputs: Inputs, **options: Any) -> Array:
         """Return the picture (H, W, 3 or 4) of `inputs`."""
@@ -56,7 +56,7 @@ class Subject:
         made = Upscaler(
             self.preset,
             self.scale,
-            str(self.upscaler.device),
+            self.device,
             precision,
             self.upscaler.network,
         )
@@ -92,6 +92,6 @@ def shipped(
             side,
             thorough,
         )
-        for record in weights.available(directory)
+        for record in available(directory)
         for precision in precisions
     ]

@@ -78,7 +78,7 @@ def stability(
     parts, stay in the report. Raises UsageError for unknown parts, WeightsError for
     damaged weights.
     """
-    from xrds_core.superres.weights import available
+    from xrds_core.superres.weights_header import available
 
     from . import report
 

@@ -64,7 +64,8 @@ def xrds(folder: Path, line: str) -> subprocess.CompletedProcess[str]:
 
 def test_json_files_and_streams(folder: Path) -> None:
     done = xrds(
-        folder, "render scene.blend -o f/##.exr --frames 1-2 --weights . --json"
+        folder,
+        "render scene.blend --scale 2 -o f/##.exr --frames 1-2 --weights . --json",
     )
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
@@ -100,7 +101,8 @@ def test_progress_lines_stay_on_stdout_without_json(folder: Path) -> None:
 
 
 def test_resolution_is_the_one_asked_for(folder: Path) -> None:
-    line = "render scene.blend -o r.png --resolution 50x34 --weights . --samples 1"
+    line = "render scene.blend -o r.png --scale 2 --resolution 50x34 --weights . "
+    line += "--samples 1"
     done = xrds(folder, line)
     assert done.returncode == 0, done.stderr
     assert Image.open(folder / "r.png").size == (50, 34)
@@ -142,6 +144,7 @@ def test_interrupt_ends_a_render_at_once(folder: Path) -> None:
         ("render scene.blend -o a.jpg --weights .", 2, "a.jpg"),
         ("render scene.blend -o a.exr --frames 1-2 --weights .", 2, "####"),
         ("render scene.blend -o a.exr --device abacus --weights .", 2, "abacus"),
+        ("render scene.blend -o a.exr --device mps", 2, "metal"),
         (
             "render scene.blend -o a.exr --resolution 3x3",
             2,
@@ -171,7 +174,7 @@ def test_refusals_come_before_rendering(
 
 
 def test_a_plan_is_told_and_nothing_is_rendered(folder: Path) -> None:
-    done = xrds(folder, "plan scene.blend --json")
+    done = xrds(folder, "plan scene.blend --scale 2 --json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert told["facts"]["width"] == 62
@@ -183,7 +186,7 @@ def test_a_plan_is_told_and_nothing_is_rendered(folder: Path) -> None:
         assert set(each) == {"decision", "value", "reason", "saving_seconds"}
     assert "Sample" not in done.stderr
     files = set(folder.iterdir())
-    explained = xrds(folder, "render scene.blend --explain --skip-nothing")
+    explained = xrds(folder, "render scene.blend --scale 2 --explain --skip-nothing")
     assert explained.returncode == 0, explained.stderr
     assert "guide lights: all" in explained.stdout
     assert set(folder.iterdir()) == files

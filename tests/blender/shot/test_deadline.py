@@ -178,8 +178,6 @@ def test_what_rules_it_out_is_said(
 ) -> None:
     words = ["render", str(blend), "-o", str(blend.parent / "#.exr"), "--deadline"]
     words += ["8h", "--frames", "1-5", *what.split()]
-    if what == "--samples 4":
-        words += ["--scale", "1"]
     assert main.main(words) == 2
     assert "--deadline cannot be had with" in capsys.readouterr().err
 
@@ -187,7 +185,7 @@ def test_what_rules_it_out_is_said(
 def test_the_plan_of_a_shot_says_so(
     blend: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["plan", str(blend), "--scale", "1", "--deadline", "1h30m"]
+    words = ["plan", str(blend), "--deadline", "1h30m"]
     assert main.main([*words, "--frames", "1-5"]) == 0
     assert "deadline: 90 min for 5 frames: each takes" in capsys.readouterr().out
 

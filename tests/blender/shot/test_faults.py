@@ -187,7 +187,7 @@ def test_too_little_memory_writes_the_low_resolution_file(
     blend: Path, too_large: None, tmp_path: Path
 ) -> None:
     with pytest.raises(XRDSError, match=r"frame 1: .*memory.*, saved as .*1_low\.exr"):
-        render_file(blend, f"{tmp_path}/f/#.exr", render_request(), frames=(1, 2))
+        render_file(blend, f"{tmp_path}/f/#.exr", render_request(2), frames=(1, 2))
     assert names(tmp_path / "f") == ["1_low.exr"]
     assert exr.read_beauty(tmp_path / "f" / "1_low.exr").radiance.shape == (17, 23, 3)
 
@@ -227,16 +227,19 @@ def test_without_a_sound_torch_only_plain_renders(
     picked = render(life, time_budget=0.1)
     assert not picked.settings.is_enlarged
     monkeypatch.setattr(session, "run", None)  # and nothing is rendered before
-    with pytest.raises(XRDSError, match=r"^XRDS needs PyTorch, .* at full size$"):
+    with pytest.raises(
+        XRDSError, match=r"^super-resolution needs PyTorch, .*\[network\]"
+    ):
         render(life, 2)
 
 
 def test_without_a_sound_torch_commands_say_so(
     life: Any, no_torch: None, blend: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert main.main(["render", str(blend), "-o", str(blend.with_suffix(".exr"))]) == 1
+    words = ["render", str(blend), "--scale", "2"]
+    assert main.main([*words, "-o", str(blend.with_suffix(".exr"))]) == 1
     err = capfd.readouterr().err
-    assert err.strip().splitlines()[-1].startswith("xrds: XRDS needs PyTorch")
+    assert err.strip().splitlines()[-1].startswith("xrds: super-resolution needs")
     assert "Traceback" not in err
 
 

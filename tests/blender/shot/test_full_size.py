@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -154,37 +153,6 @@ def test_a_missing_library_costs_no_render(
     monkeypatch.setattr(session, "run", lambda *_: pytest.fail("rendered"))
     with pytest.raises(XRDSError, match="pip install mitsuba-oidn"):
         render(life, 1)
-
-
-IN_MODULE = getattr(bpy.app, "module", False)  # not in every Blender
-WITHOUT_TORCH = """
-import sys
-for name in ("torch", "safetensors"):
-    sys.modules[name] = None
-import bpy, xrds_blender
-scene = bpy.data.scenes[0]
-scene.render.resolution_x, scene.render.resolution_y = 32, 24
-scene.cycles.samples = 1
-picture = xrds_blender.render(scene, 1)
-assert picture.radiance.shape == (24, 32, 3) and picture.radiance.any()
-sys.stdout.flush()
-import os
-os._exit(0)
-"""
-
-
-@pytest.mark.skipif(
-    not getattr(bpy.app, "module", False), reason="starts the bpy module anew"
-)
-def test_it_needs_no_torch() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_TORCH],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=100,
-    )
-    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("has_own", [True, False])

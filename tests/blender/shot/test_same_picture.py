@@ -149,8 +149,6 @@ def test_what_rules_it_out_is_said(
 ) -> None:
     words = ["render", str(shot), "-o", str(shot.parent / "#.exr"), "--same-picture"]
     words += ["--frames", "1-5", *what.split()]
-    if "scale" not in what:
-        words += ["--scale", "1"]
     assert main.main(words) == 2
     assert "--same-picture cannot be had with" in capsys.readouterr().err
 

@@ -171,10 +171,11 @@ def test_a_cancelled_shot_keeps_the_frames_before(
 @pytest.mark.parametrize(
     ("line", "radius"),
     [
-        ("--scale 1 --frames 1-3", 4),
-        ("--scale 1 --frames 1-3 --temporal-radius 2", 2),
-        ("--scale 1 --frames 1-3 --temporal-radius 0", 0),
-        ("--scale 1 --frame 1", 0),
+        ("--frames 1-3", 4),
+        ("-a", 4),
+        ("--frames 1-3 --temporal-radius 2", 2),
+        ("--frames 1-3 --temporal-radius 0", 0),
+        ("--frame 1", 0),
         ("--scale 2 --frames 1-3", 4),
         ("--plain --frames 1-3", 0),
         ("--time-budget 9 --frames 1-3", 4),
@@ -187,6 +188,7 @@ def test_the_radius_by_default(line: str, radius: int) -> None:
     words = ["render", "a.blend", "-o", "b_#.exr", *line.split()]
     found = request_of(main._parser(words).parse_args(words))
     assert found.settings.temporal_radius == radius
+    assert found.settings.scale == (2 if "--scale 2" in line else 1)
 
 
 def test_a_radius_that_cannot_be_is_refused(capfd: pytest.CaptureFixture[str]) -> None:

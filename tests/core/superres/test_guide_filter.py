@@ -10,7 +10,7 @@ import torch
 from torch.nn import functional
 
 from xrds_core.errors import UsageError, WeightsError
-from xrds_core.superres import guide_filter, guide_noise, weights
+from xrds_core.superres import guide_filter, guide_noise
 from xrds_core.superres.exr_upscale import upscale_file
 from xrds_core.superres.guide_filter import (
     FEW_SAMPLES,
@@ -19,7 +19,8 @@ from xrds_core.superres.guide_filter import (
     filter_guides,
 )
 from xrds_core.superres.upscaler import Upscaler
-from xrds_core.superres.weights import guide_filter_record, load_guide_filter
+from xrds_core.superres.weights import load_guide_filter
+from xrds_core.superres.weights_header import GUIDE_FILTER, guide_filter_record
 from xrds_lab.weights import save_guide_filter
 
 
@@ -168,7 +169,7 @@ def planes(name: str, picture: np.ndarray, channels: str) -> dict[str, np.ndarra
 
 def test_a_folder_may_bring_its_own(tmp_path: Path) -> None:
     own = GuideFilter()
-    save_guide_filter(own, tmp_path / guide_filter.FILE_NAME, {})
+    save_guide_filter(own, tmp_path / GUIDE_FILTER.name, {})
     found = load_guide_filter(tmp_path).state_dict()
     assert all(
         torch.equal(found[k], v.half().float()) for k, v in own.state_dict().items()
@@ -180,14 +181,14 @@ def test_a_folder_may_bring_its_own(tmp_path: Path) -> None:
 
 
 def test_a_damaged_file_is_named(tmp_path: Path) -> None:
-    path = tmp_path / guide_filter.FILE_NAME
-    path.write_bytes(weights.GUIDE_FILTER.read_bytes()[:200])
-    with pytest.raises(WeightsError, match=guide_filter.FILE_NAME):
+    path = tmp_path / GUIDE_FILTER.name
+    path.write_bytes(GUIDE_FILTER.read_bytes()[:200])
+    with pytest.raises(WeightsError, match=GUIDE_FILTER.name):
         load_guide_filter(tmp_path)
 
 
 def test_a_file_of_another_network_is_refused(tmp_path: Path) -> None:
-    path = tmp_path / guide_filter.FILE_NAME
-    path.write_bytes((weights.DIRECTORY / "fast_x2.safetensors").read_bytes())
+    path = tmp_path / GUIDE_FILTER.name
+    path.write_bytes((GUIDE_FILTER.parent / "fast_x2.safetensors").read_bytes())
     with pytest.raises(WeightsError, match="tensor"):
         load_guide_filter(tmp_path)

@@ -190,6 +190,9 @@ def test_exposures_that_are_none(fast: Upscaler, exposure: float) -> None:
 def test_devices_precisions_and_weights_that_are_not_there() -> None:
     with pytest.raises(UsageError, match="device 'abacus'"):
         Upscaler(device="abacus", weights=network())
+    if not torch.backends.mps.is_available():
+        with pytest.raises(UsageError, match="device 'metal'"):
+            Upscaler(device="metal", weights=network())
     if not torch.cuda.is_available():
         with pytest.raises(UsageError, match="device 'cuda'"):
             Upscaler(device="cuda", weights=network())

@@ -13,6 +13,7 @@ from safetensors.torch import save_file
 from xrds_core.errors import WeightsError
 from xrds_core.superres import weights
 from xrds_core.superres.network import XRDS, NetworkConfig
+from xrds_core.superres.weights_header import available
 from xrds_lab.weights import save_network
 
 CONFIG = NetworkConfig(
@@ -216,7 +217,7 @@ def test_a_preset_under_a_false_name(path: Path) -> None:
 def test_what_is_available_is_told(path: Path) -> None:
     for other in ("notes_x2", "fast_full_x2"):
         (path.parent / f"{other}.safetensors").write_text("not ours")
-    (record,) = weights.available(path.parent)
+    (record,) = available(path.parent)
     assert record == {
         "preset": "fast",
         "scale": 2,

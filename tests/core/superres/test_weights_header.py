@@ -9,16 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from xrds_core.superres import weights
 from xrds_core.superres.network import XRDS, preset_config
-from xrds_core.superres.weights_header import headers, read_header
+from xrds_core.superres.weights_header import available, headers, read_header
 from xrds_lab.weights import save_network
 
 
 def test_headers_tell_what_loading_tells() -> None:
     told = {(h.preset, h.scale, h.blender_series) for h in headers()}
     keys = ("preset", "scale", "blender_series")
-    assert told == {tuple(r[key] for key in keys) for r in weights.available()}
+    assert told == {tuple(r[key] for key in keys) for r in available()}
 
 
 def test_no_torch_is_loaded() -> None:

@@ -7,6 +7,8 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from xrds_core.superres.weights_header import PRESETS
+
 from ...choosing import history
 from ...choosing.capabilities import capabilities
 from ...choosing.modes import best_mode, estimates
@@ -14,7 +16,7 @@ from ...internals.engine_override import ENGINE
 from ...internals.lifetimes import FILE
 from ...planning.estimates import Capabilities
 from ...planning.request import Request
-from ...planning.settings import PRESETS, Mode
+from ...planning.settings import Mode
 from ...scene.light import has_light
 from .. import operators, presets, status_bar, translations
 from ..properties import DEADLINE, request_of
