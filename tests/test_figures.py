@@ -38,7 +38,7 @@ def test_every_figure_is_that_of_the_results() -> None:
 @pytest.mark.parametrize(
     ("page", "pattern", "into"),
     [
-        pytest.param("README.md", r"is \+4\.4 dB", "is +4.9 dB", id="sentence"),
+        pytest.param("README.md", r"is 4\.4 dB", "is 4.9 dB", id="sentence"),
         pytest.param("README.md", r"\*\*\+4\.4\*\*", "**+4.9**", id="table"),
         pytest.param("docs/performance.md", r"\| 34\.49 \|", "| 35.49 |", id="cell"),
         pytest.param("docs/performance.md", r"\| `fast` .*\n", "", id="row"),
@@ -58,18 +58,18 @@ def test_a_figure_that_is_typed_is_found(
 def test_writing_puts_figures_right(copy: Path) -> None:
     page = copy / "README.md"
     right = page.read_text("utf-8")
-    change(page, r"is \+4\.4 dB", "is +9.9 dB")
+    change(page, r"is 4\.4 dB", "is 9.9 dB")
     change(page, r"\| \+6\.0 \|", "| +7.0 |")
     Pages(copy).write()
     assert page.read_text("utf-8") == right
 
 
 def test_sentences_break_where_they_like(copy: Path) -> None:
-    change(copy / "README.md", "on the mean than Cycles", "on the mean\nthan Cycles")
+    change(copy / "README.md", "on the mean, 3", "on\nthe mean, 3")
     assert list(Pages(copy).faults()) == []
 
 
-@pytest.mark.parametrize("words", ["on the mean than Cycles", "Python 3.11"])
+@pytest.mark.parametrize("words", ["dB better on the mean", "Python 3.11"])
 def test_a_list_that_the_page_has_outgrown_is_found(copy: Path, words: str) -> None:
     change(copy / "README.md", words.replace(" ", r"\s+"), "otherwise")
     with pytest.raises(PageError, match=r"README\.md"):
