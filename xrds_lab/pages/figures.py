@@ -69,8 +69,8 @@ def _parts(results: Results) -> Figures:
     found: Figures = {}
     for of in ("lobes", "groups"):
         means = results.part_means(of, 4)
-        for way in ("still", "shot"):
-            found[f"parts.{of}.{way}"] = means[way] - means["one_by_one"]
+        found[f"parts.{of}.shot"] = means["shot"] - means["one_by_one"]
+        found[f"parts.{of}.below"] = means["one_by_one"] - means["still"]
     return found
 
 
