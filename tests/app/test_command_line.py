@@ -172,7 +172,7 @@ print("status=%s" % torch_status())
 
 
 def test_a_farm_can_ask_whether_the_engine_is_there(bare: Program) -> None:
-    """The line of docs/pipeline.md ends with success here, and not without XRDS."""
+    """The line of docs/farms.md ends with success here, and not without XRDS."""
     line = f"import bpy, sys; {ENGINE} or sys.exit(3)"
     words = ("blender", "-b", "--python-exit-code", "3", "--python-expr", line)
     assert bare.run(*words).returncode == 0

@@ -1,4 +1,4 @@
-"""The farm examples of docs/pipeline.md, read by what reads them on a farm."""
+"""The farm examples of docs/farms.md, read by what reads them on a farm."""
 
 from __future__ import annotations
 

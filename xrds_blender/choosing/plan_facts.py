@@ -13,7 +13,8 @@ from ..planning.facts import Facts, SceneFacts
 from ..planning.settings import Settings
 from ..scene.contents import scene_facts
 
-# Core-seconds of a million guide samples with nothing left out: docs/performance.md.
+# Core-seconds of a million guide samples with nothing left out, as measured in
+# docs/lab/measurements.md.
 CORE_SECONDS = 4.8
 
 

@@ -15,8 +15,8 @@ from .settings import DEFAULT_DENOISING, Denoising, Mode, Network, Settings
 # A frame of more pixels than this many times those measured is not estimated: what a
 # small one takes to begin would count too much.
 MOST_GROWTH = 4
-# A guide sample's seconds over a full one's, where no guides were rendered yet: 0.56 to
-# 0.73 in the scenes of docs/performance.md.
+# A guide sample's seconds over a full one's, where no guides were rendered yet: 0.46 to
+# 0.83 in the scenes of docs/results/bench.
 GUIDE_SHARE = 0.65
 
 

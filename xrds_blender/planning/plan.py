@@ -52,7 +52,7 @@ SAVINGS = (
     "motion blur",
     "network",
 )
-# Shares of a guide render's seconds that a saving takes off: docs/performance.md.
+# Shares of a guide render's seconds that a saving takes off: docs/lab/measurements.md.
 LIGHT_SHARE = 0.45
 BOUNCE_SHARE = 0.12
 # Guide samples where nothing is finer than an edge.

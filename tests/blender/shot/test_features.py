@@ -327,7 +327,7 @@ def test_tiles_of_a_frame_merge_nearly_to_the_whole(life: Any, written: Any) -> 
     """Crops of one frame with the shipped network, as Flamenco renders stills.
 
     Position and exposure are the whole frame's. A tile's denoiser and network see
-    nothing beyond its border, so pixels at a seam differ; docs/pipeline.md says so.
+    nothing beyond its border, so pixels at a seam differ; docs/farms.md says so.
     """
     pytest.importorskip("torch")
     edges = life.render

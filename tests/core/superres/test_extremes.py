@@ -173,7 +173,7 @@ def test_cancel_takes_less_than_half_of_the_run() -> None:
 
 # --- the document ---------------------------------------------------------------------
 
-DOCUMENT = Path(__file__).parents[3] / "docs" / "stability.md"
+DOCUMENT = Path(__file__).parents[3] / "docs" / "lab" / "stability.md"
 
 
 def test_the_document_lists_every_bound() -> None:

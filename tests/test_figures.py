@@ -1,0 +1,76 @@
+"""The figures of the pages are those of docs/results, and of nothing else."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from xrds_lab.pages.writing import PageError, Pages
+
+ROOT = Path(__file__).resolve().parent.parent
+LISTED = ("README.md", "docs/performance.md")
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """The pages by themselves, with the results of this checkout."""
+    (tmp_path / "docs").mkdir()
+    for name in (*LISTED, "docs/figures.toml"):
+        shutil.copy(ROOT / name, tmp_path / name)
+    (tmp_path / "docs/results").symlink_to(ROOT / "docs/results")
+    return tmp_path
+
+
+def change(page: Path, pattern: str, into: str) -> None:
+    """Change a page by hand, at one place."""
+    text, count = re.subn(pattern, into, page.read_text("utf-8"), count=1)
+    assert count == 1
+    page.write_text(text, "utf-8")
+
+
+def test_every_figure_is_that_of_the_results() -> None:
+    assert list(Pages(ROOT).faults()) == []
+
+
+@pytest.mark.parametrize(
+    ("page", "pattern", "into"),
+    [
+        pytest.param("README.md", r"is 4\.4 dB", "is 4.9 dB", id="sentence"),
+        pytest.param("README.md", r"\*\*\+4\.4\*\*", "**+4.9**", id="table"),
+        pytest.param("docs/performance.md", r"\| 34\.49 \|", "| 35.49 |", id="cell"),
+        pytest.param("docs/performance.md", r"\| `fast` .*\n", "", id="row"),
+        pytest.param("README.md", "## Limits", "It is 3.7 dB better.", id="new"),
+        pytest.param("README.md", "## Limits", "It takes 9 s.", id="unit"),
+    ],
+)
+def test_a_figure_that_is_typed_is_found(
+    copy: Path, page: str, pattern: str, into: str
+) -> None:
+    change(copy / page, pattern, into)
+    faults = list(Pages(copy).faults())
+    assert faults
+    assert all(fault.startswith(page) for fault in faults)
+
+
+def test_writing_puts_figures_right(copy: Path) -> None:
+    page = copy / "README.md"
+    right = page.read_text("utf-8")
+    change(page, r"is 4\.4 dB", "is 9.9 dB")
+    change(page, r"\| \+6\.0 \|", "| +7.0 |")
+    Pages(copy).write()
+    assert page.read_text("utf-8") == right
+
+
+def test_sentences_break_where_they_like(copy: Path) -> None:
+    change(copy / "README.md", "on the mean, 3", "on\nthe mean, 3")
+    assert list(Pages(copy).faults()) == []
+
+
+@pytest.mark.parametrize("words", ["dB better on the mean", "Python 3.11"])
+def test_a_list_that_the_page_has_outgrown_is_found(copy: Path, words: str) -> None:
+    change(copy / "README.md", words.replace(" ", r"\s+"), "otherwise")
+    with pytest.raises(PageError, match=r"README\.md"):
+        list(Pages(copy).faults())

@@ -1,0 +1,1 @@
+"""Figures and tables of the pages, out of docs/results: `python -m xrds_lab.pages`."""

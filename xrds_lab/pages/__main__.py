@@ -1,0 +1,34 @@
+"""`python -m xrds_lab.pages` writes the figures of pages; `--check` compares them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from .writing import Pages
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def main() -> int:
+    """Write or check the pages of this checkout."""
+    parser = argparse.ArgumentParser("python -m xrds_lab.pages", description=__doc__)
+    parser.add_argument("--check", action="store_true", help="write nothing")
+    parser.add_argument("--draw", action="store_true", help="the method's figure, too")
+    options = parser.parse_args()
+    pages = Pages(ROOT)
+    if options.check:
+        faults = list(pages.faults())
+        print("\n".join(faults), file=sys.stderr, end="\n" if faults else "")
+        return 1 if faults else 0
+    pages.write()
+    if options.draw:
+        from .method import draw  # needs matplotlib, which checking does not
+
+        draw(ROOT / "docs/images/method.svg")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,145 @@
+"""The figures that sentences of the pages hold, by name."""
+
+from __future__ import annotations
+
+from statistics import mean, median
+from typing import TYPE_CHECKING
+
+from .results import OLD_PATTERN, only
+
+if TYPE_CHECKING:
+    from .results import Results
+
+    Figures = dict[str, float]
+
+
+def figures(results: Results) -> Figures:
+    """Return every figure that docs/figures.toml may name."""
+    return {
+        **_shots(results),
+        **_gallery(results),
+        **_parts(results),
+        **_stills(results),
+        **_denoisers(results),
+        **_low_budgets(results),
+        **_networks(results),
+    }
+
+
+def _shots(results: Results) -> Figures:
+    found: Figures = {}
+    for samples in (2, 16):
+        rows = only(results.gains, motion="pan", samples=samples)
+        gains = [x["gain"] for x in rows]
+        name = f"shots.pan.{samples}"
+        found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
+    before = [x["gain"] for x in results.shot_rows("pan", 2, 4)]
+    found["shots.before.pan.2.mean"] = mean(before)
+    ratios = [each[2] / each[0] for each in results.shot_seconds().values()]
+    found |= {"shots.seconds.least": min(ratios), "shots.seconds.most": max(ratios)}
+    for samples in (2, 16):
+        rows = only(results.shots["equal_quality"], motion="pan", samples=samples)
+        needed = [x["cycles_samples"] for x in rows if x["cycles_samples"] is not None]
+        name = f"shots.equal.{samples}"
+        found |= {f"{name}.least": min(needed), f"{name}.most": max(needed)}
+    return found
+
+
+def _gallery(results: Results) -> Figures:
+    rows = results.gallery
+    flicker = [
+        x["flicker"] for x in only(rows, half="judging") if x["flicker"] is not None
+    ]
+    shown = [x for x in only(rows, samples=4) if x.get("image_gain") is not None]
+    glass = [x["image_gain"] for x in shown if x["shot"].startswith("glass_")]
+    mirrors = [x["image_gain"] for x in shown if not x["shot"].startswith("glass_")]
+    return {
+        "mirrors.least": min(mirrors),
+        "mirrors.most": max(mirrors),
+        "glass.least": min(glass),
+        "glass.most": max(glass),
+        "gallery.shots": len({x["shot"] for x in rows}),
+        "gallery.rows": len(rows),
+        "gallery.kept": sum(x["passed"] for x in rows),
+        "gallery.flicker": median(flicker),
+    }
+
+
+def _parts(results: Results) -> Figures:
+    found: Figures = {}
+    for of in ("lobes", "groups"):
+        means = results.part_means(of, 4)
+        found[f"parts.{of}.shot"] = means["shot"] - means["one_by_one"]
+        found[f"parts.{of}.below"] = means["one_by_one"] - means["still"]
+    return found
+
+
+def _stills(results: Results) -> Figures:
+    scenes = results.bench["scenes"]
+    units = [x["default_seconds"] for x in scenes]
+    shares = [x["rho"] for x in scenes]
+    found = {
+        "unit.least": min(units),
+        "unit.second": sorted(units)[-2],
+        "unit.most": max(units),
+        "guide_share.least": min(shares),
+        "guide_share.most": max(shares),
+    }
+    budgets = (1.0, 2.0, 4.0, 8.0)
+    for budget in budgets:
+        over = results.over_rival(budget)
+        new = [gain for scene, gain in over.items() if scene not in OLD_PATTERN]
+        rows = results.unit(budget)
+        name = f"stills.{budget:g}"
+        found |= {
+            f"{name}.mean": mean(over.values()),
+            f"{name}.worst": min(over.values()),
+            f"{name}.new_pattern": mean(new),
+            f"{name}.over_default": mean(x["xrds"] - x["default"] for x in rows),
+        }
+    of = {
+        key: [found[f"stills.{x:g}.{key}"] for x in budgets]
+        for key in ("mean", "worst", "new_pattern")
+    }
+    return {
+        **found,
+        "stills.least": min(of["mean"]),
+        "stills.most": max(of["mean"]),
+        "stills.below": -min(of["worst"]),
+        "stills.new_pattern.least": min(of["new_pattern"]),
+        "stills.new_pattern.most": max(of["new_pattern"]),
+    }
+
+
+def _denoisers(results: Results) -> Figures:
+    def psnr(quality: str, samples: int, *, new: bool = False) -> float:
+        rows = results.denoiser(quality, samples)
+        skipped = OLD_PATTERN if new else ()
+        return mean(x["psnr"] for x in rows if x["scene"] not in skipped)
+
+    points = results.denoiser("XRDS-HIGH", 1)
+    best = [psnr("XRDS-BEST", n) - psnr("XRDS-HIGH", n) for n in (2, 4, 8)]
+    new = [
+        psnr("HIGH-ACCURATE", n, new=True) - psnr("XRDS-HIGH", n, new=True)
+        for n in (2, 4, 8)
+    ]
+    return {
+        "high.seconds": median(x["seconds"]["denoise"] for x in points),
+        "best.least": min(best),
+        "best.most": max(best),
+        "high.below.least": min(new),
+        "high.below.most": max(new),
+    }
+
+
+def _low_budgets(results: Results) -> Figures:
+    gains = [x["gain"] for x in only(results.low_budgets, guides="rendered")]
+    return {"rendered.least": min(gains), "rendered.most": max(gains)}
+
+
+def _networks(results: Results) -> Figures:
+    methods = results.standard["mean"]["2"]["fast"]
+    return {
+        "rays.xrds": methods["xrds"]["psnr"],
+        "rays.full_size": methods["oidn_equal_spp"]["psnr"],
+    }

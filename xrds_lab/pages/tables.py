@@ -1,0 +1,241 @@
+"""The tables that pages hold, made of results."""
+
+from __future__ import annotations
+
+from statistics import mean, median
+from typing import TYPE_CHECKING
+
+from .results import MEDIAN, SCENES, Results, only, scene_name
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    Table = list[list[str]]
+
+MOTIONS = ("pan", "objects", "both")
+RADII = {
+    "median of three denoised frames": MEDIAN,
+    "radius 1": 1,
+    "radius 2": 2,
+    "**radius 4**": 4,
+    "radius 8": 8,
+}
+UNITS = (1.0, 2.0, 4.0, 8.0)
+QUALITIES = (
+    "HIGH-ACCURATE",
+    "XRDS-BEST",
+    "XRDS-HIGH",
+    "XRDS-MEDIUM",
+    "HIGH-FAST",
+    "XRDS-BALANCED",
+    "FAST-FAST",
+    "XRDS-FAST",
+)
+
+
+def shots_in_short(results: Results) -> Table:
+    """Shots of the seven scenes: Cycles + OIDN, and what XRDS gains."""
+    names = [scene_name(x) for x in SCENES]
+    table = [["", *names, "mean"]]
+    for samples in (2, 16):
+        usual = only(
+            results.shots["shots"],
+            motion="pan",
+            samples=samples,
+            method="cycles_oidn_default",
+        )
+        psnr = {x["scene"]: x["psnr"] for x in usual}
+        cells = [psnr[x] for x in SCENES]
+        table.append(
+            [
+                f"Cycles + OIDN, {samples} samples per frame",
+                *(f"{x:.1f}" for x in [*cells, mean(cells)]),
+            ]
+        )
+        gains = only(results.gains, motion="pan", samples=samples)
+        by_scene = {x["scene"]: x["gain"] for x in gains}
+        cells = [by_scene[x] for x in SCENES]
+        label = f"**XRDS, {samples} samples per frame: gain**"
+        table.append([label, *(f"{x:+.1f}" for x in cells), f"**{mean(cells):+.1f}**"])
+    return table
+
+
+def shot_motions(results: Results) -> Table:
+    """What shots gain under three motions, at 2 and 16 samples, by scene."""
+    table = [["", *(scene_name(x) for x in SCENES), "mean"]]
+    for motion in MOTIONS:
+        rows = only(results.gains, motion=motion)
+        gains = {(x["scene"], x["samples"]): x["gain"] for x in rows}
+        means = [mean(gains[x, n] for x in SCENES) for n in (2, 16)]
+        cells = [_two(gains[x, 2], gains[x, 16]) for x in SCENES]
+        table.append([f"`{motion}`", *cells, _two(*means)])
+    return table
+
+
+def _two(few: float, many: float) -> str:
+    return f"{few:+.1f}, {many:+.1f}"
+
+
+def _signed(decibels: float) -> str:
+    """Return a difference; what rounds to nothing is +0.00."""
+    return f"{round(decibels, 2) + 0.0:+.2f}"
+
+
+def shot_radii(results: Results) -> Table:
+    """What a radius brings; measured before light was judged by halves."""
+    table = [["", "mean gain", "worst scene", "flicker"]]
+    for label, radius in RADII.items():
+        rows = results.shot_rows("pan", 2, radius)
+        gains = [x["gain"] for x in rows]
+        flicker = f"{mean(x['flicker_ratio'] for x in rows):.2f}"
+        table.append([label, f"{mean(gains):+.2f}", f"{min(gains):+.2f}", flicker])
+    return table
+
+
+def gallery(results: Results) -> Table:
+    """Gain, worst block and broken rules of the gallery."""
+    counts = (2, 4, 16)
+    table = [["", *(f"{x} samples" for x in counts)]]
+    for half in ("choosing", "judging"):
+        cells = []
+        for samples in counts:
+            rows = only(results.gallery, half=half, samples=samples)
+            gain = mean(x["gain"] for x in rows)
+            worst = min(x["worst_block"] for x in rows)
+            broken = sum(not x["passed"] for x in rows)
+            cells.append(f"{gain:+.1f}; {worst:+.1f}; {broken} of {len(rows)}")
+        table.append([half, *cells])
+    return table
+
+
+def light_parts(results: Results) -> Table:
+    """Parts of the light: as rendered, one by one, as a still, in a shot."""
+    table = [["4 samples", "as rendered", "one by one", "XRDS, still", "XRDS, shot"]]
+    for of, label in (("lobes", "lobes"), ("groups", "light groups")):
+        means = results.part_means(of, 4)
+        table.append([label, *(f"{x:.1f}" for x in means.values())])
+    return table
+
+
+def same_picture(results: Results) -> Table:
+    """Seconds and errors of *Same Picture*."""
+    rows = [
+        [
+            scene_name(x["scene"]),
+            f"{x['cycles_seconds']:.1f} s",
+            f"{x['seconds']:.1f} s",
+            f"{x['seconds'] / x['cycles_seconds']:.2f}",
+            f"{x['psnr_cycles']:.1f} to {x['psnr']:.1f}",
+            f"{x['flip_cycles']:.3f} to {x['flip']:.3f}",
+        ]
+        for x in results.same_picture
+    ]
+    return [["", "Cycles + OIDN", "Same Picture", "ratio", "PSNR", "FLIP"], *rows]
+
+
+def stills(results: Results) -> Table:
+    """The best picture within a budget."""
+    table = [
+        [
+            "units",
+            "Blender's default",
+            "best mode of Cycles + OIDN",
+            "XRDS",
+            "XRDS over the best mode: mean, worst scene",
+        ]
+    ]
+    for units in UNITS:
+        groups = only(results.bench["mean"], budget=units)[0]["groups"]
+        shown = [
+            f"{groups[x]['psnr']:.2f}"
+            for x in ("OIDN, default", "OIDN, best mode", "XRDS")
+        ]
+        over = results.over_rival(units)
+        worst = min(over, key=lambda x: over[x])
+        change = f"{_signed(mean(over.values()))}, {_signed(over[worst])}"
+        table.append([f"{units:g}", *shown, f"{change} {scene_name(worst)}"])
+    return table
+
+
+def denoisers(results: Results) -> Table:
+    """Errors and seconds of the denoiser's qualities and of Cycles' modes."""
+    table = [["", "1 spp", "2", "4", "8", "seconds", "of the default's"]]
+    times = results.bench["scenes"]
+    for quality in QUALITIES:
+        cells = [
+            f"{mean(x['psnr'] for x in results.denoiser(quality, n)):.2f}"
+            for n in (1, 2, 4, 8)
+        ]
+        if quality.startswith("XRDS-"):
+            points = results.denoiser(quality, 1)
+            seconds = {x["scene"]: x["seconds"]["denoise"] for x in points}
+        else:
+            seconds = {x["scene"]: x["denoise_seconds"][quality] for x in times}
+        ratio = median(
+            seconds[x["scene"]] / x["denoise_seconds"]["HIGH-ACCURATE"] for x in times
+        )
+        name = quality.removeprefix("XRDS-")
+        label = f"`{name if name == quality else name.lower()}`"
+        table.append([label, *cells, f"{median(seconds.values()):.1f}", f"{ratio:.2f}"])
+    return table
+
+
+def low_budgets(results: Results) -> Table:
+    """Super-resolution with kept guides against a lowered resolution percentage."""
+    table = [
+        [
+            "samples per pixel",
+            "lowered resolution",
+            "XRDS",
+            "gain: mean, worst",
+            "full size fits as well",
+        ]
+    ]
+    for x in only(results.low_budgets, guides="kept"):
+        worst = f"{x['worst']['gain']:+.2f} {scene_name(x['worst']['scene'])}"
+        table.append(
+            [
+                f"{x['samples']:g}",
+                f"{x['lowered']:.2f}",
+                f"{x['xrds']:.2f}",
+                f"{x['gain']:+.2f}, {worst}",
+                f"{x['full_size_fits']} of {len(x['scenes'])}",
+            ]
+        )
+    return table
+
+
+def card(results: Results) -> Table:
+    """Seconds on a card and on the cores beside it."""
+    found = results.card
+    accumulation = found["accumulation"]
+    table = [["1920 x 1080", "card", f"{found['machine']['cores']} cores"]]
+    on_card = median(accumulation["card"]["then"])
+    on_cores = median(accumulation["processor"])
+    label = f"accumulation of {accumulation['neighbours']} neighbours"
+    table.append([label, f"{on_card:.2f}", f"{on_cores:.2f}"])
+    high = only(found["denoiser"], size=[1920, 1080])
+    seconds = {x["device"]: median(x["seconds"]) for x in high}
+    cells = [f"{seconds[x]:.2f}" for x in ("cuda", "cpu")]
+    table.append(["denoiser, `high`", *cells])
+    for scale in (2, 4):
+        rows = only(found["network"], scale=scale, size=[1920, 1080])
+        seconds = {x["device"]: x["seconds"] for x in rows}
+        on_card, on_cores = seconds[found["machine"]["card"]], seconds["cpu"]
+        table.append([f"network `fast` x{scale}", f"{on_card:.2f}", f"{on_cores:.2f}"])
+    return table
+
+
+TABLES: Mapping[str, Callable[[Results], Table]] = {
+    "shots in short": shots_in_short,
+    "shots by motion": shot_motions,
+    "shots by radius": shot_radii,
+    "gallery": gallery,
+    "passes of light": light_parts,
+    "same picture": same_picture,
+    "stills": stills,
+    "denoisers": denoisers,
+    "low budgets": low_budgets,
+    "card": card,
+}
+"""Tables by the name that a page's marker gives: `<!-- table: NAME -->`."""
