@@ -95,6 +95,9 @@ def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
     ]
     assert all(0.0 < seconds < 60.0 for seconds in timed)
     assert "## Seconds per frame" in (blend.parent / "out/report.md").read_text()
+    drawn = (blend.parent / "out/error-pan.svg").read_text()
+    assert "XRDS, radius 4" not in drawn  # only what was timed
+    assert "Cycles + OIDN" in drawn
 
 
 def test_a_shot_that_cannot_be_made_leaves_the_others(blend: Path) -> None:

@@ -32,7 +32,7 @@ def scene_plot(
     scene: str, points: Sequence[Point], unit: float, floor: float | None
 ) -> bytes:
     """SVG of one scene: all points, each group's frontier, the reference's floor."""
-    figure, panels = _figure(scene, "seconds of a whole frame")
+    figure, panels = two_panels(scene, "seconds of a whole frame")
     groups = pareto.groups(points)
     for panel, measure in zip(panels, MEASURES, strict=True):
         for name in STYLES:
@@ -43,13 +43,13 @@ def scene_plot(
             panel.axhline(floor, color="#009e73", linewidth=1, linestyle=":")
             panel.text(0.99, floor, "the reference's own error", fontsize=7, ha="right",
                        va="bottom", transform=panel.get_yaxis_transform())  # fmt: skip
-    return _svg(figure, panels, outside=True)
+    return svg_of(figure, panels, outside=True)
 
 
 def mean_plot(scenes: dict[str, tuple[Sequence[Point], float]]) -> bytes:
     """SVG over all scenes: mean error over multiples of 1 spp + OIDN's seconds."""
     title = f"mean over {len(scenes)} scenes"
-    figure, panels = _figure(title, "budget, of 1 spp + OIDN (Blender's default)")
+    figure, panels = two_panels(title, "budget, of 1 spp + OIDN (Blender's default)")
     grouped = {
         name: (pareto.groups(points), unit) for name, (points, unit) in scenes.items()
     }
@@ -61,7 +61,7 @@ def mean_plot(scenes: dict[str, tuple[Sequence[Point], float]]) -> bytes:
             }
             _draw(panel, name, pareto.mean_curve(members, measure))
         panel.axvline(1.0, color="#cccccc", zorder=0, linewidth=1)
-    return _svg(figure, panels, outside=True)
+    return svg_of(figure, panels, outside=True)
 
 
 def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
@@ -70,7 +70,7 @@ def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
     Samples beside seconds; a line for each scene, from `same_picture.entries`.
     """
     title = "the same PSNR: Cycles' best mode, as a multiple of XRDS"
-    figure, panels = _figure(title, "budget, of 1 spp + OIDN (Blender's default)")
+    figure, panels = two_panels(title, "budget, of 1 spp + OIDN (Blender's default)")
     keys = (("seconds", "seconds"), ("samples", "samples per pixel"))
     budgets = sorted({e["budget"] for e in entries})
     for panel, (key, label) in zip(panels, keys, strict=True):
@@ -85,12 +85,12 @@ def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
             if line:
                 panel.plot(*zip(*line, strict=True), color=f"C{number}", label=scene,
                            marker="osD^v<>"[number % 7], markersize=4)  # fmt: skip
-    return _svg(figure, panels)
+    return svg_of(figure, panels)
 
 
 def growth_plot(growth: dict[str, Any]) -> bytes:
     """SVG of seconds and peak memory over pixels of the output, on all cores."""
-    figure, panels = _figure("growth with the frame", "megapixels of the output")
+    figure, panels = two_panels("growth with the frame", "megapixels of the output")
     most = max(row["cores"] for row in growth["rows"])
     lines: dict[str, list[dict[str, Any]]] = {}
     for row in growth["rows"]:
@@ -109,10 +109,11 @@ def growth_plot(growth: dict[str, Any]) -> bytes:
             if shown:
                 panel.plot(*zip(*shown, strict=True), color=f"C{number}", label=name,
                            marker="osD^v<>"[number % 7], markersize=4)  # fmt: skip
-    return _svg(figure, panels, outside=True)
+    return svg_of(figure, panels, outside=True)
 
 
-def _figure(title: str, axis: str) -> tuple[Any, Any]:
+def two_panels(title: str, axis: str) -> tuple[Any, Any]:
+    """A figure with a panel for each of `MEASURES` over a log `axis`."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE, layout="constrained")
@@ -164,7 +165,8 @@ def _draw(panel: Any, name: str, line: Line, marks: bool = False) -> None:
     )
 
 
-def _svg(figure: Any, panels: Any, outside: bool = False) -> bytes:
+def svg_of(figure: Any, panels: Any, outside: bool = False) -> bytes:
+    """A figure with its legend, below the panels or inside the first."""
     from matplotlib import rc_context
 
     if outside:

@@ -20,7 +20,7 @@ from ..bench.pictures import Networks, Pictures
 from ..bench.windows import find_shots
 from ..csv_table import write_table
 from ..progress import report_line
-from . import equal, film, report
+from . import equal, film, plot, report
 from .figures import REACH, Clip, SceneFigures
 from .frames import ShotFrames
 from .motions import MOTIONS
@@ -223,5 +223,9 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
     }
     write_json(out / "results.json", results)
     write_table(out / "results.csv", results["shots"])
+    for motion in parts[0].measure.motions:
+        svg = plot.error_plot(points, motion)
+        if svg is not None:
+            (out / f"error-{motion}.svg").write_bytes(svg)
     report.write(out / "report.md", results)
     return results

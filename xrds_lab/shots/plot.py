@@ -1,0 +1,60 @@
+"""Error against seconds per frame, of shots."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..bench.plots import MEASURES, svg_of, two_panels
+from .figures import BEST, DEFAULT, MEDIAN, XRDS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    Point = dict[str, Any]
+
+# Colour, line and mark differ each by itself: readable in grey and by the colour-blind.
+_LINES = {
+    (DEFAULT, 0): ("Cycles + OIDN", "#d55e00", "--", "s"),
+    (BEST, 0): ("Cycles + OIDN, best mode", "#000000", "-", "o"),
+    (MEDIAN, 1): ("median of three", "#cc79a7", "-.", "^"),
+    (XRDS, 0): ("XRDS, the frame alone", "#e69f00", ":", "P"),
+    (XRDS, 1): ("XRDS, radius 1", "#56b4e9", "--", "d"),
+    (XRDS, 2): ("XRDS, radius 2", "#009e73", "-.", "v"),
+    (XRDS, 4): ("XRDS, radius 4", "#0072b2", "-", "D"),
+}
+_FROM, _TO = 5, 95  # percentiles over scenes
+
+
+def error_plot(points: Sequence[Point], motion: str) -> bytes | None:
+    """SVG of medians over scenes, with the 5th to 95th percentile of errors.
+
+    A line joins the samples per pixel at which all scenes were timed; None where there
+    are none.
+    """
+    timed = [p for p in points if p["motion"] == motion and p["seconds_per_frame"]]
+    scenes = {p["scene"] for p in timed}
+    title = f"shots, `{motion}`: median of {len(scenes)} scenes"
+    figure, panels = two_panels(title, "seconds of a whole frame")
+    drawn = False
+    for (method, radius), (name, colour, dash, mark) in _LINES.items():
+        own = [p for p in timed if (p["method"], p["radius"]) == (method, radius)]
+        counts = sorted({p["samples"] for p in own})
+        groups = [[p for p in own if p["samples"] == n] for n in counts]
+        whole = [g for g in groups if {p["scene"] for p in g} == scenes]
+        if not whole:
+            continue
+        drawn = True
+        seconds = [np.median([p["seconds_per_frame"] for p in g]) for g in whole]
+        for panel, measure in zip(panels, MEASURES, strict=True):
+            low, middle, high = np.transpose(
+                [
+                    np.percentile([p[measure] for p in g], (_FROM, 50, _TO))
+                    for g in whole
+                ]
+            )
+            style = {"color": colour, "linestyle": dash, "linewidth": 1.4}
+            panel.plot(seconds, middle, label=name, marker=mark, markersize=4, **style)
+            panel.vlines(seconds, low, high, color=colour, alpha=0.35, linewidth=1)
+    return svg_of(figure, panels, outside=True) if drawn else None
