@@ -6,6 +6,7 @@ import json
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -26,14 +27,18 @@ def uneven(subject: Subject) -> Iterator[Measured]:
     yield Measured("grey.chroma", float(subject.scale))
 
 
-def measure(monkeypatch: pytest.MonkeyPatch, out: Path, *works: suite.Work) -> dict:
+def measure(
+    monkeypatch: pytest.MonkeyPatch, out: Path, *works: suite.Work, **choices: Any
+) -> dict:
     """Judge the small networks alone: every one of them is loaded each time."""
     monkeypatch.setattr(suite, "GROUPS", {"some": works})
     small = out / "small"
     small.mkdir(exist_ok=True)
     for path in weights.DIRECTORY.glob("fast_x*.safetensors"):
         shutil.copy(path, small)
-    return suite.stability(out, parts=["arrays"], device="cpu", weights=small)
+    return suite.stability(
+        out, parts=["arrays"], device="cpu", weights=small, **choices
+    )
 
 
 def test_failures_come_first(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -88,6 +93,39 @@ def test_a_page_without_failures_says_so(
     measure(monkeypatch, tmp_path, even)
     assert "## Failures\n\nNone." in (tmp_path / "report.md").read_text()
     assert set(report.PLOTS[0]) >= {"firefly.far_change"}
+
+
+def test_what_is_measured_is_not_measured_again(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    lines: list[str] = []
+    subjects = []
+
+    def counted(subject: Any) -> Iterator[Measured]:
+        subjects.append(subject.name)
+        if len(subjects) == 2:
+            raise KeyboardInterrupt
+        yield from even(subject)
+
+    with pytest.raises(KeyboardInterrupt):
+        measure(monkeypatch, tmp_path, counted, progress=lines.append)
+    assert "left, about" in lines[-1]
+    first = json.loads((tmp_path / "results.json").read_text())
+    measure(monkeypatch, tmp_path, counted, resume=True)
+    assert subjects.count(subjects[0]) == 1
+    assert subjects.count(subjects[1]) == 2
+    both = json.loads((tmp_path / "results.json").read_text())
+    assert len(both["checks"]) > len(first["checks"]) > 0
+    measure(monkeypatch, tmp_path, counted)
+    assert subjects.count(subjects[0]) == 2
+
+
+def test_one_network_is_enough_for_a_quick_look(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    result = measure(monkeypatch, tmp_path, even, quick=True)
+    found = {(x["preset"], x["scale"], x["precision"]) for x in result["checks"]}
+    assert found == {("fast", 2, "fp32")}
 
 
 def test_unknown_parts_are_wrong_usage(tmp_path: Path) -> None:

@@ -95,6 +95,12 @@ def add_stability(commands: Any) -> argparse.ArgumentParser:
         default=STABILITY,
         help="as arrays,large",
     )
+    add(
+        "--quick",
+        action="store_true",
+        help="of the networks fast x2 in single precision alone",
+    )
+    add("--resume", action="store_true", help="leave out what is measured in DIR")
     add("--cache", type=Path, help="folder that keeps rendered pictures")
     add("--device", default="auto", help=DEVICE_HELP)
     add("--weights", type=Path, help="folder of weights files")
@@ -113,6 +119,8 @@ def _stability(options: argparse.Namespace) -> dict[str, Any]:
         cache=options.cache,
         device=options.device,
         weights=options.weights,
+        quick=options.quick,
+        resume=options.resume,
         progress=report_line,
     )
     if not result["passed"]:

@@ -72,8 +72,9 @@ def shipped(
     device: str = "auto",
     side: int = 96,
     thorough: bool = False,
+    only: tuple[str, int] | None = None,
 ) -> list[Subject]:
-    """Return every shipped preset and scale at every precision.
+    """Return every shipped preset and scale at every precision, or `only` one of them.
 
     Raises WeightsError if a file is damaged, UsageError for an unknown precision.
     """
@@ -93,5 +94,6 @@ def shipped(
             thorough,
         )
         for record in available(directory)
+        if only in (None, (record["preset"], record["scale"]))
         for precision in precisions
     ]

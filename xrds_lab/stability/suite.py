@@ -5,17 +5,21 @@ from __future__ import annotations
 import json
 import sys
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import xrds_core
+from xrds_core.atomic import read_json, write_json
 from xrds_core.errors import UsageError
+from xrds_core.time_left import Clock
 
+from ..checksum import checksum
 from ..progress import silent
 from . import hues, lies, light, sameness, shapes, spoilt
 from .bounds import STIFF, is_bound, judge
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
 
     from ..progress import Progress
     from .accumulation import FullSize
@@ -40,6 +44,7 @@ GROUPS: dict[str, tuple[Work, ...]] = {
 PARTS = ("arrays", "large", "scenes", "shots", "load", "accumulation")
 SIDE = 256  # pixels of rendered scenes along one side; shots are half as wide
 ARRAY_SIDE = 128
+_QUICK = ("fast", 2)  # the preset and scale that are judged alone, in single precision
 
 
 def checks(subject: Judged, work: Work) -> Iterator[tuple[Check, Measured]]:
@@ -62,6 +67,8 @@ def stability(
     cache: Path | None = None,
     device: str = "auto",
     weights: Path | None = None,
+    quick: bool = False,
+    resume: bool = False,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Measure all, write the report into `out` and return the JSON's content.
@@ -72,7 +79,9 @@ def stability(
         cache: folder that keeps rendered pictures; `out`/rendered by default.
         device: as `Upscaler`'s.
         weights: a folder of presets in place of the shipped.
-        progress: gets a line of text after every check.
+        quick: of the networks `fast` x2 in single precision alone.
+        resume: leave out what the same code and weights have measured into `out`.
+        progress: gets a line of text, with the time left, after every check.
 
     Values of the same weights that `out` holds from an earlier run, as of other
     parts, stay in the report. Raises UsageError for unknown parts, WeightsError for
@@ -88,30 +97,69 @@ def stability(
     out.mkdir(parents=True, exist_ok=True)
     records = available(weights)
     verdicts, curves = _earlier(out / "results.json", records)
-    result: dict[str, Any] = {}
     rendered = cache or out / "rendered"
-    for subject, works in _subjects(parts, rendered, device, weights, progress):
-        for name, work in works:
-            for check, measured in checks(subject, work):
-                verdicts[check.name, subject.name] = check
-                if measured.curve:
-                    curves[check.name, subject.name] = measured.curve
-                if not check.passed:
-                    progress(f"{subject.name}: {check.name} is {check.value:.3g}")
-            progress(f"{subject.name}: {name} done")
-        # after each of them: what an interrupt leaves is a report of those before
-        result = {
+    done = _Done(out / "done.json", records, resume)
+    todo = [
+        (subject, name, work)
+        for subject, works in _subjects(
+            parts, rendered, device, weights, quick, progress
+        )
+        for name, work in works
+        if not done.holds(subject.name, name)
+    ]
+
+    def told(device: object) -> dict[str, Any]:
+        return {
             "checks": [vars(check) for check in verdicts.values()],
             "curves": [
                 {"name": name, "subject": of, "points": [*map(list, curve.items())]}
                 for (name, of), curve in curves.items()
             ],
-            "machine": _machine(subject.device),
+            "machine": _machine(device),
             "weights": records,
             "passed": all(check.holds for check in verdicts.values()),
         }
-        report.write(out, result, list(verdicts.values()))
+
+    clock = Clock()
+    for number, (subject, name, work) in enumerate(todo, start=1):
+        for check, measured in checks(subject, work):
+            verdicts[check.name, subject.name] = check
+            if measured.curve:
+                curves[check.name, subject.name] = measured.curve
+            if not check.passed:
+                progress(f"{subject.name}: {check.name} is {check.value:.3g}")
+        # after each of them: what an interrupt leaves holds those before
+        write_json(out / "results.json", told(subject.device))
+        done.add(subject.name, name)
+        progress(f"{subject.name}: {name} done, {clock.lap(len(todo) - number)}")
+    result = told(todo[-1][0].device if todo else device)
+    report.write(out, result, list(verdicts.values()))
     return result
+
+
+class _Done:
+    """What is measured, in a file; it holds for the same code and weights."""
+
+    def __init__(self, path: Path, weights: list[dict[str, Any]], resume: bool) -> None:
+        sources = Path(xrds_core.__file__).parent.rglob("*.py")
+        code = checksum([*sources, *Path(__file__).parent.glob("*.py")])
+        self._path, self._of = path, {"code": code, "weights": weights}
+        self._names: list[list[str]] = []
+        try:
+            found = read_json(path)
+            if resume and found["of"] == self._of:
+                self._names = found["done"]
+        except (OSError, ValueError, KeyError, TypeError):
+            pass
+
+    def holds(self, subject: str, work: str) -> bool:
+        """Whether it is done."""
+        return [subject, work] in self._names
+
+    def add(self, subject: str, work: str) -> None:
+        """Note that it is done."""
+        self._names.append([subject, work])
+        write_json(self._path, {"of": self._of, "done": self._names})
 
 
 def _earlier(
@@ -142,10 +190,11 @@ def _subjects(
     folder: Path,
     device: str,
     weights: Path | None,
+    quick: bool,
     progress: Progress,
 ) -> Iterator[tuple[Judged, list[tuple[str, Work]]]]:
     """Yield what is judged, each with its checks."""
-    from .subject import shipped
+    from .subject import PRECISIONS, shipped
 
     if "accumulation" in parts:
         from .accumulation import FullSize
@@ -154,7 +203,12 @@ def _subjects(
     works = list(_works(parts, folder, weights, progress))
     if works:
         for subject in shipped(
-            directory=weights, device=device, side=ARRAY_SIDE, thorough=True
+            PRECISIONS[:1] if quick else PRECISIONS,
+            directory=weights,
+            device=device,
+            side=ARRAY_SIDE,
+            thorough=True,
+            only=_QUICK if quick else None,
         ):
             yield subject, works
 
