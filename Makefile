@@ -1,4 +1,4 @@
-# make install | test | test-other | test-app | demo | extension | clean.  BPY=5.0.1 picks another Blender.
+# make install | test | test-other | test-app | demo | extension | release | clean.  BPY=5.0.1 picks another Blender.
 PYTHON ?= python3.11
 VENV   ?= .venv
 BPY    ?= 4.5.15
@@ -9,13 +9,15 @@ STAMP  := $(VENV)/.installed-bpy-$(BPY)-torch-$(TORCH)
 
 PLATFORMS ?= linux-x64 windows-x64 macos-arm64
 SUITES ?= trixie sid
+# The project's address, for the manifest, the package and the page of a release.
+WEBSITE ?=
 
 # A second Blender for the tests: its bpy alone, all else comes from $(VENV).
 OTHER_BPY  ?= 5.0.1
 OTHER_VENV := $(VENV)-bpy-$(OTHER_BPY)
 OTHER_RUN  := $(OTHER_VENV)/bin/python
 
-.PHONY: install test test-other test-app demo extension clean
+.PHONY: install test test-other test-app demo extension release clean
 
 install: $(STAMP)
 
@@ -53,7 +55,12 @@ demo: install
 	$(RUN) -m xrds_lab.demo --out demo
 
 extension: install
-	$(RUN) extension/build.py --out dist --torch $(TORCH) --platform $(PLATFORMS)
+	$(RUN) extension/build.py --out dist --torch $(TORCH) --platform $(PLATFORMS) --website "$(WEBSITE)"
+
+# What a release consists of, as static files that any web server can hold.
+release: extension
+	$(RUN) extension/build.py --out dist --kind bare --website "$(WEBSITE)"
+	$(RUN) extension/release.py --zips dist --out dist/release --website "$(WEBSITE)"
 
 clean:
 	rm -rf build dist demo *.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -52,15 +52,18 @@ def build(
     return path
 
 
-def own_wheel(folder: Path, *left_out: str) -> Path:
+def own_wheel(folder: Path, *left_out: str, website: str | None = None) -> Path:
     """Build a wheel of what renders, from a copy without the rest.
 
-    `left_out` are patterns of names.
+    `left_out` are patterns of names; the `website` goes into its metadata.
     """
     source = folder / "source"
     source.mkdir(parents=True)
     for name in PROJECT_FILES:
         shutil.copy(ROOT / name, source)
+    if website:
+        with (source / "pyproject.toml").open("a", encoding="utf-8") as file:
+            file.write(f"\n[project.urls]\nHomepage = {json.dumps(website)}\n")
     for name in PACKAGES:
         ignored = shutil.ignore_patterns("__pycache__", *left_out)
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
@@ -80,12 +83,16 @@ def _manifest(lines: dict[str, object]) -> str:
 
 def _blenders_build(add_on: Path, path: Path) -> None:
     """Let Blender's extension tool check the folder and zip it."""
+    places = ["--source-dir", str(add_on), "--output-filepath", str(path)]
+    blenders_tool("build", *places)
+
+
+def blenders_tool(*words: str) -> None:
+    """Run what `blender --command extension` runs; ends the program if it fails."""
     import bpy
 
     scripts = Path(bpy.utils.resource_path("LOCAL")) / "scripts"
-    tool = scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"
-    places = ["--source-dir", str(add_on), "--output-filepath", str(path)]
-    _run(str(tool), "build", *places)
+    _run(str(scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"), *words)
 
 
 def _run(*words: str) -> None:
@@ -110,6 +117,7 @@ def _with_libraries(kind: str, options: argparse.Namespace, own: Path) -> None:
             print(f"{name}: no zip, {error}")
             continue
         lines = {"platforms": [target.platform]} | _versions(target, options)
+        lines |= _website(options)
         _print_size(build(options.out, name, [own, *wheels], lines))
 
 
@@ -120,6 +128,11 @@ def _versions(target: Target, options: argparse.Namespace) -> dict[str, object]:
     least, end = PYTHONS[target.python]
     newest = {"blender_version_max": end} if end else {}
     return {"blender_version_min": least, **newest}
+
+
+def _website(options: argparse.Namespace) -> dict[str, object]:
+    """The project's address, where it is told, as a line of the manifest."""
+    return {"website": options.website} if options.website else {}
 
 
 def _print_size(path: Path) -> None:
@@ -146,6 +159,7 @@ def main() -> None:
     add("--platform", **names)
     add("--python", nargs="+", default=list(PYTHONS), help="as 3.11")
     distributions = "for builds of distributions, which pair it with other Pythons"
+    add("--website", help="address of the project, for Blender and the package index")
     add("--any-blender", action="store_true", help=distributions)
     options = parser.parse_args()
     if not options.any_blender and set(options.python) - set(PYTHONS):
@@ -156,10 +170,11 @@ def main() -> None:
             whole = kind == "full"
             if whole not in built:
                 left_out = () if whole else (LARGE,)
-                built[whole] = own_wheel(Path(folder) / kind, *left_out)
+                place, site = Path(folder) / kind, options.website
+                built[whole] = own_wheel(place, *left_out, website=site)
             own = built[whole]
             if kind == "bare":
-                _print_size(build(options.out, kind, [own]))
+                _print_size(build(options.out, kind, [own], _website(options)))
             else:
                 _with_libraries(kind, options, own)
 

@@ -1,0 +1,158 @@
+"""What `make release` lays out: complete, in step with itself, and readable."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import zipfile
+from hashlib import sha256
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
+
+import pytest
+
+pytest.importorskip("bpy")
+pytest.importorskip("cyclonedx")
+pytest.importorskip("markdown")
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "extension"))
+
+import build
+import release
+
+SITE = "https://xrds.example"
+VERSION = "0.1.0"
+
+
+@pytest.fixture(scope="module")
+def laid_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A release of two zips as build.py names them, with little in them."""
+    folder = tmp_path_factory.mktemp("release")
+    zips, site = folder / "zips", {"website": SITE}
+    own = build.own_wheel(folder / "wheel", build.LARGE, website=SITE)
+    build.build(zips, "bare", [own], site)
+    lines = {"platforms": ["linux-x64"], "blender_version_max": "5.1.0"} | site
+    build.build(zips, "light-linux_x64-cp311", [own], lines)
+    (zips / "xrds-0.0.9-bare.zip").write_bytes(b"of an earlier version")
+    return release.release(zips, folder / "out", SITE)
+
+
+def names(folder: Path) -> set[str]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix() for path in files}
+
+
+def test_all_is_there_and_nothing_else(laid_out: Path) -> None:
+    light, bare = f"xrds-{VERSION}-light-linux_x64-cp311", f"xrds-{VERSION}-bare"
+    wheel = f"xrds-{VERSION}-py3-none-any"
+    assert names(laid_out) == {
+        "SHA256SUMS",
+        "index.html",
+        "notes.md",
+        f"{wheel}.whl",
+        f"light/{light}.zip",
+        "light/index.json",
+        f"bare/{bare}.zip",
+        "bare/index.json",
+        *(f"sbom/{name}.cdx.json" for name in (light, bare, wheel)),
+    }
+
+
+def test_checksums_are_of_every_file(laid_out: Path) -> None:
+    lines = (laid_out / "SHA256SUMS").read_text().splitlines()
+    told = {name: digest for digest, name in (line.split("  ") for line in lines)}
+    assert told.keys() == names(laid_out) - {"SHA256SUMS"}
+    for name, digest in told.items():
+        assert digest == sha256((laid_out / name).read_bytes()).hexdigest()
+
+
+def test_the_repository_names_zips_and_website(laid_out: Path) -> None:
+    told = json.loads((laid_out / "light" / "index.json").read_text("utf-8"))
+    (entry,) = told["data"]
+    path = laid_out / "light" / entry["archive_url"]
+    digest = sha256(path.read_bytes()).hexdigest()
+    assert entry["archive_hash"] == f"sha256:{digest}"
+    assert (entry["version"], entry["website"]) == (VERSION, SITE)
+    assert entry["blender_version_max"] == "5.1.0"
+
+
+def test_the_package_names_the_website(laid_out: Path) -> None:
+    (wheel,) = laid_out.glob("*.whl")
+    with zipfile.ZipFile(wheel) as file:
+        metadata = file.read(f"xrds-{VERSION}.dist-info/METADATA").decode()
+        weights = [name for name in file.namelist() if "paper_x" in name]
+    assert f"Project-URL: Homepage, {SITE}" in metadata
+    assert weights  # of the large network, too
+
+
+class Links(HTMLParser):
+    """The targets of a page's links."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def handle_starttag(self, _: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found += [value for name, value in attrs if name == "href" and value]
+
+
+def test_the_page_leads_to_what_is_there(laid_out: Path) -> None:
+    text = (laid_out / "index.html").read_text("utf-8")
+    links = Links()
+    links.feed(text)
+    here = [urlsplit(link) for link in links.found if link != SITE]
+    assert SITE in links.found
+    assert "Full:" not in text  # no full zip was built
+    assert all((laid_out / link.path).exists() for link in here)
+    (light,) = (link for link in here if link.path.startswith("light/xrds"))
+    # what Blender reads as the link is dropped on its window
+    assert parse_qs(light.query) == {
+        "repository": ["./index.json"],
+        "blender_version_min": ["4.2.0"],
+        "blender_version_max": ["5.1.0"],
+        "platforms": ["linux-x64"],
+        "python_versions": ["3"],
+    }
+    assert "4.2 or later, before 5.1" in text
+    assert "<strong>Shots</strong>" in text
+    assert not re.findall(r"\$\w+", text)
+
+
+def test_a_bill_names_what_a_zip_holds(laid_out: Path) -> None:
+    name = f"xrds-{VERSION}-bare"
+    bill = json.loads((laid_out / "sbom" / f"{name}.cdx.json").read_text("utf-8"))
+    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.6")
+    whole = bill["metadata"]["component"]
+    digest = sha256((laid_out / "bare" / f"{name}.zip").read_bytes()).hexdigest()
+    assert whole["hashes"] == [{"alg": "SHA-256", "content": digest}]
+    (own,) = bill["components"]
+    assert own["purl"] == f"pkg:pypi/xrds@{VERSION}"
+    assert own["licenses"] == [{"license": {"id": "GPL-3.0-or-later"}}]
+    (needs,) = (d for d in bill["dependencies"] if d["ref"] == whole["bom-ref"])
+    assert needs["dependsOn"] == [own["bom-ref"]]
+
+
+def test_notes_are_those_of_the_version() -> None:
+    changelog = "# Changes\n\n## 1.1.0\n\nmore\n\n## 1.0.0\n\nfirst\n"
+    assert release.notes_of("1.1.0", changelog) == "more"
+    assert release.notes_of("1.0.0", changelog) == "first"
+    with pytest.raises(SystemExit, match=r"tells nothing of 2\.0\.0"):
+        release.notes_of("2.0.0", changelog)
+
+
+def test_the_changelog_tells_of_this_version(laid_out: Path) -> None:
+    assert "Shots" in (laid_out / "notes.md").read_text("utf-8")
+
+
+def test_without_zips_there_is_no_release(tmp_path: Path) -> None:
+    script = str(ROOT / "extension" / "release.py")
+    words = [script, "--zips", str(tmp_path), "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        [sys.executable, *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert f"no zip of {VERSION}" in done.stderr
+    assert not (tmp_path / "out").exists()
