@@ -23,7 +23,15 @@ def figures(results: Results) -> Figures:
         **_denoisers(results),
         **_low_budgets(results),
         **_networks(results),
+        **_installs(results),
     }
+
+
+def _installs(results: Results) -> Figures:
+    names = ("light", "network", "cuda")
+    rows = dict(zip(names, results.installs, strict=True))
+    sizes = {f"install.{k}.megabytes": x["megabytes"] for k, x in rows.items()}
+    return sizes | {f"install.{k}.seconds": x["seconds"] for k, x in rows.items()}
 
 
 def _shots(results: Results) -> Figures:

@@ -65,6 +65,11 @@ class Results:
         return self._read("shots/gains.json")["gains"]
 
     @cached_property
+    def installs(self) -> Rows:
+        """Sizes and seconds of installs, the smallest first."""
+        return self._read("install.json")["rows"]
+
+    @cached_property
     def same_picture(self) -> Rows:
         """*Same Picture*: seconds and errors."""
         return self._read("shots/same-picture.json")["scenes"]
