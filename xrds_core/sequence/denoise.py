@@ -186,7 +186,8 @@ def _entries(
 ) -> Iterator[dict[str, Any]]:
     """Finish and write the frames of a shot; yields the record of each.
 
-    A frame that cannot be written is left out; two of them in a row are an error.
+    A frame that cannot be finished or written is left out; two of them in a row are an
+    error.
     """
     selection, fails = NeighbourSelection(say), False
     clock = Clock()
@@ -196,7 +197,6 @@ def _entries(
         if resume and files.is_done(number, shot.neighbours(number)):
             continue
         others = selection.select(number, own, found.neighbours)
-        started = time.perf_counter()
         try:
             region, within = _regions(own, files.crop)
             finished = finish_frame(

@@ -98,10 +98,10 @@ def accumulate(
     means, device = None, PROCESSOR
     if card is not None and card.takes(target, others):
         means = card.means(target, [x for x in groups if x], images, usual, lit)
-    if card is not None and means is not None:
         device = card.name
     if means is None:
         means = _by_rows(target, groups, images, usual, lit, threads)
+        device = PROCESSOR
     height, width = target.shape
     requested = sum(x.samples for x in others) * height * width
     rejected = 1.0 - means.reused / requested if requested else 0.0

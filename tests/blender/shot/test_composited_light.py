@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from channels import read_channels
+from light_passes import with_light_passes
 
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
@@ -74,10 +75,7 @@ def rebuild(tree: Tree) -> Any:
     sockets = {x.name: x for x in tree.layers.outputs}
 
     def light(name: str) -> Any:
-        long, _, kind = name.partition(" ")
-        short = dict(LOBES).get(long, OTHERS.get(long, long))
-        old = short + {"Direct": "Dir", "Indirect": "Ind", "Color": "Col"}.get(kind, "")
-        return sockets[name] if name in sockets else sockets[old]
+        return sockets[name] if name in sockets else sockets[_old(name)]
 
     lobes = [
         tree.mix(
@@ -103,16 +101,7 @@ def rebuilt_here(parts: dict[str, np.ndarray]) -> np.ndarray:
 @pytest.fixture
 def file(life: Any, tmp_path: Path) -> Path:
     """A still life with all lobes and two light groups that hold all light."""
-    layer = life.view_layers[0]
-    for lobe, _ in LOBES:
-        for kind in ("direct", "indirect", "color"):
-            setattr(layer, f"use_pass_{lobe.lower()}_{kind}", True)
-    layer.use_pass_emit = layer.use_pass_environment = True
-    for name in ("lamps", "world"):
-        layer.lightgroups.add(name=name)
-    for item in life.objects:
-        item.lightgroup = "lamps"
-    life.world.lightgroup = "world"
+    with_light_passes(life)
     life.cycles.samples = 4
     life.frame_start = life.frame_end = life.frame_current
     life.render.engine, life.xrds.mode = "XRDS", "full_size"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from channels import read_channels
+from light_passes import with_light_passes
 
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
@@ -28,31 +29,16 @@ Planes = Mapping[str, np.ndarray]
 CYCLES = next(x for x in read_renderers() if x.name == "Cycles")
 
 
-def with_passes(scene: Any) -> Any:
-    """A scene with all lobes, and two light groups that hold all light."""
-    layer = scene.view_layers[0]
-    for lobe in ("diffuse", "glossy", "transmission"):
-        for kind in ("direct", "indirect", "color"):
-            setattr(layer, f"use_pass_{lobe}_{kind}", True)
-    layer.use_pass_emit = layer.use_pass_environment = True
-    for name in ("lamps", "world"):
-        layer.lightgroups.add(name=name)
-    for item in scene.objects:
-        item.lightgroup = "lamps"
-    scene.world.lightgroup = "world"
-    return scene
-
-
 @pytest.fixture
 def lit(life: Any) -> Any:
     life.cycles.samples = 4
-    return with_passes(life)
+    return with_light_passes(life)
 
 
 @pytest.fixture
 def shot(blend: Path) -> Path:
     bpy.ops.wm.open_mainfile(filepath=str(blend))
-    with_passes(bpy.context.scene)
+    with_light_passes(bpy.context.scene)
     bpy.ops.wm.save_mainfile()
     return blend
 
