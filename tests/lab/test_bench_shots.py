@@ -25,6 +25,7 @@ from xrds_lab.shots import equal, figures, film, motions, report, rivals
 from xrds_lab.shots.bench import Measure, bench_shots
 from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
 from xrds_lab.shots.frames import MIDDLE, ShotFrames
+from xrds_lab.shots.seeds import over_seeds
 
 SIZE = (48, 36)
 WINDOW = Window(*SIZE, 0, 0, *SIZE)
@@ -100,6 +101,28 @@ def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
     assert "Cycles + OIDN" in drawn
 
 
+def test_another_seed_is_other_noise_of_the_same_shot(blend: Path) -> None:
+    asked = {"motions": ("still",), "radii": (0,), "pair_samples": 0}
+    first = run(blend, **asked)["shots"]
+    kept = {path.name for path in (blend.parent / "cache").glob("*noisy*")}
+    assert len(kept) == 9
+    assert not any("seed" in name for name in kept)
+    both = run(blend, seeds=2, **asked)["shots"]
+    assert [p for p in both if p["seed"] == 0] == first
+    again = {p["method"]: p["psnr"] for p in both if p["seed"] == 1}
+    assert again.keys() == {p["method"] for p in first}
+    for point in first:
+        assert again[point["method"]] != point["psnr"]
+        assert again[point["method"]] == pytest.approx(point["psnr"], abs=3.0)
+    means = {p["method"]: p for p in over_seeds(both)}
+    for point in first:
+        mean = means[point["method"]]
+        assert mean["psnr"] == pytest.approx(
+            (point["psnr"] + again[point["method"]]) / 2
+        )
+        assert mean["seeds"] == 2
+
+
 def test_a_shot_that_cannot_be_made_leaves_the_others(blend: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     for name in ("Red", "Mirror"):
@@ -116,6 +139,8 @@ def test_what_cannot_be_measured_is_wrong_usage() -> None:
         Measure(samples=(0,))
     with pytest.raises(UsageError, match="radii"):
         Measure(radii=(-1,))
+    with pytest.raises(UsageError, match="seeds 0"):
+        Measure(seeds=0)
 
 
 # --- motions --------------------------------------------------------------------------

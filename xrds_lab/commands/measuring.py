@@ -282,6 +282,12 @@ def _add_shots(group: Any) -> None:
         help="of the frame that flicker under a moving camera is judged by; 0: none",
     )
     add(
+        "--seeds",
+        type=arguments.positive,
+        default=1,
+        help="render each shot so many times, with other noise (default: 1)",
+    )
+    add(
         "--equal",
         action="store_true",
         help="find the samples with which Cycles + OIDN is as good under pan",
@@ -424,6 +430,7 @@ def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
             options.samples or (2,),
             options.radii,
             options.pair_samples,
+            options.seeds,
             equal_quality=options.equal,
             seconds=options.seconds,
             films=options.films,

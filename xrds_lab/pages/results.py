@@ -8,6 +8,8 @@ from functools import cached_property
 from statistics import mean
 from typing import TYPE_CHECKING, Any
 
+from ..shots.seeds import over_seeds
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
     from pathlib import Path
@@ -57,7 +59,8 @@ class Results:
     @cached_property
     def shots(self) -> dict[str, Any]:
         """Shots, when neighbours' light was still compared without halves."""
-        return self._read("shots/results.json")
+        found = self._read("shots/results.json")
+        return found | {"shots": over_seeds(found["shots"])}
 
     @cached_property
     def gains(self) -> Rows:

@@ -25,6 +25,7 @@ from .figures import REACH, Clip, SceneFigures
 from .frames import ShotFrames
 from .motions import MOTIONS
 from .seconds import SceneSeconds
+from .seeds import over_seeds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,14 +51,17 @@ class Measure:
     samples: tuple[int, ...] = SAMPLES
     radii: tuple[int, ...] = RADII
     pair_samples: int = PAIR_SAMPLES
+    seeds: int = 1
     equal_quality: bool = False
     seconds: bool = False
     films: bool = False
     rounds: int = ROUNDS
 
     def __post_init__(self) -> None:
-        for name, least in (("samples", 1), ("radii", 0)):
-            if min(getattr(self, name)) < least:
+        given = {"samples": self.samples, "radii": self.radii, "seeds": (self.seeds,)}
+        for name, values in given.items():
+            least = 0 if name == "radii" else 1
+            if min(values) < least:
                 raise UsageError(f"{name} {getattr(self, name)}: give {least} or more")
 
 
@@ -116,7 +120,13 @@ class _Scene:
 
     def wanted(self, motion: str, samples: int) -> list[FrameRequest]:
         """The frames of one shot that are still to be rendered."""
-        needed = self.figures.requests(motion, samples, self.measure.radii)
+        needed = [
+            request
+            for seed in range(self.measure.seeds)
+            for request in self.figures.requests(
+                motion, samples, self.measure.radii, seed
+            )
+        ]
         return [r for r in needed if not self.frames.has(r)]
 
     def cost(self, cases: Sequence[tuple[str, int]]) -> float:
@@ -129,7 +139,7 @@ class _Scene:
         return sum(missing.values())
 
     def shoot(self, motion: str, samples: int, meter: workload.Meter) -> None:
-        """Render and measure one shot."""
+        """Render and measure one shot, with every seed."""
         what = f"{self.shot.name}: {motion}, {samples} spp"
 
         def done(request: FrameRequest) -> None:
@@ -139,11 +149,12 @@ class _Scene:
         self.pictures.render(halves, self.journal, lambda _: None)
         self.frames.render(self.wanted(motion, samples), self.journal, done)
         with self.journal.attempt(f"{what}, figures"):
-            self.figures.measure(motion, samples, self.measure.radii)
+            for seed in range(self.measure.seeds):
+                self.figures.measure(motion, samples, self.measure.radii, seed)
 
     def compare(self) -> None:
         """Find the samples at which Cycles gives pictures as good."""
-        targets = equal.targets(self.figures.points())
+        targets = equal.targets(over_seeds(self.figures.points()))
         if targets and self.measure.equal_quality:
             best = max(point["psnr"] for point in targets)
             known = equal.curve(self.pictures, self.journal, best)
@@ -188,7 +199,7 @@ def _measured(
                 part.time()
         results = _written(parts, journal, out)
         if measure.films:
-            _films(parts, results["shots"], out)
+            _films(parts, over_seeds(results["shots"]), out)
     finally:
         meter.close()
     return results
@@ -205,6 +216,7 @@ def _films(parts: Sequence[_Scene], points: Sequence[Any], out: Path) -> None:
 
 def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
     points = [point for part in parts for point in part.points()]
+    means = over_seeds(points)
     equals = [entry for part in parts for entry in part.equals]
     results = {
         "settings": {
@@ -218,13 +230,13 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
             for part in parts
         ],
         "shots": points,
-        "equal_quality": equal.with_seconds(equals, points),
+        "equal_quality": equal.with_seconds(equals, means),
         "failures": journal.failures,
     }
     write_json(out / "results.json", results)
     write_table(out / "results.csv", results["shots"])
     for motion in parts[0].measure.motions:
-        svg = plot.error_plot(points, motion)
+        svg = plot.error_plot(means, motion)
         if svg is not None:
             (out / f"error-{motion}.svg").write_bytes(svg)
     report.write(out / "report.md", results)

@@ -28,6 +28,8 @@ from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
 from .motions import MOTIONS
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from xrds_blender.planning.settings import Denoising
     from xrds_core.arrays import Array
     from xrds_core.temporal.frame import Frame
@@ -53,9 +55,15 @@ class Clip:
     """One shot of one scene: the pictures that each method makes of its frames."""
 
     def __init__(
-        self, frames: ShotFrames, motion: str, samples: int, reach: int
+        self,
+        frames: ShotFrames,
+        motion: str,
+        samples: int,
+        reach: int,
+        seed: int = 0,
     ) -> None:
-        wanted = {r.number: r for r in requests(motion, samples, reach)}
+        wanted = {r.number: r for r in requests(motion, samples, reach, seed)}
+        self.motion, self.seed = motion, seed
         self.stops = frames.stops(wanted[MIDDLE])
         self.samples = samples
         self.frames: dict[int, Frame] = {n: frames.frame(r) for n, r in wanted.items()}
@@ -145,37 +153,45 @@ class SceneFigures:
                 point["samples"],
                 [*RIVALS, XRDS].index(point["method"]),
                 point["radius"],
+                point.get("seed", 0),
             )
             if case not in found or f"-pair{self.pair_samples}-" in key:
-                found[case] = dict(point)
+                found[case] = {"seed": 0} | point
         return [found[case] for case in sorted(found)]
 
-    def requests(self, motion: str, samples: int, radii: list[int]) -> list[Any]:
+    def requests(
+        self, motion: str, samples: int, radii: Sequence[int], seed: int = 0
+    ) -> list[FrameRequest]:
         """The frames that these figures need."""
         reaches = sorted({reach_of(radius) for radius in radii} | {REACH})
-        wanted = [r for reach in reaches for r in requests(motion, samples, reach)]
-        return wanted + ([] if self._truth(motion) is None else [self._truth(motion)])
+        wanted = [r for x in reaches for r in requests(motion, samples, x, seed)]
+        return [*wanted, *filter(None, [self._truth(motion)])]
 
     def _truth(self, motion: str) -> FrameRequest | None:
         if motion == "still" or not self.pair_samples:
             return None
         return truth(motion, self.pair_samples)
 
-    def measure(self, motion: str, samples: int, radii: list[int]) -> None:
+    def measure(
+        self, motion: str, samples: int, radii: Sequence[int], seed: int = 0
+    ) -> None:
         """Measure whatever is missing of one shot, and keep it."""
         for reach in sorted({reach_of(radius) for radius in radii} | {REACH}):
             methods = [(XRDS, r) for r in radii if reach_of(r) == reach]
             if reach == REACH:
                 methods = [*RIVALS.items(), *methods]
             left = [
-                m for m in methods if self._key(motion, samples, *m) not in self._known
+                m
+                for m in methods
+                if self._key(motion, samples, seed, *m) not in self._known
             ]
             if left:
-                clip = Clip(self.frames, motion, samples, reach)
+                clip = Clip(self.frames, motion, samples, reach, seed)
                 for method, radius in left:
-                    self._measure(clip, motion, method, radius)
+                    self._measure(clip, method, radius)
 
-    def _measure(self, clip: Clip, motion: str, method: str, radius: int) -> None:
+    def _measure(self, clip: Clip, method: str, radius: int) -> None:
+        motion = clip.motion
         paint, more = self._paint(clip, method, radius)
         reference = self._reference()
         pair = None
@@ -195,12 +211,14 @@ class SceneFigures:
             "method": method,
             "samples": clip.samples,
             "radius": radius,
+            "seed": clip.seed,
             "scale": 1,
             "seconds_per_frame": None,
             **all_metrics(once(MIDDLE), reference, clip.stops),
             "flicker": flicker(once, motion, clip.stops, pair),
         }
-        self._known[self._key(motion, clip.samples, method, radius)] = point | more
+        key = self._key(motion, clip.samples, clip.seed, method, radius)
+        self._known[key] = point | more
         write_json(self._path, self._known)
 
     def _paint(self, clip: Clip, method: str, radius: int) -> tuple[Paint, Figures]:
@@ -214,11 +232,13 @@ class SceneFigures:
             mode = best_mode(clip, self._reference())
         return lambda number: clip.oidn(number, mode), {"mode": str(mode)}
 
-    def _key(self, motion: str, samples: int, method: str, radius: int) -> str:
+    def _key(
+        self, motion: str, samples: int, seed: int, method: str, radius: int
+    ) -> str:
         pair = self.pair_samples if motion != "still" else 0
-        return (
-            f"{motion}-{samples}-{method}-{radius}-pair{pair}-{_code(method == XRDS)}"
-        )
+        other = f"-seed{seed}" if seed else ""
+        what = f"{motion}-{samples}-{method}-{radius}{other}-pair{pair}"
+        return f"{what}-{_code(method == XRDS)}"
 
 
 def best_mode(clip: Clip, reference: Array) -> Denoising:

@@ -30,6 +30,7 @@ REACH = 4
 """Frames to each side of it in a shot of nine, the standard."""
 _STILL_CAMERA = ("still", "objects")
 _PAIR_SEED = 21
+_SEED_STEP = 15_485_863  # larger than seeds of a shot's frames lie apart
 _EXPOSURE = "view_exposure"
 
 
@@ -40,6 +41,7 @@ class FrameRequest:
     `reach` is how many frames the shot has on each side of the middle one: under a
     camera that stands still the part of the sample sequence depends on it. With
     `is_truth` it is rendered to be compared with: by many samples, denoised by Cycles.
+    Another `seed` gives other noise; that of 0 is the file's own.
     """
 
     motion: str
@@ -47,6 +49,7 @@ class FrameRequest:
     number: int
     reach: int = REACH
     is_truth: bool = False
+    seed: int = 0
 
     def file_name(self, shot: Shot) -> str:
         """A name that depends on everything the pixels depend on."""
@@ -55,18 +58,21 @@ class FrameRequest:
         kind = "truth" if self.is_truth else "noisy"
         length = 2 * self.reach + 1
         of = f"of{length}" if self.motion in _STILL_CAMERA and not self.is_truth else ""
-        what = f"{self.motion}-{kind}-{self.samples}spp-{self.number:02}{of}"
+        seed = f"-seed{self.seed}" if self.seed else ""
+        what = f"{self.motion}-{kind}-{self.samples}spp-{self.number:02}{of}{seed}"
         version = bpy.app.version_string.replace(" ", "")
         scene = f"{shot.name}-{shot.digest}-{shot.window.label}"
         return f"{scene}-{what}-v{GENERATION}-blender{version}.npz"
 
 
-def requests(motion: str, samples: int, reach: int) -> list[FrameRequest]:
+def requests(
+    motion: str, samples: int, reach: int, seed: int = 0
+) -> list[FrameRequest]:
     """All noisy frames of a shot, the middle ones first: they count most."""
     numbers = sorted(
         range(MIDDLE - reach, MIDDLE + reach + 1), key=lambda n: abs(n - MIDDLE)
     )
-    return [FrameRequest(motion, samples, number, reach) for number in numbers]
+    return [FrameRequest(motion, samples, n, reach, seed=seed) for n in numbers]
 
 
 def truth(motion: str, samples: int) -> FrameRequest:
@@ -152,7 +158,10 @@ def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]
     from xrds_blender.shot.sampling import noisy_frame
 
     job = render_request(
-        scale=1, samples=request.samples, temporal_radius=request.reach
+        scale=1,
+        samples=request.samples,
+        temporal_radius=request.reach,
+        seed=(scene.cycles.seed + request.seed * _SEED_STEP) % 2**31,
     )
     place = request.number - (MIDDLE - request.reach)
     frames, seconds = call_engine(scene, lambda *given: noisy_frame(*given, job, place))

@@ -9,6 +9,7 @@ from xrds_core.atomic import replacing
 
 from .figures import BEST, DEFAULT, MEDIAN, REACH, XRDS
 from .motions import MOTIONS
+from .seeds import over_seeds
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -45,7 +46,7 @@ def write(path: Path, results: dict[str, Any]) -> None:
 
 def page(results: dict[str, Any]) -> str:
     """The page of `results.json`."""
-    points = results["shots"]
+    points = over_seeds(results["shots"])
     sections = [
         _INTRODUCTION,
         "\n".join(f"- `{name}`: {meaning}." for name, meaning in MOTIONS.items()),
