@@ -20,7 +20,7 @@ from ..bench.pictures import Networks, Pictures
 from ..bench.windows import find_shots
 from ..csv_table import write_table
 from ..progress import report_line
-from . import equal, film, plot, report
+from . import equal, equal_seconds, film, paired, plot, report
 from .figures import REACH, Clip, SceneFigures
 from .frames import ShotFrames
 from .motions import MOTIONS
@@ -214,6 +214,16 @@ def _films(parts: Sequence[_Scene], points: Sequence[Any], out: Path) -> None:
             film.write(out / f"{rank}-{scene}-{motion}-{samples}spp.webp", clip)
 
 
+def compared(points: Sequence[dict[str, Any]]) -> Report:
+    """What `results.json` says of points beside Cycles + OIDN's."""
+    differences = paired.differences(points)
+    return {
+        "differences": differences,
+        "verdicts": paired.verdicts(differences),
+        "equal_seconds": equal_seconds.entries(over_seeds(points)),
+    }
+
+
 def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
     points = [point for part in parts for point in part.points()]
     means = over_seeds(points)
@@ -231,6 +241,7 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
         ],
         "shots": points,
         "equal_quality": equal.with_seconds(equals, means),
+        **compared(points),
         "failures": journal.failures,
     }
     write_json(out / "results.json", results)

@@ -1,0 +1,148 @@
+"""Sections of the page that compare with Cycles + OIDN: how sure, by which measure."""
+
+from __future__ import annotations
+
+import statistics
+from typing import TYPE_CHECKING, Any
+
+from .figures import DEFAULT, REACH, XRDS
+from .paired import LEVEL, MEASURES
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping, Sequence
+
+    Row = dict[str, Any]
+
+NAMES = {XRDS: "XRDS", DEFAULT: "Cycles + OIDN"}
+_COUNTS = {2: "both", 3: "all three", 4: "all four"}
+
+
+def sections(results: Mapping[str, Any]) -> Iterator[str]:
+    """The sections, as Markdown, of what `results.json` holds beside its points."""
+    yield from _sureness(results["differences"])
+    yield from _verdicts(results["verdicts"])
+    yield from _equal_seconds(results["equal_seconds"])
+
+
+def _sureness(differences: Sequence[Row]) -> Iterator[str]:
+    shots: dict[tuple[str, int], dict[str, Row]] = {}
+    for entry in differences:
+        if (entry["method"], entry["radius"]) == (XRDS, REACH):
+            shot = shots.setdefault((entry["motion"], entry["samples"]), {})
+            shot[entry["measure"]] = entry
+    if not shots:
+        return
+    yield "## How sure the differences are"
+    yield (
+        f"XRDS at radius {REACH} against Cycles + OIDN's default, scene by scene: the "
+        f"mean difference, its {LEVEL} % interval in brackets, and the worst scene. "
+        "PSNR's is in dB, others are ratios and their mean is geometric. Intervals are "
+        "of a bootstrap over scenes, and over seeds where there are several: they tell "
+        "of scenes like these alone, and of so few are rather too narrow. *Between "
+        "seeds*: the standard deviation of one scene's difference in PSNR."
+    )
+    lines = [
+        f"| camera, samples per frame | seeds | {' | '.join(MEASURES.values())} "
+        "| between seeds |",
+        "|---|---|" + "---|" * (len(MEASURES) + 1),
+    ]
+    for (motion, samples), found in shots.items():
+        cells = [_difference(found.get(measure)) for measure in MEASURES]
+        spread = found["psnr"]["between_seeds"]
+        seeds = found["psnr"]["seeds"]
+        cells = [f"{motion}, {samples}", str(seeds), *cells, _optional(spread)]
+        lines.append(f"| {' | '.join(cells)} |")
+    yield "\n".join(lines)
+
+
+def _difference(entry: Row | None) -> str:
+    if entry is None:
+        return "-"
+    form = "{:+.2f}" if entry["measure"] == "psnr" else "{:.2f}"
+    mean, worst = form.format(entry["mean"]), form.format(entry["worst"])
+    bounds = ""
+    if entry["low"] is not None:
+        bounds = f" ({form} to {form})".format(entry["low"], entry["high"])
+    return f"{mean}{bounds}, {worst} {entry['worst_scene']}"
+
+
+def _optional(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
+
+
+# --- who wins -------------------------------------------------------------------------
+
+
+def _verdicts(verdicts: Sequence[Row]) -> Iterator[str]:
+    if not verdicts:
+        return
+    yield "## Whether the measures agree"
+    yield (
+        f"Whose error is smaller on the mean, XRDS' at radius {REACH} or that of "
+        "Cycles + OIDN's default; and in which scenes a measure says otherwise."
+    )
+    yield "\n".join(f"- {sentence(verdict)}" for verdict in verdicts)
+
+
+def sentence(verdict: Row) -> str:
+    """What the measures say of one shot, and in which scenes they say otherwise."""
+    others = [f"{scene} ({_said(wins)})" for scene, wins in verdict["scenes"].items()]
+    where = f"; otherwise in {', '.join(others)}" if others else ", in every scene"
+    shot = f"`{verdict['motion']}`, {verdict['samples']}"
+    return f"{shot}: {_said(verdict['wins'])}{where}."
+
+
+def _said(wins: Mapping[str, bool]) -> str:
+    sides = {
+        NAMES[method]: [MEASURES[x] for x, ours in wins.items() if ours == is_ours]
+        for method, is_ours in ((XRDS, True), (DEFAULT, False))
+    }
+    for name, measures in sides.items():
+        if len(measures) == len(wins) > 1:
+            return f"{_COUNTS[len(wins)]} agree on {name}"
+    told = (f"{_listed(found)} for {name}" for name, found in sides.items() if found)
+    return ", ".join(told)
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
+
+
+# --- equal seconds --------------------------------------------------------------------
+
+
+def _equal_seconds(entries: Sequence[Row]) -> Iterator[str]:
+    if all(entry["gain"] is None for entry in entries):
+        return
+    yield "## Equal seconds"
+    yield (
+        f"PSNR at the seconds per frame of one method, XRDS at radius {REACH} or "
+        "Cycles + OIDN's default, and what the other has in as many: read from its own "
+        "frontier over samples, straight lines over the logarithm of seconds. Nothing "
+        "is extrapolated: only scenes where the other was timed on both sides count."
+    )
+    shots = dict.fromkeys((e["motion"], e["at"], e["samples"]) for e in entries)
+    lines = []
+    for motion, at, samples in shots:
+        asked = {"motion": motion, "at": at, "samples": samples}
+        here = [e for e in entries if asked.items() <= e.items()]
+        lines.append(f"- {_told(here)}")
+    yield "\n".join(lines)
+
+
+def _told(entries: Sequence[Row]) -> str:
+    """What two methods have in equal seconds, of the scenes of one shot."""
+    first = entries[0]
+    at, other = first["at"], DEFAULT if first["at"] == XRDS else XRDS
+    known = [e for e in entries if e["gain"] is not None]
+    of = f"`{first['motion']}`: at the seconds of {NAMES[at]} with {first['samples']} "
+    if not known:
+        return f"{of}samples, {NAMES[other]} was not timed on both sides."
+    own, theirs = (statistics.fmean(e[x] for e in known) for x in (at, other))
+    gain = statistics.fmean(e["gain"] for e in known)
+    worst = min(known, key=lambda e: e["gain"])
+    return (
+        f"{of}samples ({own:.2f} dB), {NAMES[other]} has {theirs:.2f} dB: XRDS "
+        f"{gain:+.2f}, worst {worst['gain']:+.2f} {worst['scene']} "
+        f"({len(known)} of {len(entries)} scenes)."
+    )
