@@ -72,6 +72,9 @@ def test_a_second_run_renders_nothing_and_gives_the_same_files(
         assert len(list(csv.DictReader(file))) == len(points)
     assert "| pan, 2 | 1 | +" in (out / "report.md").read_text()
     assert len(list(out.glob("best-cubes-*-2spp.webp"))) == 1
+    crops = list((blend.parent / "cache").glob("*-crop-*.webp"))
+    assert len(crops) == len(points) + 2  # the references of two motions
+    assert (out / "report.html").read_text().count("data:image/webp") > 2
 
     def refuse(*_: Any) -> None:
         raise AssertionError("measured again")
@@ -81,7 +84,7 @@ def test_a_second_run_renders_nothing_and_gives_the_same_files(
     # what an earlier call has measured stays in the report
     again = run(blend, "again", radii=(0,), **(asked | {"films": False}))
     assert again == first
-    for name in ("results.json", "results.csv", "report.md"):
+    for name in ("results.json", "results.csv", "report.md", "report.html"):
         assert (out / name).read_bytes() == (blend.parent / "again" / name).read_bytes()
 
 
@@ -121,6 +124,8 @@ def test_another_seed_is_other_noise_of_the_same_shot(blend: Path) -> None:
             (point["psnr"] + again[point["method"]]) / 2
         )
         assert mean["seeds"] == 2
+    crops = list((blend.parent / "cache").glob("*-crop-*.webp"))
+    assert len(crops) == len(first) + 1  # other noise of the same place tells no more
 
 
 def test_a_shot_that_cannot_be_made_leaves_the_others(blend: Path) -> None:

@@ -20,7 +20,7 @@ from ..bench.pictures import Networks, Pictures
 from ..bench.windows import find_shots
 from ..csv_table import write_table
 from ..progress import report_line
-from . import equal, equal_seconds, film, paired, plot, report
+from . import equal, equal_seconds, film, page, paired, plot, report
 from .figures import REACH, Clip, SceneFigures
 from .frames import ShotFrames
 from .motions import MOTIONS
@@ -250,5 +250,7 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
         svg = plot.error_plot(means, motion)
         if svg is not None:
             (out / f"error-{motion}.svg").write_bytes(svg)
+    crops = {k: p for part in parts for k, p in part.figures.kept_crops().items()}
+    page.write(out / "report.html", results, crops)
     report.write(out / "report.md", results)
     return results

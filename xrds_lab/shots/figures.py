@@ -15,6 +15,7 @@ import numpy as np
 
 import xrds_core
 from xrds_blender.planning.request import render_request
+from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.atomic import write_json
@@ -24,6 +25,7 @@ from xrds_core.temporal.window import Shot
 from ..checksum import checksum
 from ..metrics import all_metrics, to_srgb
 from . import rivals
+from .crops import REFERENCE, SceneCrops, crop_key
 from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
 from .motions import MOTIONS
 
@@ -33,6 +35,8 @@ if TYPE_CHECKING:
     from xrds_blender.planning.settings import Denoising
     from xrds_core.arrays import Array
     from xrds_core.temporal.frame import Frame
+
+    from .crops import Key
 
     Figures = dict[str, Any]
     Paint = Callable[[int], Array]
@@ -135,8 +139,10 @@ class SceneFigures:
         self.pair_samples = pair_samples
         shot = frames.shot
         own = "own" if shot.reference is None else shot.reference.stem
-        name = f"{shot.name}-{shot.digest}-{shot.window.label}-{own}-shots.json"
-        self._path = frames.folder.directory / name
+        name = f"{shot.name}-{shot.digest}-{shot.window.label}-{own}-shots"
+        directory = frames.folder.directory
+        self._path = directory / f"{name}.json"
+        self.crops = SceneCrops(directory, name)
         self._known: dict[str, Figures] = _stored(self._path)
 
     def points(self) -> list[Figures]:
@@ -144,7 +150,25 @@ class SceneFigures:
 
         Of those with other pairs of references one each: this one's, if there is any.
         """
-        found: dict[tuple[Any, ...], Figures] = {}
+        return [{"seed": 0} | self._known[key] for key in self._current()]
+
+    def kept_crops(self) -> dict[Key, Path]:
+        """The crops of points and references that there are."""
+        scene = self.frames.shot.name
+        own = {
+            crop_key(self._known[key]): self.crops.path(key)
+            for key in self._current()
+            if not self._known[key].get("seed")
+        }
+        true = {
+            (scene, motion, *REFERENCE): path
+            for motion, path in self.crops.references().items()
+        }
+        return {key: path for key, path in (own | true).items() if path.is_file()}
+
+    def _current(self) -> list[str]:
+        """Keys of the points."""
+        found: dict[tuple[Any, ...], str] = {}
         for key, point in self._known.items():
             if not key.endswith(_code(point["method"] == XRDS)):
                 continue
@@ -156,7 +180,7 @@ class SceneFigures:
                 point.get("seed", 0),
             )
             if case not in found or f"-pair{self.pair_samples}-" in key:
-                found[case] = {"seed": 0} | point
+                found[case] = key
         return [found[case] for case in sorted(found)]
 
     def requests(
@@ -187,8 +211,15 @@ class SceneFigures:
             ]
             if left:
                 clip = Clip(self.frames, motion, samples, reach, seed)
+                self._place_crops(clip)
                 for method, radius in left:
                     self._measure(clip, method, radius)
+
+    def _place_crops(self, clip: Clip) -> None:
+        """Find where crops are, with the two methods that pages set side by side."""
+        if not self.crops.has_place(clip.motion):
+            pair = clip.xrds(MIDDLE, REACH), clip.oidn(MIDDLE, DEFAULT_DENOISING)
+            self.crops.settle(clip.motion, pair, self._reference(), clip.stops)
 
     def _measure(self, clip: Clip, method: str, radius: int) -> None:
         motion = clip.motion
@@ -218,6 +249,8 @@ class SceneFigures:
             "flicker": flicker(once, motion, clip.stops, pair),
         }
         key = self._key(motion, clip.samples, clip.seed, method, radius)
+        if not clip.seed:  # others show the same place with other noise
+            self.crops.keep(key, motion, once(MIDDLE), clip.stops)
         self._known[key] = point | more
         write_json(self._path, self._known)
 
@@ -227,7 +260,7 @@ class SceneFigures:
             return lambda number: clip.xrds(number, radius), {}
         if method == MEDIAN:
             return clip.median, {}
-        mode = rivals.DEFAULT_DENOISING
+        mode = DEFAULT_DENOISING
         if method == BEST:
             mode = best_mode(clip, self._reference())
         return lambda number: clip.oidn(number, mode), {"mode": str(mode)}

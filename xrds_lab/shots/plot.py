@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     Point = dict[str, Any]
 
 # Colour, line and mark differ each by itself: readable in grey and by the colour-blind.
-_LINES = {
+LINES = {
     (DEFAULT, 0): ("Cycles + OIDN", "#d55e00", "--", "s"),
     (BEST, 0): ("Cycles + OIDN, best mode", "#000000", "-", "o"),
     (MEDIAN, 1): ("median of three", "#cc79a7", "-.", "^"),
@@ -38,7 +38,7 @@ def error_plot(points: Sequence[Point], motion: str) -> bytes | None:
     title = f"shots, `{motion}`: median of {len(scenes)} scenes"
     figure, panels = two_panels(title, "seconds of a whole frame")
     drawn = False
-    for (method, radius), (name, colour, dash, mark) in _LINES.items():
+    for (method, radius), (name, colour, dash, mark) in LINES.items():
         own = [p for p in timed if (p["method"], p["radius"]) == (method, radius)]
         counts = sorted({p["samples"] for p in own})
         groups = [[p for p in own if p["samples"] == n] for n in counts]
