@@ -14,6 +14,7 @@ import pytest
 from mathutils import Matrix
 
 from xrds_blender import run_job
+from xrds_blender.command import main
 from xrds_blender.cycles.samples import sample_layer
 from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
@@ -21,7 +22,7 @@ from xrds_blender.planning.settings import CYCLES_DENOISING
 from xrds_core.errors import SceneError, UsageError
 from xrds_core.temporal.frame import Camera, Frame
 from xrds_lab.bench.windows import Window
-from xrds_lab.shots import equal, figures, film, motions, report, rivals
+from xrds_lab.shots import bench, equal, figures, film, motions, report, rivals
 from xrds_lab.shots.bench import Measure, bench_shots
 from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
 from xrds_lab.shots.frames import MIDDLE, ShotFrames
@@ -146,6 +147,22 @@ def test_what_cannot_be_measured_is_wrong_usage() -> None:
         Measure(radii=(-1,))
     with pytest.raises(UsageError, match="seeds 0"):
         Measure(seeds=0)
+
+
+def test_the_command_passes_on_what_is_measured(
+    blend: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked = []
+
+    def note(scenes: Any, out: Path, measure: Measure, **_: Any) -> dict[str, Any]:
+        asked.append(measure)
+        return {"shots": [], "failures": {}}
+
+    monkeypatch.setattr(bench, "bench_shots", note)
+    given = ["bench", str(blend), "--shots", "-o", str(tmp_path), "--samples", "4"]
+    assert main.main([*given, "--seeds", "3"]) == 0
+    assert main.main(given) == 0
+    assert [(m.samples, m.seeds) for m in asked] == [((4,), 3), ((4,), 1)]
 
 
 # --- motions --------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from xrds_lab.shots import comparison, equal_seconds, paired
+from xrds_lab.shots import comparison, equal_seconds, paired, verdicts
 from xrds_lab.shots.bench import compared
 from xrds_lab.shots.figures import DEFAULT, REACH, XRDS
 
@@ -105,8 +105,8 @@ def test_the_spread_between_seeds_is_within_scenes() -> None:
 
 
 def sentences(points: list[dict[str, Any]]) -> list[str]:
-    verdicts = paired.verdicts(paired.differences(points))
-    return [comparison.sentence(verdict) for verdict in verdicts]
+    found = verdicts.verdicts(paired.differences(points))
+    return [verdicts.sentence(verdict) for verdict in found]
 
 
 def test_measures_that_agree_say_so() -> None:

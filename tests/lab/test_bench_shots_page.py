@@ -215,6 +215,14 @@ answer({ count, crops: places.crops.words, plot: places.plot.words });
     assert "No frames of these were timed" in told["plot"]
 
 
+def test_one_scene_is_shown_as_it_is(tmp_path: Path) -> None:
+    found = [p for p in points() if p["scene"] == "house"]
+    page.write(tmp_path / "report.html", results(found), {})
+    asks = 'marks()[2].fire("mouseenter"); answer(places.told.words);'
+    told = run_page(tmp_path / "report.html", ASKS + asks)
+    assert "2 samples per frame, pan, house" in told
+
+
 # --- crops ----------------------------------------------------------------------------
 
 

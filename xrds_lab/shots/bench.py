@@ -20,7 +20,7 @@ from ..bench.pictures import Networks, Pictures
 from ..bench.windows import find_shots
 from ..csv_table import write_table
 from ..progress import report_line
-from . import equal, equal_seconds, film, page, paired, plot, report
+from . import equal, equal_seconds, film, page, paired, plot, report, verdicts
 from .figures import REACH, Clip, SceneFigures
 from .frames import ShotFrames
 from .motions import MOTIONS
@@ -219,7 +219,7 @@ def compared(points: Sequence[dict[str, Any]]) -> Report:
     differences = paired.differences(points)
     return {
         "differences": differences,
-        "verdicts": paired.verdicts(differences),
+        "verdicts": verdicts.verdicts(differences),
         "equal_seconds": equal_seconds.entries(over_seeds(points)),
     }
 

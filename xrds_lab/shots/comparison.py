@@ -7,14 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from .figures import DEFAULT, REACH, XRDS
 from .paired import LEVEL, MEASURES
+from .verdicts import NAMES, sentence
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
     Row = dict[str, Any]
-
-NAMES = {XRDS: "XRDS", DEFAULT: "Cycles + OIDN"}
-_COUNTS = {2: "both", 3: "all three", 4: "all four"}
 
 
 def sections(results: Mapping[str, Any]) -> Iterator[str]:
@@ -82,30 +80,6 @@ def _verdicts(verdicts: Sequence[Row]) -> Iterator[str]:
         "Cycles + OIDN's default; and in which scenes a measure says otherwise."
     )
     yield "\n".join(f"- {sentence(verdict)}" for verdict in verdicts)
-
-
-def sentence(verdict: Row) -> str:
-    """What the measures say of one shot, and in which scenes they say otherwise."""
-    others = [f"{scene} ({_said(wins)})" for scene, wins in verdict["scenes"].items()]
-    where = f"; otherwise in {', '.join(others)}" if others else ", in every scene"
-    shot = f"`{verdict['motion']}`, {verdict['samples']}"
-    return f"{shot}: {_said(verdict['wins'])}{where}."
-
-
-def _said(wins: Mapping[str, bool]) -> str:
-    sides = {
-        NAMES[method]: [MEASURES[x] for x, ours in wins.items() if ours == is_ours]
-        for method, is_ours in ((XRDS, True), (DEFAULT, False))
-    }
-    for name, measures in sides.items():
-        if len(measures) == len(wins) > 1:
-            return f"{_COUNTS[len(wins)]} agree on {name}"
-    told = (f"{_listed(found)} for {name}" for name, found in sides.items() if found)
-    return ", ".join(told)
-
-
-def _listed(words: Sequence[str]) -> str:
-    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
 
 
 # --- equal seconds --------------------------------------------------------------------

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .figures import DEFAULT, REACH, XRDS
+from .figures import DEFAULT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -143,44 +143,3 @@ def _resampled(rng: np.random.Generator, values: Array, count: int) -> Array:
     if len(values) == 1:
         return np.repeat(values, count)
     return values[rng.integers(len(values), size=(count, len(values)))].mean(axis=1)
-
-
-# --- who wins -------------------------------------------------------------------------
-
-
-def verdicts(found: Iterable[Difference]) -> list[dict[str, Any]]:
-    """Who has the smaller error by each measure: XRDS or Cycles + OIDN, of each shot.
-
-    `wins` says by measure whether XRDS does on the mean; `scenes` the same of those
-    scenes where a measure says otherwise.
-    """
-    shots: dict[tuple[str, int], list[Difference]] = {}
-    for entry in found:
-        if (entry["method"], entry["radius"]) == (XRDS, REACH):
-            shots.setdefault((entry["motion"], entry["samples"]), []).append(entry)
-    return [
-        {"motion": motion, "samples": samples, **_verdict(entries)}
-        for (motion, samples), entries in shots.items()
-    ]
-
-
-def _verdict(entries: Sequence[Difference]) -> dict[str, Any]:
-    mean = {e["measure"]: better(e["mean"], e["measure"]) for e in entries}
-    names = list(dict.fromkeys(scene for e in entries for scene in e["scenes"]))
-    scenes = {
-        name: {
-            e["measure"]: better(e["scenes"][name], e["measure"])
-            for e in entries
-            if name in e["scenes"]
-        }
-        for name in names
-    }
-    others = {
-        name: wins for name, wins in scenes.items() if not wins.items() <= mean.items()
-    }
-    return {"wins": mean, "scenes": others}
-
-
-def better(difference: float, measure: str) -> bool:
-    """Whether a difference is for the method and against Cycles + OIDN."""
-    return difference > 0.0 if measure == "psnr" else difference < 1.0
