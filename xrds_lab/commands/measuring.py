@@ -293,6 +293,12 @@ def _add_shots(group: Any) -> None:
         help="find the samples with which Cycles + OIDN is as good under pan",
     )
     add("--seconds", action="store_true", help="time whole frames; on a quiet machine")
+    add(
+        "--seconds-resolution",
+        type=arguments.size,
+        metavar="WxH",
+        help="of the frames that are timed; the files' own",
+    )
     add("--films", action="store_true", help="also the best and the worst shot as WebP")
 
 
@@ -433,6 +439,7 @@ def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
             options.seeds,
             equal_quality=options.equal,
             seconds=options.seconds,
+            seconds_at=options.seconds_resolution,
             films=options.films,
             rounds=options.rounds,
         ),

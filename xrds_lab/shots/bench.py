@@ -54,6 +54,7 @@ class Measure:
     seeds: int = 1
     equal_quality: bool = False
     seconds: bool = False
+    seconds_at: tuple[int, int] | None = None  # width, height; the shots' own
     films: bool = False
     rounds: int = ROUNDS
 
@@ -116,7 +117,9 @@ class _Scene:
         self.figures = SceneFigures(
             self.frames, self.pictures.reference, self.measure.pair_samples
         )
-        self.seconds = SceneSeconds(self.shot, self.folder.directory)
+        self.seconds = SceneSeconds(
+            self.shot, self.folder.directory, self.measure.seconds_at
+        )
 
     def wanted(self, motion: str, samples: int) -> list[FrameRequest]:
         """The frames of one shot that are still to be rendered."""
@@ -233,6 +236,7 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
             "middle": "the file's own view",
             "pair_samples": parts[0].measure.pair_samples,
             "radius": REACH,
+            "seconds_resolution": parts[0].measure.seconds_at,
         },
         "machine": machine.describe(),
         "scenes": [

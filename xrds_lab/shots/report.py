@@ -54,7 +54,7 @@ def page(results: dict[str, Any]) -> str:
         *_gains(points),
         *comparison.sections(results),
         *_equal(results["equal_quality"]),
-        *_seconds(points),
+        *_seconds(points, results["settings"].get("seconds_resolution")),
         *_by_scene(points),
         *_failures(results["failures"]),
     ]
@@ -189,12 +189,13 @@ def _needed(entry: dict[str, Any] | None) -> str:
     return f"{needed:.1f} ({needed / entry['samples']:.1f})"
 
 
-def _seconds(points: Sequence[Point]) -> Iterator[str]:
+def _seconds(points: Sequence[Point], size: Sequence[int] | None) -> Iterator[str]:
     known = [p for p in points if p["seconds_per_frame"] and p["motion"] == "pan"]
     if not known:
         return
     yield "## Seconds per frame"
-    yield "Of whole frames, all that the user waits for; medians of runs in turns."
+    of = "whole frames" if size is None else f"frames of {size[0]}x{size[1]}"
+    yield f"Of {of}, all that the user waits for; medians of runs in turns."
     scenes = list(dict.fromkeys(p["scene"] for p in known))
     lines = [
         "| method, samples | " + " | ".join(scenes) + " |",

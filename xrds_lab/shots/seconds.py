@@ -14,6 +14,7 @@ from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.atomic import write_json
 
 from ..bench.inputs import open_scene
+from ..bench.windows import Window
 from .figures import DEFAULT, XRDS
 from .frames import MIDDLE
 from .motions import animate
@@ -33,11 +34,21 @@ T = TypeVar("T")
 
 
 class SceneSeconds:
-    """Seconds by method, samples and radius of one scene, kept in a file."""
+    """Seconds by method, samples and radius of one scene, kept in a file.
 
-    def __init__(self, shot: Shot, directory: Path) -> None:
-        self.shot = shot
-        self._path = directory / f"{shot.identity}-shot-seconds.json"
+    Frames are whole, of `resolution` where it is given: half the width and height take
+    a quarter of the seconds, whatever the method.
+    """
+
+    def __init__(
+        self, shot: Shot, directory: Path, resolution: tuple[int, int] | None = None
+    ) -> None:
+        window = shot.window.whole
+        if resolution is not None:
+            window = Window(*resolution, 0, 0, *resolution)
+        self.shot, self.window = shot, window
+        name = f"{shot.identity}-{window.label}-shot-seconds.json"
+        self._path = directory / name
         self.known: dict[str, Timed] = {}
         if self._path.is_file():
             self.known = json.loads(self._path.read_text("utf-8"))
@@ -52,18 +63,20 @@ class SceneSeconds:
         known = self.known.setdefault(str(samples), {})
         left = [r for r in radii if _name(XRDS, r) not in known]
         if left or _name(DEFAULT, 0) not in known:
-            known |= timed(self.shot, samples, left, rounds)
+            known |= timed(self.shot.path, self.window, samples, left, rounds)
             write_json(self._path, self.known)
 
 
-def timed(shot: Shot, samples: int, radii: Sequence[int], rounds: int) -> Timed:
-    """Time a panning shot of whole frames: seconds by stage, `total` and `cpu`."""
+def timed(
+    path: Path, window: Window, samples: int, radii: Sequence[int], rounds: int
+) -> Timed:
+    """Time a panning shot: seconds of a frame by stage, `total` and `cpu`."""
     from xrds_blender import render
     from xrds_blender.planning.request import render_request
 
     reach = max(*radii, rounds // 2, 1)
-    scene = open_scene(shot.path, shot.window.whole)
-    animate(scene, shot.window, "pan", MIDDLE, reach)
+    scene = open_scene(path, window)
+    animate(scene, window, "pan", MIDDLE, reach)
     job = render_request(scale=1, samples=samples, temporal_radius=reach)
     plain = {"plain": True, "samples": samples, "denoiser": DEFAULT_DENOISING}
     sampled: dict[int, Stored] = {}
