@@ -20,7 +20,18 @@ from ..bench.pictures import Networks, Pictures
 from ..bench.windows import find_shots
 from ..csv_table import write_table
 from ..progress import report_line
-from . import equal, equal_seconds, film, page, paired, plot, report, verdicts
+from . import (
+    answer,
+    equal,
+    equal_seconds,
+    estimate,
+    film,
+    page,
+    paired,
+    plot,
+    report,
+    verdicts,
+)
 from .figures import REACH, Clip, SceneFigures
 from .frames import ShotFrames
 from .motions import MOTIONS
@@ -141,6 +152,10 @@ class _Scene:
         }
         return sum(missing.values())
 
+    def left(self, cases: Sequence[tuple[str, int]]) -> float:
+        """What is to be rendered, references too, in the unit of `cost`."""
+        return self.cost(cases) + sum(r.samples for r in self.pictures.missing([]))
+
     def shoot(self, motion: str, samples: int, meter: workload.Meter) -> None:
         """Render and measure one shot, with every seed."""
         what = f"{self.shot.name}: {motion}, {samples} spp"
@@ -189,6 +204,10 @@ def _measured(
 ) -> Report:
     """Shot by shot, each of all scenes, with a report of what is done after each."""
     cases = [(m, n) for m in measure.motions for n in measure.samples]
+    left = {part.shot: part.left(cases) for part in parts}
+    left = {shot: units for shot, units in left.items() if units}
+    if left:
+        report_line(estimate.sentence(left))
     meter = workload.Meter(sum(part.cost(cases) for part in parts))
     journal.progress = meter.write
     try:
@@ -257,4 +276,5 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
     crops = {k: p for part in parts for k, p in part.figures.kept_crops().items()}
     page.write(out / "report.html", results, crops)
     report.write(out / "report.md", results)
+    answer.write(out, means, results["equal_seconds"], crops)
     return results
