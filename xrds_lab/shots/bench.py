@@ -270,7 +270,7 @@ def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
     write_json(out / "results.json", results)
     write_table(out / "results.csv", results["shots"])
     for motion in parts[0].measure.motions:
-        svg = plot.error_plot(means, motion)
+        svg = plot.error_plot(means, motion, parts[0].measure.seconds_at)
         if svg is not None:
             (out / f"error-{motion}.svg").write_bytes(svg)
     crops = {k: p for part in parts for k, p in part.figures.kept_crops().items()}

@@ -27,16 +27,21 @@ LINES = {
 _FROM, _TO = 5, 95  # percentiles over scenes
 
 
-def error_plot(points: Sequence[Point], motion: str) -> bytes | None:
+def error_plot(
+    points: Sequence[Point], motion: str, resolution: Sequence[int] | None = None
+) -> bytes | None:
     """SVG of medians over scenes, with the 5th to 95th percentile of errors.
 
     A line joins the samples per pixel at which all scenes were timed; None where there
-    are none.
+    are none. `resolution` is that of the frames that were timed, whole ones with None.
     """
     timed = [p for p in points if p["motion"] == motion and p["seconds_per_frame"]]
     scenes = {p["scene"] for p in timed}
     title = f"shots, `{motion}`: median of {len(scenes)} scenes"
-    figure, panels = two_panels(title, "seconds of a whole frame")
+    frame = (
+        "whole frame" if resolution is None else "frame of {}x{}".format(*resolution)
+    )
+    figure, panels = two_panels(title, f"seconds of a {frame}")
     drawn = False
     for (method, radius), (name, colour, dash, mark) in LINES.items():
         own = [p for p in timed if (p["method"], p["radius"]) == (method, radius)]
