@@ -250,8 +250,8 @@ def _add_shots(group: Any) -> None:
     add(
         "--motions",
         type=arguments.names((*MOTIONS, FILE)),
-        help=f"of {', '.join(MOTIONS)}; all, with --same-picture pan, or {FILE}: "
-        "the file's own around its current frame",
+        help=f"of {', '.join(MOTIONS)}; all, with --same-picture pan; or {FILE}: "
+        "what the file itself animates around its current frame",
     )
     add(
         "--samples",
@@ -413,14 +413,11 @@ def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
 def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
     from ..shots.bench import Measure, bench_shots
 
-    motions = options.motions or MOTIONS
-    if FILE in motions:
-        raise UsageError(f"--motions {FILE} is measured by --same-picture alone")
     return bench_shots(
         options.scenes,
         options.out,
         Measure(
-            motions,
+            options.motions or MOTIONS,
             options.samples or (2,),
             options.radii,
             options.pair_samples,

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.atomic import replacing
 
+from . import blocks
 from .figures import BEST, DEFAULT, MEDIAN, REACH, XRDS
 from .motions import MOTIONS
 
@@ -50,6 +51,7 @@ def page(results: dict[str, Any]) -> str:
         _INTRODUCTION,
         "\n".join(f"- `{name}`: {meaning}." for name, meaning in MOTIONS.items()),
         *_gains(points),
+        *blocks.section(points),
         *_equal(results["equal_quality"]),
         *_seconds(points),
         *_by_scene(points),
