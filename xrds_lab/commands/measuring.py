@@ -210,7 +210,8 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         "--growth",
         type=arguments.sizes,
         default=(),
-        help="frames, as 512x512,1920x1080",
+        help="frames, as 512x512,1920x1080: how seconds and memory grow; with --shots "
+        "those of finishing a frame, and of a shot of small frames",
     )
     add(
         "--noise-thresholds",
@@ -411,6 +412,16 @@ def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
+    if options.growth:
+        from ..shots.growth import SMALL, bench_growth
+
+        return bench_growth(
+            options.scenes[0],
+            options.out,
+            options.growth,
+            cache=options.cache,
+            small=options.resolution or SMALL,
+        )
     from ..shots.bench import Measure, bench_shots
 
     return bench_shots(
