@@ -7,10 +7,9 @@ from typing import Any
 
 import pytest
 
-from xrds_blender.command import main
 from xrds_core.errors import UsageError
 from xrds_lab.bench.windows import find_shots
-from xrds_lab.shots import sooner
+from xrds_lab.shots import motions, sooner
 from xrds_lab.shots.sooner import CYCLES, SAME_PICTURE, SAME_SAMPLES, Case
 
 SIZE = (64, 48)
@@ -61,12 +60,7 @@ def test_a_file_may_move_as_it_says(blend: Path) -> None:
     ends = [
         (scene.frame_start, scene.frame_end, scene.camera.animation_data is None)
         for scene in (
-            sooner._opened(shot, Case(motion, 8), 8) for motion in (sooner.FILE, "pan")
+            sooner._opened(shot, Case(motion, 8), 8) for motion in (motions.FILE, "pan")
         )
     ]
     assert ends == [(1, 250, True), (1, 17, False)]
-
-
-def test_other_measures_refuse_it(blend: Path, tmp_path: Path) -> None:
-    given = ["bench", str(blend), "--shots", "--motions", "file", "-o", str(tmp_path)]
-    assert main.main(given) == 2

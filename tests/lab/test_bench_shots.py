@@ -21,11 +21,21 @@ from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.settings import CYCLES_DENOISING
 from xrds_core.errors import SceneError, UsageError
 from xrds_core.temporal.frame import Camera, Frame
-from xrds_lab.bench.windows import Window
-from xrds_lab.shots import bench, equal, figures, film, motions, report, rivals
+from xrds_lab.bench.inputs import Folder
+from xrds_lab.bench.windows import Window, find_shots
+from xrds_lab.shots import (
+    bench,
+    blocks,
+    equal,
+    figures,
+    film,
+    motions,
+    report,
+    rivals,
+)
 from xrds_lab.shots.bench import Measure, bench_shots
 from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
-from xrds_lab.shots.frames import MIDDLE, ShotFrames
+from xrds_lab.shots.frames import MIDDLE, ShotFrames, requests
 from xrds_lab.shots.seeds import over_seeds
 
 SIZE = (48, 36)
@@ -131,6 +141,28 @@ def test_another_seed_is_other_noise_of_the_same_shot(blend: Path) -> None:
     assert len(crops) == len(first) + 1  # other noise of the same place tells no more
 
 
+def test_a_file_moves_as_it_says_around_its_current_frame(blend: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    for frame, x in ((1, -0.5), (41, 0.5)):
+        scene.camera.location.x = x
+        scene.camera.keyframe_insert("location", frame=frame)
+    scene.frame_set(21)
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    result = run(blend, motions=(motions.FILE,), radii=(0, 4))
+    assert result["failures"] == {}
+    assert {p["motion"] for p in result["shots"]} == {"file"}
+    assert gain(result["shots"], "file", 4) > 0.5
+    assert all(p["flicker"] > 0 for p in result["shots"])
+    (shot,) = find_shots([blend], None, None, SIZE)
+    frames = ShotFrames(shot, Folder(blend.parent / "cache"))
+    made = [frames.frame(r) for r in requests(motions.FILE, 2, 4)]
+    at = {f.number: np.linalg.inv(f.camera.view)[0, 3] for f in made}
+    assert sorted(at) == list(range(17, 26))
+    assert at[21] == pytest.approx(0.0, abs=1e-6)
+    assert at[17] < at[21] < at[25]
+
+
 def test_a_shot_that_cannot_be_made_leaves_the_others(blend: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     for name in ("Red", "Mirror"):
@@ -167,6 +199,31 @@ def test_the_command_passes_on_what_is_measured(
     assert [(m.samples, m.seeds) for m in asked] == [((4,), 3), ((4,), 1)]
 
 
+# --- blocks ---------------------------------------------------------------------------
+
+
+def test_a_block_that_loses_is_found_in_a_picture_that_gains() -> None:
+    noise = np.random.default_rng(0).normal(0, 0.01, (4, 96, 128, 3))
+    alone, picture, *truth = (
+        0.3 + noise * [[[[4]]], [[[1]]], [[[1]]], [[[1]]]]
+    ).astype(np.float32)
+    good = blocks.against_alone(picture, alone, truth, 0.0)
+    assert good["gain_over_alone"] > 6.0
+    assert good["worst_block"] > 6.0
+    assert good["share_of_blocks"] == 0.0
+    picture[32:64, 64:96] += 0.1
+    bad = blocks.against_alone(picture, alone, truth, 0.0)
+    assert bad["worst_block"] < -2.0
+    assert bad["share_of_blocks"] == pytest.approx(1 / 12, abs=1e-4)
+    points = [
+        {"scene": s, "motion": "pan", "samples": 2, "radius": 4, **x}
+        for s, x in (("good", good), ("bad", bad))
+    ]
+    text = "\n".join(blocks.section(points))
+    assert f"| {bad['worst_block']:+.2f} bad | 4.2% | 8.3% bad |" in text
+    assert not list(blocks.section([{"scene": "good"}]))
+
+
 # --- motions --------------------------------------------------------------------------
 
 
@@ -179,7 +236,7 @@ def places(scene: Any, name: str, frames: list[int]) -> list[np.ndarray]:
     return found
 
 
-@pytest.mark.parametrize("motion", list(motions.MOTIONS))
+@pytest.mark.parametrize("motion", list(motions.MADE))
 def test_the_middle_frame_is_the_files_own_view(
     still_life: Callable[..., Any], motion: str
 ) -> None:

@@ -219,16 +219,16 @@ def exponents(rows: Sequence[Row]) -> list[dict[str, Any]]:
     fitted = []
     for task, cores in dict.fromkeys((row["task"], row["cores"]) for row in rows):
         mine = [r for r in rows if (r["task"], r["cores"]) == (task, cores)]
-        fits = {key: _power(mine, key) for key in ("seconds", "peak_memory")}
+        fits = {key: power(mine, key) for key in ("seconds", "peak_memory")}
         if fits["seconds"] is not None:
             fitted.append({"task": task, "cores": cores} | fits)
     return fitted
 
 
-def _power(rows: Sequence[Row], key: str) -> float | None:
+def power(rows: Sequence[Row], key: str, over: str = "pixels") -> float | None:
     """Slope of the least-squares line through the logarithms; None for one point."""
-    known = [(r["pixels"], r[key]) for r in rows if r[key]]
-    if len({pixels for pixels, _ in known}) < 2:
+    known = [(r[over], r[key]) for r in rows if r[key]]
+    if len({x for x, _ in known}) < 2:
         return None
     x, y = (np.log([pair[i] for pair in known]) for i in (0, 1))
     return float(np.polyfit(x, y, 1)[0])

@@ -210,7 +210,8 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         "--growth",
         type=arguments.sizes,
         default=(),
-        help="frames, as 512x512,1920x1080",
+        help="frames, as 512x512,1920x1080: how seconds and memory grow; with --shots "
+        "those of finishing a frame, and of a shot of small frames",
     )
     add(
         "--noise-thresholds",
@@ -250,8 +251,8 @@ def _add_shots(group: Any) -> None:
     add(
         "--motions",
         type=arguments.names((*MOTIONS, FILE)),
-        help=f"of {', '.join(MOTIONS)}; all, with --same-picture pan, or {FILE}: "
-        "the file's own around its current frame",
+        help=f"of {', '.join(MOTIONS)}; all, with --same-picture pan; or {FILE}: "
+        "what the file itself animates around its current frame",
     )
     add(
         "--samples",
@@ -423,16 +424,23 @@ def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
+    if options.growth:
+        from ..shots.growth import SMALL, bench_growth
+
+        return bench_growth(
+            options.scenes[0],
+            options.out,
+            options.growth,
+            cache=options.cache,
+            small=options.resolution or SMALL,
+        )
     from ..shots.bench import Measure, bench_shots
 
-    motions = options.motions or MOTIONS
-    if FILE in motions:
-        raise UsageError(f"--motions {FILE} is measured by --same-picture alone")
     return bench_shots(
         options.scenes,
         options.out,
         Measure(
-            motions,
+            options.motions or MOTIONS,
             options.samples or (2,),
             options.radii,
             options.pair_samples,

@@ -17,6 +17,7 @@ def figures(results: Results) -> Figures:
     """Return every figure that docs/figures.toml may name."""
     return {
         **_shots(results),
+        **_held_out(results),
         **_gallery(results),
         **_parts(results),
         **_stills(results),
@@ -50,6 +51,24 @@ def _shots(results: Results) -> Figures:
         needed = [x["cycles_samples"] for x in rows if x["cycles_samples"] is not None]
         name = f"shots.equal.{samples}"
         found |= {f"{name}.least": min(needed), f"{name}.most": max(needed)}
+    return found
+
+
+def _held_out(results: Results) -> Figures:
+    """Gains in dB over Cycles + OIDN; of the blocks of a scene those that lose."""
+    found: Figures = {}
+    for samples in sorted({x["samples"] for x in results.held_out}):
+        rows = only(results.held_out, samples=samples)
+        cycles = only(rows, method="cycles_oidn_default")
+        alone = {x["scene"]: x["psnr"] for x in cycles}
+        shots = only(rows, method="xrds", radius=4)
+        gains = [x["psnr"] - alone[x["scene"]] for x in shots]
+        lost = [100.0 * x["share_of_blocks"] for x in shots]
+        name = f"held_out.{samples}"
+        found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
+        found |= {f"{name}.lost.mean": mean(lost), f"{name}.lost.most": max(lost)}
+        found |= {f"{name}.block": min(x["worst_block"] for x in shots)}
+        found[f"{name}.scenes"] = len(shots)
     return found
 
 

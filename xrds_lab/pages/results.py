@@ -68,6 +68,11 @@ class Results:
         return self._read("shots/gains.json")["gains"]
 
     @cached_property
+    def held_out(self) -> Rows:
+        """Shots on which no constant was chosen: all methods."""
+        return self._read("held-out/results.json")["shots"]
+
+    @cached_property
     def installs(self) -> Rows:
         """Sizes and seconds of installs, the smallest first."""
         return self._read("install.json")["rows"]

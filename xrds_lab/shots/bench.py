@@ -34,7 +34,7 @@ from . import (
 )
 from .figures import REACH, Clip, SceneFigures
 from .frames import ShotFrames
-from .motions import MOTIONS
+from .motions import MADE
 from .seconds import SceneSeconds
 from .seeds import over_seeds
 
@@ -58,7 +58,7 @@ ROUNDS = 3
 class Measure:
     """What is measured of each scene."""
 
-    motions: tuple[str, ...] = tuple(MOTIONS)
+    motions: tuple[str, ...] = tuple(MADE)
     samples: tuple[int, ...] = SAMPLES
     radii: tuple[int, ...] = RADII
     pair_samples: int = PAIR_SAMPLES
@@ -126,7 +126,7 @@ class _Scene:
         )
         self.frames = ShotFrames(self.shot, self.folder)
         self.figures = SceneFigures(
-            self.frames, self.pictures.reference, self.measure.pair_samples
+            self.frames, self.pictures.references, self.measure.pair_samples
         )
         self.seconds = SceneSeconds(
             self.shot, self.folder.directory, self.measure.seconds_at

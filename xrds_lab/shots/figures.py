@@ -24,7 +24,7 @@ from xrds_core.temporal.window import Shot
 
 from ..checksum import checksum
 from ..metrics import all_metrics, to_srgb
-from . import rivals
+from . import blocks, rivals
 from .crops import REFERENCE, SceneCrops, crop_key
 from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
 from .motions import MOTIONS
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     Figures = dict[str, Any]
     Paint = Callable[[int], Array]
 
-GENERATION = 1  # counts up whenever this file makes other figures
+GENERATION = 2  # counts up whenever this file makes other figures
 DEFAULT, BEST, MEDIAN = "cycles_oidn_default", "cycles_oidn_best", "median_of_three"
 XRDS = "xrds"
 RIVALS = {DEFAULT: 0, BEST: 0, MEDIAN: 1}
@@ -133,9 +133,12 @@ class SceneFigures:
     """All figures of one scene; those known are not computed again."""
 
     def __init__(
-        self, frames: ShotFrames, reference: Callable[[], Array], pair_samples: int
+        self,
+        frames: ShotFrames,
+        references: Callable[[], tuple[Array, Array]],
+        pair_samples: int,
     ) -> None:
-        self.frames, self._reference = frames, reference
+        self.frames, self._references = frames, references
         self.pair_samples = pair_samples
         shot = frames.shot
         own = "own" if shot.reference is None else shot.reference.stem
@@ -144,6 +147,10 @@ class SceneFigures:
         self._path = directory / f"{name}.json"
         self.crops = SceneCrops(directory, name)
         self._known: dict[str, Figures] = _stored(self._path)
+
+    def _reference(self) -> Array:
+        first, second = self._references()
+        return (first + second) / 2
 
     def points(self) -> list[Figures]:
         """Every figure that the present code gave, in order of motions and samples.
@@ -224,8 +231,7 @@ class SceneFigures:
     def _measure(self, clip: Clip, method: str, radius: int) -> None:
         motion = clip.motion
         paint, more = self._paint(clip, method, radius)
-        reference = self._reference()
-        pair = None
+        reference, pair = self._reference(), None
         request = self._truth(motion)
         if request is not None:
             pair = reference, self.frames.truth(request)
@@ -236,6 +242,9 @@ class SceneFigures:
                 made[number] = paint(number)
             return made[number]
 
+        if method == XRDS and radius:
+            truths, alone = self._references(), clip.xrds(MIDDLE, 0)
+            more |= blocks.against_alone(once(MIDDLE), alone, truths, clip.stops)
         point = {
             "scene": self.frames.shot.name,
             "motion": motion,

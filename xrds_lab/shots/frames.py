@@ -12,7 +12,7 @@ from xrds_core.errors import SceneError
 
 from .. import packing
 from ..bench.inputs import Arrays, Folder, open_scene
-from .motions import animate
+from .motions import FILE, animate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -28,7 +28,7 @@ MIDDLE = 9
 """The number of the frame that shows the file's own view."""
 REACH = 4
 """Frames to each side of it in a shot of nine, the standard."""
-_STILL_CAMERA = ("still", "objects")
+_STILL_CAMERA = ("still", "objects", FILE)  # of a file it may stand still
 _PAIR_SEED = 21
 _SEED_STEP = 15_485_863  # larger than seeds of a shot's frames lie apart
 _EXPOSURE = "view_exposure"
@@ -139,11 +139,12 @@ class ShotFrames:
     ) -> None:
         scene = open_scene(self.shot.path, self.shot.window)
         animate(scene, self.shot.window, motion, MIDDLE, reach)
+        apart = scene.frame_current - MIDDLE  # of a file's own motion
         scene.render.use_persistent_data = True  # one sync of the scene for all frames
         exposure = np.float32(scene.view_settings.exposure)
         for request in wanted:
             with journal.attempt(self._named(request)):
-                scene.frame_set(request.number)
+                scene.frame_set(request.number + apart)
                 made = _truth if request.is_truth else _noisy
                 arrays, seconds = made(scene, request)
                 arrays[_EXPOSURE] = exposure

@@ -19,14 +19,16 @@ if TYPE_CHECKING:
 
     from ..bench.windows import Window
 
-MOTIONS = {
+FILE = "file"
+MADE = {
     "pan": "the camera trucks and turns, 2 to 5 pixels a frame",
     "fast": "the same, four times as far",
     "still": "nothing moves",
     "objects": "a still camera; up to three small objects move 3 pixels a frame",
     "both": "the camera as in pan, and the objects",
 }
-"""Each motion, and what moves in it."""
+"""Each motion that is made here, and what moves in it."""
+MOTIONS = {**MADE, FILE: "what the file itself animates, around its current frame"}
 FAST = 4.0  # times pan
 _TRUCK = 0.01  # metres per frame
 _LARGEST_TRUCK = 0.01  # of the middle distance: a small scene would leap
@@ -44,9 +46,12 @@ def animate(
     """Animate frames `middle` - `reach` to `middle` + `reach`; return what moves.
 
     All animation of the file is taken away: things stay where its current frame has
-    them. Simulations are not: bake them. Raises SceneError where `motion` asks for
+    them. Simulations are not: bake them. With the motion of the file nothing is done:
+    its current frame stays the middle one. Raises SceneError where `motion` asks for
     small objects and the window shows none.
     """
+    if motion == FILE:
+        return []
     graph = bpy.context.evaluated_depsgraph_get()
     view = graph.objects[scene.camera.name].matrix_world.copy()
     seen = _seen(scene, graph, window)

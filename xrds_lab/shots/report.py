@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.atomic import replacing
 
-from . import comparison
+from . import blocks, comparison
 from .figures import BEST, DEFAULT, MEDIAN, REACH, XRDS
 from .motions import MOTIONS
 from .seeds import over_seeds
@@ -53,6 +53,7 @@ def page(results: dict[str, Any]) -> str:
         "\n".join(f"- `{name}`: {meaning}." for name, meaning in MOTIONS.items()),
         *_gains(points),
         *comparison.sections(results),
+        *blocks.section(points),
         *_equal(results["equal_quality"]),
         *_seconds(points, results["settings"].get("seconds_resolution")),
         *_by_scene(points),

@@ -45,8 +45,6 @@ if TYPE_CHECKING:
     Row = dict[str, Any]
 
 SAMPLES = (16, 64, 256)
-FILE = "file"
-"""The motion of the file itself, around its current frame."""
 FRAMES = 17
 """Frames of a shot: from 16 on it may have fewer samples."""
 MOST_SAMPLES = 4096
@@ -194,8 +192,7 @@ def _opened(shot: Shot, case: Case, reach: int) -> Any:
     scene.cycles.samples = case.samples
     if case.noise_threshold is not None:
         sample_adaptively(scene, case.samples, case.noise_threshold)
-    if case.motion != FILE:
-        animate(scene, shot.window, case.motion, MIDDLE, reach)
+    animate(scene, shot.window, case.motion, MIDDLE, reach)
     scene.render.use_persistent_data = True  # for all three: one sync of the scene
     return scene
 
