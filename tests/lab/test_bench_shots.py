@@ -100,17 +100,26 @@ def test_a_second_run_renders_nothing_and_gives_the_same_files(
 
 
 def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
-    result = run(
-        blend, radii=(0, 5), pair_samples=0, seconds=True, seconds_at=(48, 32), rounds=1
-    )
+    asked = {"radii": (0, 5), "pair_samples": 0, "rounds": 1, "samples": (2, 6)}
+    result = run(blend, seconds=True, seconds_at=(48, 32), **asked)
     assert result["failures"] == {}
-    found = {(p["method"], p["radius"]): p for p in result["shots"]}
+    few = [p for p in result["shots"] if p["samples"] == 2]
+    found = {(p["method"], p["radius"]): p for p in few}
     assert found[XRDS, 5]["psnr"] > found[XRDS, 0]["psnr"] + 1.0
     assert found[XRDS, 5]["flicker"] is None
     timed = [
         found[x]["seconds_per_frame"] for x in ((XRDS, 0), (XRDS, 5), (DEFAULT, 0))
     ]
     assert all(0.0 < seconds < 60.0 for seconds in timed)
+    (path,) = (blend.parent / "cache").glob("*-shot-seconds.json")
+    known = json.loads(path.read_text())
+    name = f"{XRDS}-5"
+    assert known.keys() == {"2", "4", "6"}  # frames of 6 are finished as those of 4
+    assert known["6"][name]["finish"] == known["4"][name]["finish"]
+    assert known["6"][name]["finish"] != known["2"][name]["finish"]
+    assert known["6"][name]["total"] == pytest.approx(
+        known["6"][name]["sample"]["total"] + known["4"][name]["finish"]["total"]
+    )
     assert "Of frames of 48x32" in (blend.parent / "out/report.md").read_text()
     drawn = (blend.parent / "out/error-pan.svg").read_text()
     assert "XRDS, radius 4" not in drawn  # only what was timed
