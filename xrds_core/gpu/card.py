@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import XRDSError
+from ..notices import warn
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -41,7 +42,8 @@ class CardLost(XRDSError):
 def find_adapters(software: bool = False) -> list[Any]:
     """Return the cards that can accumulate, the fastest kind first; [] without wgpu.
 
-    `software` returns those that the processor plays instead, for tests.
+    A wgpu that is there but cannot be loaded is told of. `software` returns those that
+    the processor plays instead, for tests.
     """
     try:
         wgpu, extras = (import_module(name) for name in ("wgpu", _EXTRAS))
@@ -50,6 +52,9 @@ def find_adapters(software: bool = False) -> list[Any]:
         with _without_windows():
             every = wgpu.gpu.enumerate_adapters_sync()
     except (ImportError, OSError, RuntimeError):
+        return []
+    except Exception as error:  # cffi raises no other kind beside another cffi
+        warn(f"no graphics card is used, for wgpu cannot be loaded: {error}")
         return []
     kinds = ("CPU",) if software else _KINDS
     found = [

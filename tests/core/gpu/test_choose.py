@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from xrds_core.errors import UsageError
+from xrds_core.gpu import card
 from xrds_core.gpu import choose as choosing
 from xrds_core.gpu.accumulate import CardAccumulator
 from xrds_core.gpu.card import CardLost, find_adapters
@@ -29,6 +30,23 @@ def test_without_a_card_the_processor_accumulates(
 ) -> None:
     play(monkeypatch, 0)
     assert choosing.choose("auto") is None
+
+
+def test_a_package_that_cannot_be_loaded_is_told_and_does_without(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As cffi where the system's own _cffi_backend was loaded before ours."""
+
+    def mismatch(name: str) -> None:
+        raise Exception("Version mismatch: this is the 'cffi' package")
+
+    monkeypatch.setattr(card, "import_module", mismatch)
+    assert choosing.choose("auto") is None
+    told = capsys.readouterr().err
+    assert "no graphics card is used" in told
+    assert "Version mismatch" in told
+    with pytest.raises(UsageError, match="no graphics card 'gpu'"):
+        choosing.choose("gpu")
 
 
 @pytest.mark.parametrize("name", ["gpu", "Radeon"])
