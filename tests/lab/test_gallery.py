@@ -11,13 +11,16 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
+from PIL import Image
 
 from xrds_blender.interface.registration import ensure_registered
 from xrds_core.errors import UsageError
-from xrds_core.temporal.frame import Camera, Frame, Sphere
+from xrds_core.temporal.accumulate import accumulate
+from xrds_core.temporal.frame import Camera, Frame, Sphere, Stored, store
 from xrds_lab import packing
-from xrds_lab.gallery import bench, frames, report
+from xrds_lab.gallery import bench, crops, frames, report
 from xrds_lab.gallery.bench import bench_gallery
+from xrds_lab.gallery.crops import averaged
 from xrds_lab.gallery.frames import Measure, Store
 from xrds_lab.gallery.judge import (
     block_gains,
@@ -137,6 +140,38 @@ def test_frames_come_back_as_they_were_whatever_fields_they_have(
     assert frame.halves.counts.dtype == np.int32
 
 
+def grey(number: int, light: float, at: float = 0.0) -> Stored:
+    """A wall of one light, three units before a camera `at` so far to the right."""
+    view = np.eye(4)
+    view[:3, 3] = -at, 0.0, 0.0
+    project = np.diag([2.0, 2.0, -1.0, 0.0])
+    project[2, 3], project[3, 2] = -0.2, -1.0
+    plane = np.full((48, 64, 3), light, np.float32)
+    normal = np.zeros_like(plane)
+    normal[..., 2] = 1.0
+    depth = np.full((48, 64), 3.0, np.float32)
+    camera = Camera(view, project, (64, 48))
+    return store(Frame(number, camera, plane, plane, normal, depth, samples=4))
+
+
+def test_averaged_neighbours_are_judged_by_nothing() -> None:
+    own, bright = grey(1, 0.2), grey(2, 0.8)
+    mean = averaged(own, [bright])
+    assert mean.radiance is not None
+    assert np.allclose(mean.radiance, 0.5, atol=1e-3)
+    assert np.all(mean.samples == 8.0)
+    judged = accumulate(own, [bright]).radiance
+    assert judged is not None
+    assert np.allclose(judged, 0.2, atol=0.02)
+
+
+def test_averaged_neighbours_count_where_the_camera_saw_them() -> None:
+    aside = averaged(grey(1, 0.2), [grey(2, 0.2, at=1.0)]).samples
+    seen = (aside == 8.0).mean(axis=0)
+    assert set(seen) == {0.0, 1.0}  # whole columns are out of sight
+    assert 0.5 < seen.mean() < 0.9
+
+
 def test_the_gallery_is_large_and_its_halves_are_alike() -> None:
     assert len(SHOTS) == len(TABLE) >= 44
     halves = [sum(shot.half == half for shot in TABLE) for half in HALVES]
@@ -161,7 +196,7 @@ def test_three_shots_are_rendered_judged_and_resumed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     out, cache = tmp_path / "out", tmp_path / "cache"
-    first = bench_gallery(FEW, out, TINY, cache=cache)
+    first = bench_gallery(FEW, out, TINY, cache=cache, crops=True)
     assert first["failures"] == {}
     assert {p["shot"] for p in first["shots"]} == set(FEW)
     assert all(np.isfinite(p["worst_block"]) for p in first["shots"])
@@ -170,6 +205,10 @@ def test_three_shots_are_rendered_judged_and_resumed(
     rows = list(csv.DictReader((out / "results.csv").open()))
     assert {row["half"] for row in rows} == set(HALVES)
     assert (out / "report.html").read_text().count("<tr") > len(FEW)
+    sheet = np.asarray(Image.open(out / "crops.webp"))
+    assert sheet.shape[0] > len(FEW) * crops.HEIGHT
+    columns = np.array_split(sheet.astype(float), len(crops.LABELS), axis=1)
+    assert np.abs(columns[1] - columns[2]).mean() > 0.5  # of 255
 
     def never(*_: Any) -> None:
         raise AssertionError("rendered again")

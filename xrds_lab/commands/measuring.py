@@ -314,6 +314,11 @@ def _add_gallery(group: Any) -> None:
     add("--half", choices=GALLERY_HALVES, help="of the gallery: its shots alone")
     add("--middle-only", action="store_true", help="judge no first frames")
     add("--references-only", action="store_true", help="render these, judge nothing")
+    add(
+        "--crops",
+        action="store_true",
+        help="also crops.webp: the shots with neighbours that nothing judges, by XRDS",
+    )
 
 
 def _add_device_report(group: Any) -> None:
@@ -406,6 +411,7 @@ def _bench_gallery(options: argparse.Namespace) -> dict[str, Any]:
         cache=options.cache,
         half=options.half,
         references_only=options.references_only,
+        crops=options.crops,
     )
 
 

@@ -14,6 +14,7 @@ from ..bench import machine, workload
 from ..bench.journal import Journal
 from ..progress import report_line
 from . import report
+from .crops import write_crops
 from .frames import Measure, Request, Store
 from .pictures import ShotFigures
 from .rendering import render_apart
@@ -32,16 +33,24 @@ def bench_gallery(
     cache: Path | None = None,
     half: str | None = None,
     references_only: bool = False,
+    crops: bool = False,
 ) -> Report:
     """Measure shots of the gallery, by name or all of a half; returns the report.
 
     What the folder `cache` holds is not rendered again. With `references_only` these
-    are rendered and nothing new is judged. Raises UsageError for unknown names.
+    are rendered and nothing new is judged. `crops` also writes `crops.webp`, of shots
+    with neighbours judged and not. Raises UsageError for unknown names.
     """
     shots = chosen(tuple(names), half)
     out.mkdir(parents=True, exist_ok=True)
     run = _Run(shots, out, measure, Store(cache or out / "cache"))
-    return run.references() if references_only else run.everything()
+    if references_only:
+        return run.references()
+    made = run.everything()
+    if crops:
+        whole = [shot for shot in shots if run.has(shot)]
+        write_crops(whole, measure, run.store, out / "crops.webp")
+    return made
 
 
 class _Run:
@@ -71,6 +80,10 @@ class _Run:
         """Render and judge shot by shot, with a report after each."""
         steps = [(shot, self.measure.all_of(shot)) for shot in self.shots]
         return self._run(steps, judging=_JUDGING_SECONDS)
+
+    def has(self, shot: Shot) -> bool:
+        """Whether all frames of a shot are there; some may have failed."""
+        return all(map(self.store.has, self.measure.all_of(shot)))
 
     def _run(
         self, steps: Sequence[tuple[Shot, list[Request]]], judging: float

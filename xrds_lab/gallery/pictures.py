@@ -23,6 +23,7 @@ from xrds_blender.shot import full_size
 from xrds_blender.shot.full_size import FullSize
 from xrds_core.arrays import Array
 from xrds_core.atomic import write_json
+from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.frame import Frame, Stored, store
 from xrds_core.temporal.window import Shot as Window
 
@@ -57,16 +58,16 @@ class Clip:
 
     def alone(self, number: int) -> Array:
         """A frame by itself, radiance and alpha (H, W, 4)."""
-        return self._finish(self.own(number), [])
+        return self.finished(self.own(number), [])
 
     def lent(self, number: int) -> Array:
         """A frame with its neighbours' samples, and those of its other views."""
-        return self._finish(self.own(number), self.neighbours(number))
+        return self.finished(self.own(number), self.neighbours(number))
 
     def by_surface(self, number: int) -> Array:
         """The same where what mirrors and glass show is not looked for."""
         own = replace(self.own(number), image=None)
-        return self._finish(own, self.neighbours(number))
+        return self.finished(own, self.neighbours(number))
 
     def neighbours(self, number: int) -> list[Stored]:
         """Its neighbours, and its other views."""
@@ -80,8 +81,14 @@ class Clip:
         """A frame by itself, as it was sampled."""
         return self._packed(number)[self.view]
 
-    def _finish(self, own: Stored, lenders: Sequence[Stored]) -> Array:
-        made = self._method.finish_stored(own, lenders)
+    def finished(
+        self,
+        own: Stored,
+        lenders: Sequence[Stored],
+        gathered: Accumulated | None = None,
+    ) -> Array:
+        """A frame with its lenders' samples (H, W, 4), or with those `gathered`."""
+        made = self._method.finish_stored(own, lenders, gathered=gathered)
         return np.dstack((made.radiance, made.alpha))
 
     def _packed(self, number: int) -> dict[str, Stored]:
