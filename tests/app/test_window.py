@@ -17,7 +17,7 @@ pytestmark = pytest.mark.timeout(3600)
 
 RENDER_MENU = (129, 34)
 RENDER_IMAGE, RENDER_ANIMATION = (175, 56), (175, 78)
-RENDER_WITH_XRDS = (190, 204)
+RENDER_WITH_XRDS, RENDER_ANIMATION_WITH_XRDS = (190, 204), (190, 230)
 SIZE = (96, 64)
 
 
@@ -131,6 +131,29 @@ render.resolution_x, render.resolution_y = 320, 180
     assert picture.shape == (180, 320, 3)
     parts = [half for row in np.split(picture, 2) for half in np.split(row, 2, axis=1)]
     assert min(part.std() for part in parts) > 1.0  # not in one corner alone
+    window.wait(f"bpy.data.scenes[0].render.engine == {engine!r}", 20)
+
+
+def test_first_shot_from_the_render_menu(window: Window) -> None:
+    """Its frames hold each other's samples, and the scene keeps its engine."""
+    small_scene(window, 2)
+    folder = window.program.share / "shot"
+    seen = window.program.seen(folder)
+    engine = window.ask(
+        f"""
+scene = bpy.data.scenes[0]
+scene.frame_start, scene.frame_end = 1, 3
+scene.render.filepath = {seen!r} + '/'
+scene.render.engine
+"""
+    )
+    press(window, RENDER_ANIMATION_WITH_XRDS)
+    assert finished(window).count("render_complete") == 1
+    image = pytest.importorskip("PIL.Image")
+    frames = [image.open(path) for path in sorted(folder.iterdir())]
+    assert len(frames) == 3
+    for frame in frames:
+        assert frame.text["xrds.ViewLayer.frames"] == "1 to 3"
     window.wait(f"bpy.data.scenes[0].render.engine == {engine!r}", 20)
 
 
