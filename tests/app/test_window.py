@@ -253,7 +253,7 @@ bpy.data.scenes[0].cycles.use_adaptive_sampling = False
 
 SAMPLES_ARE_TAKEN = """
 import sys
-progress = sys.modules.get('xrds_blender.frame.stages')
+stages = sys.modules.get('xrds_blender.frame.stages')
 lifetimes = sys.modules.get('xrds_blender.internals.lifetimes')
 run = stages and lifetimes.RENDER_JOB.of(stages.Current).run
 status = sys.modules.get('xrds_blender.internals.status')
@@ -307,7 +307,7 @@ bpy.context.preferences.view.render_display_type = 'AREA'
     window.wait(
         """
 import sys
-progress = sys.modules.get('xrds_blender.frame.stages')
+stages = sys.modules.get('xrds_blender.frame.stages')
 stages and 'frame 2' in (stages.current() or '')
 """
     )
@@ -413,7 +413,7 @@ OPEN_PANELS = """
 view = bpy.context.preferences.view
 view.language = {language!r}
 view.use_translate_interface = view.use_translate_tooltips = True
-from xrds_blender.interface import panels
+from xrds_blender.interface.panel import panels
 for panel in reversed(panels.CLASSES):  # a new editor shows them open
     bpy.utils.unregister_class(panel)
     panel.bl_options = set()
