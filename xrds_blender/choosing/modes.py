@@ -24,13 +24,24 @@ def estimates(
 
     In a `shot` frames have the samples of their neighbours.
     """
+    radius = settings.temporal_radius if shot else 0
 
     def seconds(resolved: Settings) -> float | None:
-        return history.seconds(scene, resolved)
+        return frame_seconds(scene, resolved, radius)
 
     known, model = history.scene_settings(scene), budget.shipped()
-    radius = settings.temporal_radius if shot else 0
     return estimating.estimates(settings, known, here, model, seconds, radius)
+
+
+def frame_seconds(scene: Any, resolved: Settings, radius: int) -> float | None:
+    """What a frame will about take that reuses `radius` frames before and after.
+
+    None where nothing is known; the settings are resolved.
+    """
+    costs = history.costs(scene)
+    if not radius or costs is None or resolved.is_cycles_only:
+        return history.seconds(scene, resolved)
+    return costs.in_shot(radius).seconds(resolved)
 
 
 def best_mode(scene: Any, request: Request) -> Mode:

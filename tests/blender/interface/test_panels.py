@@ -323,6 +323,11 @@ def test_seconds_of_an_animation_are_those_of_its_frames() -> None:
     assert found.ours is not None
     assert found.ours > 35.0  # and neighbours
     assert not found.at_most
+    told = {x.mode: x.seconds for x in estimates_of(scene, request.settings, ALL, True)}
+    assert told[Mode.FULL_SIZE] == found.ours  # the table agrees with the lines above
+    assert told[Mode.CYCLES_ONLY] == found.cycles
+    alone = estimates_of(scene, request.settings, ALL)
+    assert {x.mode: x.seconds for x in alone}[Mode.FULL_SIZE] < found.ours
     scene.xrds.mode, scene.xrds.animation = "full_size", "same_picture"
     same = expected(scene)
     assert (same.picture, same.at_most) == ("same", has_subsets(scene))

@@ -9,6 +9,7 @@ from typing import Any
 from xrds_core.time_left import duration
 
 from ...choosing import history
+from ...choosing.modes import frame_seconds
 from ...planning.estimates import Capabilities, Estimate, resolved
 from ...planning.request import Request
 from ...planning.settings import Mode
@@ -57,7 +58,8 @@ def expected(
     settings = request.settings
     cycles = resolved(replace(settings, mode=Mode.CYCLES_ONLY, denoising=None), known)
     saves = can_save(scene, request, frames)
-    ours = _seconds(scene, request, is_shot)
+    radius = settings.temporal_radius if is_shot else 0
+    ours = frame_seconds(scene, resolved(settings, known), radius)
     if request.deadline is not None:
         ours = request.deadline / frames
     picture = words.of(settings.mode, estimated, scene, here)
@@ -69,15 +71,6 @@ def expected(
         saves,
         is_shot,
     )
-
-
-def _seconds(scene: Any, request: Request, is_shot: bool) -> float | None:
-    """What a frame will about take beside its neighbours."""
-    settings = resolved(request.settings, history.scene_settings(scene))
-    costs = history.costs(scene)
-    if not is_shot or costs is None:
-        return history.seconds(scene, settings)
-    return costs.in_shot(request.settings.temporal_radius).seconds(settings)
 
 
 def draw(layout: Any, context: Any, found: Expected) -> None:
