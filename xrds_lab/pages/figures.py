@@ -38,15 +38,14 @@ def _installs(results: Results) -> Figures:
 def _shots(results: Results) -> Figures:
     found: Figures = {}
     for samples in (2, 16):
-        rows = only(results.gains, motion="pan", samples=samples)
-        gains = [x["gain"] for x in rows]
+        gains = results.gains("pan", samples).values()
         name = f"shots.pan.{samples}"
         found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
-    before = [x["gain"] for x in results.shot_rows("pan", 2, 4)]
-    found["shots.before.pan.2.mean"] = mean(before)
-    ratios = [each[2] / each[0] for each in results.shot_seconds().values()]
-    found |= {"shots.seconds.least": min(ratios), "shots.seconds.most": max(ratios)}
-    for samples in (2, 16):
+        ratios = [
+            ours / cycles for cycles, ours in results.shot_seconds(samples).values()
+        ]
+        name = f"shots.seconds.{samples}"
+        found |= {f"{name}.least": min(ratios), f"{name}.most": max(ratios)}
         rows = only(results.shots["equal_quality"], motion="pan", samples=samples)
         needed = [x["cycles_samples"] for x in rows if x["cycles_samples"] is not None]
         name = f"shots.equal.{samples}"
@@ -144,14 +143,12 @@ def _denoisers(results: Results) -> Figures:
         skipped = OLD_PATTERN if new else ()
         return mean(x["psnr"] for x in rows if x["scene"] not in skipped)
 
-    points = results.denoiser("XRDS-HIGH", 1)
     best = [psnr("XRDS-BEST", n) - psnr("XRDS-HIGH", n) for n in (2, 4, 8)]
     new = [
         psnr("HIGH-ACCURATE", n, new=True) - psnr("XRDS-HIGH", n, new=True)
         for n in (2, 4, 8)
     ]
     return {
-        "high.seconds": median(x["seconds"]["denoise"] for x in points),
         "best.least": min(best),
         "best.most": max(best),
         "high.below.least": min(new),

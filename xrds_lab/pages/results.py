@@ -8,6 +8,7 @@ from functools import cached_property
 from statistics import mean
 from typing import TYPE_CHECKING, Any
 
+from ..shots.frames import REACH
 from ..shots.seeds import over_seeds
 
 if TYPE_CHECKING:
@@ -58,14 +59,9 @@ class Results:
 
     @cached_property
     def shots(self) -> dict[str, Any]:
-        """Shots, when neighbours' light was still compared without halves."""
+        """Shots of the seven scenes; means over seeds."""
         found = self._read("shots/results.json")
         return found | {"shots": over_seeds(found["shots"])}
-
-    @cached_property
-    def gains(self) -> Rows:
-        """Shots of the seven scenes, with halves: gains over Cycles + OIDN."""
-        return self._read("shots/gains.json")["gains"]
 
     @cached_property
     def held_out(self) -> Rows:
@@ -128,18 +124,22 @@ class Results:
             for x in chosen
         ]
 
-    def shot_seconds(self) -> dict[str, tuple[float, float, float]]:
-        """Return a frame's seconds by scene: Cycles + OIDN, XRDS alone, radius 4."""
-        rows = only(self.shots["shots"], motion="pan", samples=2)
+    def gains(self, motion: str, samples: int) -> dict[str, float]:
+        """Return what shots of radius 4 gain over Cycles + OIDN, by scene."""
+        rows = self.shot_rows(motion, samples, REACH)
+        if not rows:  # measured, but kept in the notebook alone
+            typed = self._read("shots/gains.json")["gains"]
+            rows = only(typed, motion=motion, samples=samples)
+        return {x["scene"]: x["gain"] for x in rows}
+
+    def shot_seconds(self, samples: int) -> dict[str, tuple[float, float]]:
+        """Return a frame's seconds by scene: Cycles + OIDN, and XRDS at radius 4."""
+        rows = only(self.shots["shots"], motion="pan", samples=samples)
         found = {}
         for scene in SCENES:
             of = [x for x in rows if x["scene"] == scene and x["seconds_per_frame"]]
             seconds = {(x["method"], x["radius"]): x["seconds_per_frame"] for x in of}
-            found[scene] = (
-                seconds["cycles_oidn_default", 0],
-                seconds["xrds", 0],
-                seconds["xrds", 4],
-            )
+            found[scene] = (seconds["cycles_oidn_default", 0], seconds["xrds", REACH])
         return found
 
     def unit(self, units: float) -> Rows:

@@ -18,7 +18,6 @@ RADII = {
     "radius 1": 1,
     "radius 2": 2,
     "**radius 4**": 4,
-    "radius 8": 8,
 }
 UNITS = (1.0, 2.0, 4.0, 8.0)
 QUALITIES = (
@@ -52,9 +51,8 @@ def shots_in_short(results: Results) -> Table:
                 *(f"{x:.1f}" for x in [*cells, mean(cells)]),
             ]
         )
-        gains = only(results.gains, motion="pan", samples=samples)
-        by_scene = {x["scene"]: x["gain"] for x in gains}
-        cells = [by_scene[x] for x in SCENES]
+        gains = results.gains("pan", samples)
+        cells = [gains[x] for x in SCENES]
         label = f"**XRDS, {samples} samples per frame: gain**"
         table.append([label, *(f"{x:+.1f}" for x in cells), f"**{mean(cells):+.1f}**"])
     return table
@@ -64,10 +62,9 @@ def shot_motions(results: Results) -> Table:
     """What shots gain under three motions, at 2 and 16 samples, by scene."""
     table = [["", *(scene_name(x) for x in SCENES), "mean"]]
     for motion in MOTIONS:
-        rows = only(results.gains, motion=motion)
-        gains = {(x["scene"], x["samples"]): x["gain"] for x in rows}
-        means = [mean(gains[x, n] for x in SCENES) for n in (2, 16)]
-        cells = [_two(gains[x, 2], gains[x, 16]) for x in SCENES]
+        few, many = (results.gains(motion, samples) for samples in (2, 16))
+        means = [mean(gains[x] for x in SCENES) for gains in (few, many)]
+        cells = [_two(few[x], many[x]) for x in SCENES]
         table.append([f"`{motion}`", *cells, _two(*means)])
     return table
 
@@ -82,7 +79,7 @@ def _signed(decibels: float) -> str:
 
 
 def shot_radii(results: Results) -> Table:
-    """What a radius brings; measured before light was judged by halves."""
+    """What a radius brings."""
     table = [["", "mean gain", "worst scene", "flicker"]]
     for label, radius in RADII.items():
         rows = results.shot_rows("pan", 2, radius)
