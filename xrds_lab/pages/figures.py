@@ -17,6 +17,7 @@ def figures(results: Results) -> Figures:
     """Return every figure that docs/figures.toml may name."""
     return {
         **_shots(results),
+        **_same_seconds(results),
         **_held_out(results),
         **_gallery(results),
         **_parts(results),
@@ -68,6 +69,17 @@ def _held_out(results: Results) -> Figures:
         found |= {f"{name}.lost.mean": mean(lost), f"{name}.lost.most": max(lost)}
         found |= {f"{name}.block": min(x["worst_block"] for x in shots)}
         found[f"{name}.scenes"] = len(shots)
+    return found
+
+
+def _same_seconds(results: Results) -> Figures:
+    """Shots over Cycles + OIDN in the seconds of the shots' few samples."""
+    found: Figures = {}
+    for samples in (1, 2):
+        rows = only(results.shots["equal_seconds"], motion="pan", at="xrds")
+        gains = [x["gain"] for x in only(rows, samples=samples)]
+        name = f"shots.same_seconds.{samples}"
+        found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
     return found
 
 
