@@ -5,7 +5,8 @@ from __future__ import annotations
 from statistics import mean, median
 from typing import TYPE_CHECKING
 
-from .results import OLD_PATTERN, only
+from ..shots.frames import REACH
+from .results import OLD_PATTERN, beside_cycles, only
 
 if TYPE_CHECKING:
     from .results import Results
@@ -55,20 +56,14 @@ def _shots(results: Results) -> Figures:
 
 
 def _held_out(results: Results) -> Figures:
-    """Gains in dB over Cycles + OIDN; of the blocks of a scene those that lose."""
+    """Gains in dB over Cycles + OIDN."""
     found: Figures = {}
     for samples in sorted({x["samples"] for x in results.held_out}):
-        rows = only(results.held_out, samples=samples)
-        cycles = only(rows, method="cycles_oidn_default")
-        alone = {x["scene"]: x["psnr"] for x in cycles}
-        shots = only(rows, method="xrds", radius=4)
-        gains = [x["psnr"] - alone[x["scene"]] for x in shots]
-        lost = [100.0 * x["share_of_blocks"] for x in shots]
+        rows = beside_cycles(only(results.held_out, samples=samples), REACH)
+        gains = [x["gain"] for x in rows]
         name = f"held_out.{samples}"
         found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
-        found |= {f"{name}.lost.mean": mean(lost), f"{name}.lost.most": max(lost)}
-        found |= {f"{name}.block": min(x["worst_block"] for x in shots)}
-        found[f"{name}.scenes"] = len(shots)
+        found[f"{name}.scenes"] = len(gains)
     return found
 
 

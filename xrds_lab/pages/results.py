@@ -43,6 +43,26 @@ def only(rows: Iterable[dict[str, Any]], **values: Any) -> Rows:
     return [x for x in rows if all(x[key] == value for key, value in values.items())]
 
 
+def beside_cycles(rows: Rows, radius: int) -> Rows:
+    """Return XRDS' rows of one shot with their `gain` and `flicker_ratio`.
+
+    `rows` hold those of Cycles + OIDN, too; `radius` is as in `shot_rows`.
+    """
+    method = "median_of_three" if radius == MEDIAN else "xrds"
+    usual = {x["scene"]: x for x in only(rows, method="cycles_oidn_default")}
+    chosen = only(rows, method=method)
+    if radius != MEDIAN:
+        chosen = only(chosen, radius=radius)
+    return [
+        {
+            **x,
+            "gain": x["psnr"] - usual[x["scene"]]["psnr"],
+            "flicker_ratio": x["flicker"] / usual[x["scene"]]["flicker"],
+        }
+        for x in chosen
+    ]
+
+
 @dataclass(frozen=True)
 class Results:
     """The JSON files below a folder; each is read once."""
@@ -110,19 +130,7 @@ class Results:
         Those of a median of three denoised frames for `MEDIAN` in place of a radius.
         """
         rows = only(self.shots["shots"], motion=motion, samples=samples)
-        method = "median_of_three" if radius == MEDIAN else "xrds"
-        usual = {x["scene"]: x for x in only(rows, method="cycles_oidn_default")}
-        chosen = only(rows, method=method)
-        if radius != MEDIAN:
-            chosen = only(chosen, radius=radius)
-        return [
-            {
-                **x,
-                "gain": x["psnr"] - usual[x["scene"]]["psnr"],
-                "flicker_ratio": x["flicker"] / usual[x["scene"]]["flicker"],
-            }
-            for x in chosen
-        ]
+        return beside_cycles(rows, radius)
 
     def gains(self, motion: str, samples: int) -> dict[str, float]:
         """Return what shots of radius 4 gain over Cycles + OIDN, by scene."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from xrds_core.atomic import replacing
 
@@ -24,17 +24,6 @@ _PAPER, _INK = (24, 24, 26), (235, 235, 230)
 _QUALITY = 85  # of WebP
 
 
-class _Pair(NamedTuple):
-    """Cycles + OIDN and XRDS with the same samples."""
-
-    cycles: Point
-    xrds: Point
-
-    @property
-    def gain(self) -> float:
-        return float(self.xrds["psnr"] - self.cycles["psnr"])
-
-
 def write(
     folder: Path,
     points: Sequence[Point],
@@ -47,19 +36,17 @@ def write(
     for each number of samples: Cycles + OIDN, XRDS, the reference.
     """
     for scene in dict.fromkeys(p["scene"] for p in points):
-        here = [p for p in points if p["scene"] == scene]
-        pairs = _pairs([p for p in here if p["motion"] == here[0]["motion"]])
-        reference = crops.get((scene, here[0]["motion"], *REFERENCE))
+        motion = next(p["motion"] for p in points if p["scene"] == scene)
+        shot = {"scene": scene, "motion": motion}.items()
+        pairs = _pairs([p for p in points if shot <= p.items()])
+        reference = crops.get((scene, motion, *REFERENCE))
         pairs = [x for x in pairs if all(crop_key(p) in crops for p in x)]
         if pairs and reference:
-            equal = [
-                x
-                for x in at_equal_seconds
-                if (x["scene"], x["motion"]) == (scene, here[0]["motion"])
-            ]
+            equal = [x for x in at_equal_seconds if shot <= x.items()]
             lines = [sentence(*pair, equal) for pair in pairs]
+            true = "Reference", reference
             rows = [
-                [*((_label(p), crops[crop_key(p)]) for p in pair), ("", reference)]
+                [*((_label(p), crops[crop_key(p)]) for p in pair), true]
                 for pair in pairs
             ]
             _draw(folder / f"answer-{scene}.webp", lines, rows)
@@ -73,7 +60,7 @@ def sentence(
     In equal seconds where these are known, else with the same samples.
     """
     samples = xrds["samples"]
-    gain, reason = _Pair(cycles, xrds).gain, "with the same samples"
+    gain, reason = xrds["psnr"] - cycles["psnr"], "with the same samples"
     for entry in at_equal_seconds:
         is_this = (entry["at"], entry["samples"]) == (XRDS, samples)
         if is_this and entry["gain"] is not None:
@@ -86,12 +73,13 @@ def sentence(
     return f"{samples} sample{plural} a frame: {verdict}. {gain:+.1f} dB {reason}."
 
 
-def _pairs(points: Sequence[Point]) -> list[_Pair]:
+def _pairs(points: Sequence[Point]) -> list[tuple[Point, Point]]:
+    """Cycles + OIDN and XRDS, of each number of samples that both have."""
     found = []
     for samples in sorted({p["samples"] for p in points}):
         of = {(p["method"], p["radius"]): p for p in points if p["samples"] == samples}
         if (DEFAULT, 0) in of and (XRDS, REACH) in of:
-            found.append(_Pair(of[DEFAULT, 0], of[XRDS, REACH]))
+            found.append((of[DEFAULT, 0], of[XRDS, REACH]))
     return found
 
 
@@ -117,8 +105,7 @@ def _draw(
         draw.text((_GAP, top), line, fill=_INK, font=font)
         for column, (label, crop) in enumerate(row):
             left = _GAP + column * (side + _GAP)
-            told = label or "Reference"
-            draw.text((left, top + _LINE), told, fill=_INK, font=font)
+            draw.text((left, top + _LINE), label, fill=_INK, font=font)
             with Image.open(crop) as picture:
                 shape = picture.width * _ZOOM, picture.height * _ZOOM
                 shown = picture.resize(shape, Image.Resampling.NEAREST)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,6 +80,11 @@ class Clip:
         lenders = [self._packed(n) for n in numbers]
         own = self._packed(number)
         return self._method(radius).finish_stored(own, lenders).radiance
+
+    @cached_property
+    def alone(self) -> Array:
+        """The middle frame by itself, which every radius is judged against."""
+        return self.xrds(MIDDLE, 0)
 
     def _method(self, radius: int) -> FullSize:
         if radius not in self._methods:
@@ -243,8 +248,8 @@ class SceneFigures:
             return made[number]
 
         if method == XRDS and radius:
-            truths, alone = self._references(), clip.xrds(MIDDLE, 0)
-            more |= blocks.against_alone(once(MIDDLE), alone, truths, clip.stops)
+            truths = self._references()
+            more |= blocks.against_alone(once(MIDDLE), clip.alone, truths, clip.stops)
         point = {
             "scene": self.frames.shot.name,
             "motion": motion,

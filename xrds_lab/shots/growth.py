@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 import sys
-import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,6 +21,7 @@ from ..bench import machine
 from ..bench.growth import power
 from ..bench.inputs import Folder
 from ..bench.journal import Journal
+from ..bench.stages import clocked
 from ..bench.workload import Meter
 from ..progress import report_line
 
@@ -191,15 +191,14 @@ def _shot(run: Run) -> Iterator[tuple[str, Row]]:
 
 
 def _clocked(work: Callable[[], Any]) -> tuple[Any, Row]:
-    known = machine.forget_peak()
-    wall, processor = time.perf_counter(), time.process_time()
-    result = work()
+    made: list[Any] = []
+    run = clocked(lambda: made.append(work()))
     figures = {
-        "seconds": round(time.perf_counter() - wall, 4),
-        "processor_seconds": round(time.process_time() - processor, 4),
-        "peak_memory": machine.peak() if known else None,
+        "seconds": round(run["seconds"], 4),
+        "processor_seconds": round(run["cpu"], 4),
+        "peak_memory": run["peak"],
     }
-    return result, figures
+    return made[0], figures
 
 
 # --- the report -----------------------------------------------------------------------

@@ -19,7 +19,7 @@ from ..bench.plots import MEASURES as LABELS
 from .crops import REFERENCE, crop_key
 from .figures import BEST, DEFAULT, MEDIAN, XRDS
 from .motions import MOTIONS
-from .plot import LINES
+from .plot import LINES, PERCENTILES
 from .seeds import over_seeds
 
 if TYPE_CHECKING:
@@ -37,8 +37,6 @@ MEASURES = {
     "relmse_trimmed": LABELS["relmse_trimmed"],
     "flicker": "flicker (sRGB)",
 }
-PERCENTILES = (5, 50, 95)
-"""Of the scenes: the bar's beginning, the point, and the bar's end."""
 _ORDER = [DEFAULT, BEST, MEDIAN, XRDS]
 _DIGITS = 5
 

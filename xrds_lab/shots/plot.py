@@ -24,7 +24,8 @@ LINES = {
     (XRDS, 2): ("XRDS, radius 2", "#009e73", "-.", "v"),
     (XRDS, 4): ("XRDS, radius 4", "#0072b2", "-", "D"),
 }
-_FROM, _TO = 5, 95  # percentiles over scenes
+PERCENTILES = (5, 50, 95)
+"""Of the scenes: the bar's beginning, the point, and the bar's end."""
 
 
 def error_plot(
@@ -54,10 +55,7 @@ def error_plot(
         seconds = [np.median([p["seconds_per_frame"] for p in g]) for g in whole]
         for panel, measure in zip(panels, MEASURES, strict=True):
             low, middle, high = np.transpose(
-                [
-                    np.percentile([p[measure] for p in g], (_FROM, 50, _TO))
-                    for g in whole
-                ]
+                [np.percentile([p[measure] for p in g], PERCENTILES) for g in whole]
             )
             style = {"color": colour, "linestyle": dash, "linewidth": 1.4}
             panel.plot(seconds, middle, label=name, marker=mark, markersize=4, **style)
