@@ -38,6 +38,7 @@ def test_each_method_has_a_row_that_is_measured_once(
     assert len(rows[SAME_PICTURE]["shares"]) == sooner.FRAMES
     assert rows[SAME_PICTURE]["mean_share"] <= 1.0
     assert rows[SAME_SAMPLES]["gain"] > rows[SAME_PICTURE]["gain"] - 1.0
+    assert all(0 < row["flicker"] < 0.1 for row in rows.values())
     assert all(row["seconds"] > 0 and row["psnr"] > 15 for row in rows.values())
     report = (blend.parent / "out" / "report.md").read_text()
     assert report.count("| cubes | 8 |") == 3

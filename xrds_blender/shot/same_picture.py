@@ -196,6 +196,7 @@ class SamePicture:
     _tried: float = 1.0
     _ratio: float = 1.0
     _shares: dict[int, float] = field(default_factory=dict)  # that all pixels have
+    _call: float = 0.0  # what more samples cost each time, in samples of a block
     _taken: int = 0  # of the sequence that frames continue under a still camera
     _taken_more: int = 0  # of that of more samples
 
@@ -229,6 +230,7 @@ class SamePicture:
         shape = own.views[view].shape
         extra: dict[str, ExtraSamples] = {}
         regions: list[Region] = []
+        more = self._priced(more, shape)
         if self._worth.is_due(len(beside)):
             regions = measured_regions(shape)
             ratio, extra = self._measure(method, own, others, regions, spent.of(more))
@@ -344,24 +346,43 @@ class SamePicture:
     ) -> dict[str, ExtraSamples]:
         """Render more samples where a frame lacks them, up to all of the file's."""
         extra: dict[str, ExtraSamples] = {}
-        for rows, columns in rectangles(lacks):
+        if not lacks.any():
+            return extra
+        length = self._missing(share, gained, lacks)
+        for rows, columns in rectangles(lacks, self._call / max(length, 1)):
             there = np.zeros_like(lacks)
             there[rows, columns] = lacks[rows, columns]
-            missing = min(
-                1.0 - float(self._equal(share, gained.of(there))), 1.0 - share
-            )
-            first = round(self.samples * share)
-            length = min(round(self.samples * missing), self.samples - first)
+            length = self._missing(share, gained, there)
             if length < 1:
                 continue
+            first = round(self.samples * share)
             region = _region(rows, columns, shape)
             begin = None if self.history is None else self._taken_more
             self._taken_more += length
-            part = Part(first, length, missing, region, begin)
+            part = Part(first, length, length / self.samples, region, begin)
             for view, samples in more(part).items():
                 whole = extra.setdefault(view, _nothing(shape, samples.parts))
                 _put(whole, region, samples)
         return extra
+
+    def _priced(self, more: More, shape: tuple[int, int]) -> More:
+        """The same; what a call costs beside its samples is noted."""
+
+        def priced(part: Part) -> tuple[dict[str, ExtraSamples], dict[str, float]]:
+            found, seconds = more(part)
+            region = part.region or Region(0, 0, shape[1], shape[0])
+            samples = part.length * region.width * region.height / BLOCK**2
+            if seconds["beauty"]:
+                self._call = samples * seconds["sync"] / seconds["beauty"]
+            return found, seconds
+
+        return priced
+
+    def _missing(self, share: float, gained: Gain, blocks: NDArray[np.bool_]) -> int:
+        """How many samples some blocks lack, up to all of the file's."""
+        equal = float(self._equal(share, gained.of(blocks)))
+        most = self.samples - round(self.samples * share)
+        return min(max(round(self.samples * (1.0 - equal)), 0), most)
 
     def _choose_next(self, share: float, gain: float, others: Sequence[int]) -> None:
         """Let the next frames have about the share that is enough if all have it.

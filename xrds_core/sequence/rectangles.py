@@ -13,17 +13,19 @@ Rectangle = tuple[slice, slice]
 """Rows and columns."""
 
 
-def rectangles(blocks: NDArray[np.bool_], most: int = 4) -> list[Rectangle]:
+def rectangles(
+    blocks: NDArray[np.bool_], call: float = 0.0, most: int = 4
+) -> list[Rectangle]:
     """Return up to `most` rectangles of blocks that cover all that are marked.
 
     The rectangle that gains most by it is divided in two, as long as that leaves out
-    a quarter of it.
+    a quarter of it, and more blocks than a `call` costs as much as.
     """
     found = [x for x in (_bounds(blocks),) if x is not None]
     while found and len(found) < most:
         splits = [(_split(blocks, each), each) for each in found]
         (parts, gain), divided = max(splits, key=lambda x: x[0][1])
-        if not parts or gain < 0.25 * _area(divided):
+        if not parts or gain < max(0.25 * _area(divided), call):
             break
         found.remove(divided)
         found += parts

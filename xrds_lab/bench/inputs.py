@@ -18,6 +18,8 @@ from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
 
+from ..cards.cycles import render_on
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -148,8 +150,11 @@ def kept(directory: Path | None) -> Iterator[Folder]:
         yield Folder(Path(temporary))
 
 
-def open_scene(path: Path, window: Window) -> Any:
-    """Open a scene file and set it up for the standard measure; returns the scene."""
+def open_scene(path: Path, window: Window, device: str | None = None) -> Any:
+    """Open a scene file and set it up for the standard measure; returns the scene.
+
+    Cycles renders on a `device` as in `Shot`, None for what the file says.
+    """
     import bpy
 
     from xrds_blender.interface.registration import ensure_registered
@@ -160,6 +165,8 @@ def open_scene(path: Path, window: Window) -> Any:
     window.apply(scene)
     scene.cycles.use_adaptive_sampling = False
     scene.cycles.time_limit = 0
+    if device is not None:
+        render_on(scene, device)
     return scene
 
 

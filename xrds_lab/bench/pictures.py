@@ -132,7 +132,7 @@ class Pictures:
 
         for part in _sessions(left):
             with journal.attempt(f"{self.shot.name}: rendering its inputs"):
-                scene = open_scene(self.shot.path, self.shot.window)
+                scene = open_scene(self.shot.path, self.shot.window, self.shot.device)
                 exposure = np.float32(scene.view_settings.exposure)
                 first = part[0]
                 if first.noise_threshold is not None:

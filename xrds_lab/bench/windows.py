@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import UsageError
 
+from ..cards.cycles import CPU
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
@@ -57,13 +59,15 @@ class Window:
 class Shot:
     """A scene file seen through a window, with the reference to compare with.
 
-    Without one, `xrds bench` renders its own.
+    Without one, `xrds bench` renders its own. Cycles renders on a `device`: the
+    processor, or a kind of card as `find_card` names it.
     """
 
     path: Path
     window: Window
     reference: Path | None
     digest: str
+    device: str = CPU
 
     @property
     def name(self) -> str:
@@ -72,9 +76,10 @@ class Shot:
 
     @property
     def identity(self) -> str:
-        """Scene and frame size, for the names of files of seconds."""
+        """Scene, frame size and card, for the names of files of seconds."""
         frame = f"{self.window.frame_width}x{self.window.frame_height}"
-        return f"{self.name}-{self.digest}-{frame}"
+        card = "" if self.device == CPU else f"-{self.device.lower()}"
+        return f"{self.name}-{self.digest}-{frame}{card}"
 
 
 def read_windows(path: Path) -> dict[str, Window]:
@@ -97,11 +102,12 @@ def find_shots(
     windows: Path | None,
     references: Path | None,
     resolution: tuple[int, int] | None = None,
+    device: str = CPU,
 ) -> list[Shot]:
     """A shot of each scene file, of the whole frame without `windows`.
 
-    `resolution` replaces the files' own. Raises UsageError for what is missing or
-    contradicts.
+    `resolution` replaces the files' own. `device` is as in `Shot`. Raises UsageError
+    for what is missing or contradicts.
     """
     if windows is not None and resolution is not None:
         raise UsageError(
@@ -126,7 +132,7 @@ def find_shots(
         if reference is not None and not reference.is_file():
             raise UsageError(f"there is no reference {reference} for {path}")
         window = known.get(path.stem) or _whole(path, resolution)
-        shots.append(Shot(path, window, reference, digest(path)))
+        shots.append(Shot(path, window, reference, digest(path), device))
     return shots
 
 

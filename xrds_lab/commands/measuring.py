@@ -266,6 +266,11 @@ def _add_shots(group: Any) -> None:
         help="time the picture of the file's samples, with fewer; on a quiet machine",
     )
     add(
+        "--card",
+        action="store_true",
+        help="with --same-picture: Cycles renders on this machine's graphics card",
+    )
+    add(
         "--light-parts",
         action="store_true",
         help="judge the parts of the light under a moving camera",
@@ -462,6 +467,7 @@ def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _bench_same_picture(options: argparse.Namespace) -> dict[str, Any]:
+    from ..cards.cycles import CPU, find_card
     from ..shots.sooner import MOST_SAMPLES, SAMPLES, Case, bench_same_picture
 
     cases = [
@@ -472,7 +478,12 @@ def _bench_same_picture(options: argparse.Namespace) -> dict[str, Any]:
             *(Case(motion, MOST_SAMPLES, x) for x in options.noise_thresholds or ()),
         )
     ]
-    return bench_same_picture(options.scenes, options.out, cases, **_inputs(options))
+    device = find_card() if options.card else CPU
+    if options.card and device == CPU:
+        raise UsageError("Cycles finds no graphics card here: leave out --card")
+    return bench_same_picture(
+        options.scenes, options.out, cases, device=device, **_inputs(options)
+    )
 
 
 def _bench_light_parts(options: argparse.Namespace) -> dict[str, Any]:

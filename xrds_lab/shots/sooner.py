@@ -25,12 +25,13 @@ from .. import metrics
 from ..bench import machine
 from ..bench.inputs import Folder, open_scene, sample_adaptively
 from ..bench.journal import Journal
-from ..bench.pictures import Networks, Pictures
+from ..bench.pictures import HALF_SEEDS, Networks, Pictures
 from ..bench.windows import find_shots
+from ..cards.cycles import CPU
 from ..csv_table import write_table
 from ..gallery.judge import compare
 from ..progress import report_line
-from .figures import REACH
+from .figures import REACH, wrong_change
 from .frames import MIDDLE
 from .motions import animate
 
@@ -71,13 +72,14 @@ class Case:
 
 @dataclass(frozen=True)
 class Made:
-    """A method's middle frame (H, W, 3), seen at `stops`, and what it took.
+    """A method's middle frame (H, W, 3) and the next, seen at `stops`, and their price.
 
     `seconds` are of a frame by the clock, `processor` of all cores; `shares` of the
     file's samples, one for each frame.
     """
 
     radiance: Array
+    following: Array
     seconds: float
     processor: float
     stops: float
@@ -95,12 +97,14 @@ def bench_same_picture(
     resolution: tuple[int, int] | None = None,
     cache: Path | None = None,
     reference_samples: int = 256,
+    device: str = CPU,
 ) -> dict[str, Any]:
     """Measure what is missing, write the report into `out` and return it.
 
     Errors are of the shot's middle frame, which is the file's own view, against two
     renders of `reference_samples` each, without their noise; with `references` against
-    these. Raises UsageError for missing files and too short a shot.
+    these. Cycles renders on a `device` as in `Shot`. Raises UsageError for missing
+    files and too short a shot.
     """
     if frames < 2 * REACH + 1:
         raise UsageError(f"{frames} frames: give {2 * REACH + 1} or more")
@@ -111,7 +115,7 @@ def bench_same_picture(
         networks = Networks(None, "cpu")
         parts = [
             _Scene(shot, folder, Pictures(shot, folder, networks, reference_samples))
-            for shot in find_shots(scenes, windows, references, resolution)
+            for shot in find_shots(scenes, windows, references, resolution, device)
         ]
         for methods in _IN_TURN:
             for case, part in product(cases, parts):
@@ -148,7 +152,7 @@ class _Scene:
         for method in missing:
             report_line(f"{self.shot.name}: {case.label}, {method}")
             made = work[method]()
-            picture = {"radiance": made.radiance}
+            picture = {"radiance": made.radiance, "following": made.following}
             self.folder.write(self._picture(case, method), picture, {})
             self.rows[f"{case.label}-{method}"] = self._judged(case, method, made)
             write_json(self._path, self.rows)
@@ -159,7 +163,10 @@ class _Scene:
         pictures = made.radiance, single["radiance"], *self.pictures.references()
         shown, alone, *truth = (metrics.to_srgb(x, made.stops) for x in pictures)
         verdict = compare(shown, alone, truth)
-        error = metrics.flip(made.radiance, self.pictures.reference(), made.stops)
+        reference = self.pictures.reference()
+        error = metrics.flip(made.radiance, reference, made.stops)
+        both = made.radiance, made.following
+        flicker = wrong_change(both, (reference, self._following(case)), made.stops)
         own = {"seconds": made.seconds, "processor_seconds": made.processor}
         cycles = self.rows.get(f"{case.label}-{CYCLES}", own)
         ratios = {name: round(x / cycles[name], 3) for name, x in own.items()}
@@ -178,9 +185,26 @@ class _Scene:
             "psnr": round(verdict.psnr, 3),
             "gain": round(verdict.gain, 3),
             "flip": round(error, 5),
+            "flicker": round(flicker, 5),
             "worst_block": round(verdict.worst, 2),
             "share_of_blocks": round(verdict.share, 4),
         }
+
+    def _following(self, case: Case) -> Array:
+        """The reference of the frame after the middle one, to judge flicker by."""
+        from xrds_blender import render
+
+        case = Case(case.motion, self.pictures.reference_samples)
+        name = self._picture(case, "following")
+        kept = self.folder.read(name)
+        if kept is None:
+            scene = _opened(self.shot, case, REACH)
+            scene.cycles.seed = HALF_SEEDS[0]  # of other noise than the methods'
+            scene.frame_set(scene.frame_current + 1)
+            picture = render(scene, plain=True, denoiser=DEFAULT_DENOISING)
+            kept = {"radiance": np.asarray(picture.radiance, np.float32)}
+            self.folder.write(name, kept, {})
+        return kept["radiance"]
 
     def _picture(self, case: Case, method: str) -> str:
         window = self.shot.window.label
@@ -188,7 +212,7 @@ class _Scene:
 
 
 def _opened(shot: Shot, case: Case, reach: int) -> Any:
-    scene = open_scene(shot.path, shot.window)
+    scene = open_scene(shot.path, shot.window, shot.device)
     scene.cycles.samples = case.samples
     if case.noise_threshold is not None:
         sample_adaptively(scene, case.samples, case.noise_threshold)
@@ -202,7 +226,7 @@ def _cycles(shot: Shot, case: Case, frames: int) -> Made:
     from xrds_blender import render
 
     scene = _opened(shot, case, frames // 2)
-    seconds, processor, radiance = [], [], np.empty(0)
+    seconds, processor, shown = [], [], {}
     middle = scene.frame_current
     for number in range(middle - _TIMED // 2, middle + _TIMED // 2 + 1):
         scene.frame_set(number)
@@ -210,10 +234,9 @@ def _cycles(shot: Shot, case: Case, frames: int) -> Made:
         picture = render(scene, plain=True, denoiser=DEFAULT_DENOISING)
         seconds.append(time.perf_counter() - started)
         processor.append(time.process_time() - busy)
-        if number == middle:
-            radiance = np.asarray(picture.radiance, np.float32)
+        shown[number] = np.asarray(picture.radiance, np.float32)
     taken = statistics.median(seconds), statistics.median(processor)
-    return Made(radiance, *taken, _stops(scene))
+    return Made(shown[middle], shown[middle + 1], *taken, _stops(scene))
 
 
 def _same_picture(shot: Shot, case: Case, frames: int) -> Made:
@@ -235,16 +258,17 @@ def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     middle = scene.frame_current
     numbers = range(middle - reach, middle + reach + 1)
     job = render_request(scale=1, temporal_radius=REACH, **choices)
-    radiance, shares = np.empty(0), []
+    shown, shares = {}, []
     started, busy = time.perf_counter(), time.process_time()
     for number, picture in render_shot(scene, job, numbers):
         assert picture.settings is not None
         shares.append(float(picture.settings.share))
-        if number == middle:
-            radiance = np.asarray(picture.radiance, np.float32)
+        if number in (middle, middle + 1):
+            shown[number] = np.asarray(picture.radiance, np.float32)
     seconds = (time.perf_counter() - started) / len(numbers)
     processor = (time.process_time() - busy) / len(numbers)
-    return Made(radiance, seconds, processor, _stops(scene), tuple(shares))
+    pictures = shown[middle], shown[middle + 1]
+    return Made(*pictures, seconds, processor, _stops(scene), tuple(shares))
 
 
 def _stops(scene: Any) -> float:
@@ -263,6 +287,7 @@ _COLUMNS = {
     "psnr": "PSNR",
     "gain": "gain",
     "flip": "FLIP",
+    "flicker": "flicker",
     "worst_block": "worst block",
     "share_of_blocks": "blocks below -1 dB",
 }
@@ -271,7 +296,7 @@ _COLUMNS = {
 def _write(parts: Sequence[_Scene], journal: Journal, out: Path) -> dict[str, Any]:
     rows = [row for part in parts for row in part.rows.values()]
     results = {
-        "machine": machine.describe(),
+        "machine": machine.describe(parts[0].shot.device.lower()),
         "shots": rows,
         "failures": journal.failures,
     }
