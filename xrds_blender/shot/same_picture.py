@@ -61,7 +61,7 @@ _FALL = 0.5  # the next share over the present one, at least, where frames add u
 _LEAST_AREA = 200_000  # pixels that are measured in, where there are more
 _LEAST = 2  # samples of a frame, which has halves then
 # Blocks with less than this share of what they need get more samples, and frames.
-_LACKING, _ENOUGH = 0.75, 0.9
+_LACKING, _ENOUGH = 0.5, 0.8
 _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
 # The share of the next frames stays as it is as long as it is off by no more: Cycles
 # syncs the scene again for another number of samples.
@@ -140,7 +140,10 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     if can_continue(scene, request):
         history = History(Accumulator(request.machine.accumulate_on))
     neighbours = 2 * request.settings.temporal_radius
-    found = SamePicture(scene.cycles.samples, history, neighbours=neighbours)
+    exposure = 2.0**scene.view_settings.exposure
+    found = SamePicture(
+        scene.cycles.samples, history, neighbours=neighbours, exposure=exposure
+    )
     found.share = found.possible(_FIRST)
     return found
 
@@ -184,13 +187,14 @@ class SamePicture:
     `samples` are the file's, with a noise threshold the most that a pixel takes. Under
     a camera that stands still frames that have left the window count, as `history`. The
     next frame to be sampled takes a `share` of them. Frames have so many `neighbours`,
-    but fewer near the ends of the shot.
+    but fewer near the ends of the shot. White is a luminance of 1 / `exposure`.
     """
 
     samples: int
     history: History | None = None
     share: float = _FIRST
     neighbours: int = 0
+    exposure: float = 1.0
     _worth: Worth = field(default_factory=Worth)
     _measured_in: int = 0
     _tried: float = 1.0
@@ -333,8 +337,9 @@ class SamePicture:
                 noisy,
             )
         )
-        fall = error_fall(alone, self._shares.get(own.number, 1.0), noisy, parts)
-        return error_ratio(together, noisy, parts, fall), extra
+        share = self._shares.get(own.number, 1.0)
+        fall = error_fall(alone, share, noisy, parts, self.exposure)
+        return error_ratio(together, noisy, parts, fall, self.exposure), extra
 
     def _top_up(
         self,

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 BLOCK = 32  # pixels across
 FALL = 0.7
 """The error of a denoised picture falls with about this power of its samples."""
-_LEAST_FALL, _MOST_FALL = 0.5, 0.9  # beyond, a small picture shows chance
+_LEAST_FALL, _MOST_FALL = 0.5, 0.8  # beyond, a small picture shows chance
 # The more samples, the slower errors fall: from 4 to 16 samples 0.69 to 0.98 times as
 # fast as from 2 to 4, in seven scenes, 0.84 on the mean.
 _SLOWER = 0.85
@@ -40,6 +40,9 @@ _APART = 1.5
 _NOISIEST = 0.01
 _DARKEST = 0.02  # of the mean luminance; darker pixels count as if they were as bright
 _SMOOTH = 7  # pixels across
+# Pixels across that what is left of a picture is smoothed over: noise is fine, errors
+# of denoised pictures are coarse. Over more, errors in fine texture are lost.
+_COARSE = 3
 # Standard deviation of noise that nobody sees, of the square root of luminance and
 # relative to it: 0.2 % of the light.
 _UNSEEN = 1e-3
@@ -55,34 +58,43 @@ class Rendered:
 
 
 def error_ratio(
-    picture: Array, noisy: Array, parts: tuple[Rendered, Rendered], fall: float = FALL
+    picture: Array,
+    noisy: Array,
+    parts: tuple[Rendered, Rendered],
+    fall: float = FALL,
+    exposure: float = 1.0,
 ) -> Ratio:
     """Return the squared error of a picture over that of a frame of all samples.
 
     `parts` are half of all samples each, of seeds of their own; `picture` (H, W, 3) and
     `noisy`, the mean of samples that the parts do not have either, were made without
-    them. All are radiance. Errors count relative to the local luminance, as they do to
-    the eye. The ratio is infinite where noise hides the error of all samples; errors
-    fall with their number's power `fall`.
+    them. All are radiance. Errors count as they are seen: relative to the local
+    luminance, and less where it is beyond white, 1 / `exposure`. The ratio is infinite
+    where noise hides the error of all samples; errors fall with their number's power
+    `fall`.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
-        ours, half = _errors(picture, noisy, parts)
+        ours, half = _errors(picture, noisy, parts, exposure)
         return Ratio(*_ratio(ours, half * 0.5**fall), fall)
 
 
 def error_fall(
-    alone: Array, share: float, noisy: Array, parts: tuple[Rendered, Rendered]
+    alone: Array,
+    share: float,
+    noisy: Array,
+    parts: tuple[Rendered, Rendered],
+    exposure: float = 1.0,
 ) -> float:
     """Return the power of the samples with which errors fall, up to all of them.
 
-    `alone` (H, W, 3) is a picture of a `share` of all, by themselves; `noisy` and
-    `parts` are as in `error_ratio`. Where they tell nothing it is `FALL`.
+    `alone` (H, W, 3) is a picture of a `share` of all, by themselves; `noisy`, `parts`
+    and `exposure` are as in `error_ratio`. Where they tell nothing it is `FALL`.
     """
     apart = 0.5 / share
     if apart < _APART:
         return FALL
     with np.errstate(over="ignore", invalid="ignore"):
-        ratio, _ = _ratio(*_errors(alone, noisy, parts))
+        ratio, _ = _ratio(*_errors(alone, noisy, parts, exposure))
     if not 0.0 < ratio < float("inf"):
         return FALL
     fall = _SLOWER * np.log(ratio) / np.log(apart)
@@ -90,26 +102,32 @@ def error_fall(
 
 
 def _errors(
-    picture: Array, noisy: Array, parts: tuple[Rendered, Rendered]
+    picture: Array, noisy: Array, parts: tuple[Rendered, Rendered], exposure: float
 ) -> tuple[Array, Array]:
     """Return the errors of the picture and of half of all samples, by blocks."""
     one, two = parts
     bright = box(luminance((picture + one.denoised + two.denoised) / 3), _SMOOTH)
     bright += max(float(bright.mean()) * _DARKEST, _TINY)
-    scale = np.nan_to_num(1.0 / bright, posinf=0.0)[..., None]
+    shown = 1.0 + bright * np.float32(exposure)  # tones beyond white are pressed
+    scale = np.nan_to_num(1.0 / (bright * shown**2), posinf=0.0)[..., None]
 
     def product(first: Array, second: Array) -> Array:
         light = (first * second * scale).mean(-1)
         return block_means(np.nan_to_num(light, posinf=0.0, neginf=0.0))
 
     def error(made: Array, first: Array, second: Array) -> Array:
-        return product(made - first, made - second)
+        return product(_smoothed(made - first), _smoothed(made - second))
 
     noise = product(one.noisy - two.noisy, one.noisy - two.noisy)
     kept = noise <= np.quantile(noise, 1.0 - _NOISIEST)
     half = error(one.denoised, two.noisy, noisy) + error(two.denoised, one.noisy, noisy)
     ours = error(picture, one.noisy, two.noisy)
     return ours[kept], 0.5 * half[kept]
+
+
+def _smoothed(light: Array) -> Array:
+    planes = [box(np.nan_to_num(light[..., i]), _COARSE) for i in range(3)]
+    return np.stack(planes, axis=-1)
 
 
 def _ratio(one: Array, two: Array) -> tuple[float, float]:

@@ -231,7 +231,7 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
     assert len(same_picture.measured_regions((96, 128))) == 2
     sizes: list[int] = []
 
-    def noted(ours: Any, noisy: Any, parts: Any, fall: float) -> Ratio:
+    def noted(ours: Any, noisy: Any, parts: Any, *_: Any) -> Ratio:
         sizes.append(ours.shape[0] * ours.shape[1])
         assert ours.shape == noisy.shape == parts[0].noisy.shape
         return Ratio(float("inf"), 0.0, 0.7)

@@ -20,8 +20,7 @@ def ratio(worth: float, spread: float = 0.0, chance: float = 0.0) -> Ratio:
 def test_it_is_found_from_errors(worth: float) -> None:
     found = Worth()
     found.add(ratio(worth), SHARE, GAIN, NEIGHBOURS)
-    assert found.value == pytest.approx(worth, abs=0.06)
-    assert found.value <= worth
+    assert worth - 0.2 < found.value < worth + 0.05  # the usual one counts as well
 
 
 def test_it_is_the_usual_one_where_chance_hides_it() -> None:
@@ -42,13 +41,12 @@ def test_what_noise_hides_is_worth_nothing() -> None:
 
 def test_chance_counts_less_the_more_is_measured() -> None:
     rng, found, values = np.random.default_rng(1), Worth(), []
-    for _ in range(12):
+    for _ in range(40):
         chance = rng.normal(0.0, 0.3)
-        found.add(ratio(0.4, 0.3, chance), SHARE, GAIN, NEIGHBOURS)
+        found.add(ratio(0.7, 0.3, chance), SHARE, GAIN, NEIGHBOURS)
         values.append(found.value)
-    assert values[0] < 0.4
-    assert 0.25 < values[-1] < 0.55
-    assert values[-1] > values[0]
+    assert values[0] < 0.6
+    assert 0.6 < values[-1] < 0.8
 
 
 def test_neighbours_on_one_side_count_until_there_are_two() -> None:
@@ -56,7 +54,7 @@ def test_neighbours_on_one_side_count_until_there_are_two() -> None:
     assert found.is_due(4)
     found.add(ratio(0.1), SHARE, GAIN, 4)
     found.add(ratio(0.6), SHARE, GAIN, NEIGHBOURS)
-    assert found.value == pytest.approx(0.6, abs=0.03)
+    assert 0.5 < found.value < 0.6
 
 
 def test_it_is_measured_ever_more_seldom() -> None:
