@@ -165,7 +165,10 @@ def write_combined(engine: Any, layer_name: str, pictures: dict[str, Array]) -> 
 def free(engine: Any) -> None:
     """End the engine's session if it has one."""
     if getattr(engine, "session", None):
-        functions().free(engine)  # takes the attribute away
+        # not `functions`: Blender ends what it keeps as it switches Cycles off
+        from cycles import engine as cycles
+
+        cycles.free(engine)  # takes the attribute away
     engine.session = None
 
 

@@ -6,6 +6,10 @@ the scene between these two calls only, and nobody sees it: a file saved, an und
 or a panel drawn while the render runs has the scene's own engine. The name is written
 in place: Blender's property would restart viewports, and only the main thread may set
 it.
+
+With persistent data Blender keeps the engine, and with it the synced scene, for the
+next render of the scene, whoever is asked for it. So ours is kept for our next one, and
+freed before one by another engine.
 """
 
 from __future__ import annotations
@@ -34,12 +38,15 @@ class Override:
     `offset` is where the name lies in the render settings, the same in every scene.
     `waiting` is the scene whose next render is to be ours; `named` the one that bears
     our name now, with the bytes of its own; `last` that of the render that goes on.
+    `kept` is the session identifier of the scene whose engine Blender keeps, if that is
+    ours.
     """
 
     offset: int | None = None
     waiting: Any = None
     named: tuple[Any, bytes] | None = None
     last: Any = None
+    kept: int | None = None
 
 
 def begin(scene: Any) -> None:
@@ -50,8 +57,10 @@ def begin(scene: Any) -> None:
     """
     if scene.render.engine != ENGINE:
         _find(scene.render)
-        _free_last_engine(scene)
-        PROCESS.of(Override).waiting = scene
+        state = PROCESS.of(Override)
+        if state.kept != scene.session_uid:
+            _free_last_engine(scene)
+        state.waiting = scene
 
 
 def withdraw() -> None:
@@ -67,6 +76,8 @@ def _before_copy(scene: Any, *_: Any) -> None:
         state.named = scene, ctypes.string_at(address, _NAME_SIZE)
         state.last, state.waiting = scene, None
         ctypes.memmove(address, _padded(ENGINE), _NAME_SIZE)
+    elif state.kept == scene.session_uid:
+        _free_last_engine(scene)
 
 
 @bpy.app.handlers.persistent
@@ -83,14 +94,20 @@ def _at_end(*_: Any) -> None:
     state = PROCESS.of(Override)
     if state.last is not None:
         scene, state.last = state.last, None
-        _free_last_engine(scene)
+        state.kept = scene.session_uid
+
+
+@bpy.app.handlers.persistent
+def _at_cancel(*_: Any) -> None:
+    scene = PROCESS.of(Override).last
+    _at_end()
+    if scene is not None:
+        _free_last_engine(scene)  # in whatever state it was stopped
 
 
 def _free_last_engine(scene: Any) -> None:
-    """Free what Blender keeps of the last render, which may be another engine's.
-
-    It keeps the engine for persistent data, and would render with it.
-    """
+    """Free what Blender keeps of the last render, which may be another engine's."""
+    PROCESS.of(Override).kept = None
     if scene.render.use_persistent_data:
         scene.render.use_persistent_data = False
         scene.render.use_persistent_data = True
@@ -140,13 +157,16 @@ def register() -> None:
     handlers.render_init.append(_before_copy)
     handlers.render_pre.insert(0, _after_copy)
     handlers.render_complete.append(_at_end)
-    handlers.render_cancel.append(_at_end)
+    handlers.render_cancel.append(_at_cancel)
 
 
 def unregister() -> None:
-    """Listen no more."""
+    """Listen no more; what Blender keeps of our renders is freed."""
+    for scene in bpy.data.scenes:
+        if scene.session_uid == PROCESS.of(Override).kept:
+            _free_last_engine(scene)
     handlers = bpy.app.handlers
     handlers.render_init.remove(_before_copy)
     handlers.render_pre.remove(_after_copy)
     handlers.render_complete.remove(_at_end)
-    handlers.render_cancel.remove(_at_end)
+    handlers.render_cancel.remove(_at_cancel)

@@ -10,6 +10,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy")
 
+from xrds_blender.cycles import session
 from xrds_blender.internals import engine_override
 from xrds_blender.internals.lifetimes import PROCESS
 from xrds_blender.shot import render
@@ -68,6 +69,27 @@ def test_the_next_render_is_by_the_scenes_engine(
     bpy.ops.render.render()
     assert len(renders) == 1
     assert life.render.use_persistent_data is persistent
+
+
+@pytest.mark.parametrize(("persistent", "sessions"), [(False, 3), (True, 2)])
+def test_persistent_data_is_kept_from_one_of_our_renders_to_the_next(
+    life: Any, monkeypatch: pytest.MonkeyPatch, persistent: bool, sessions: int
+) -> None:
+    life.render.engine, life.render.use_persistent_data = "CYCLES", persistent
+    engines: list[str] = []
+    cycles = session.functions()
+    create = cycles.create
+
+    def noted(engine: Any, *more: Any) -> None:
+        engines.append(engine.bl_idname)
+        create(engine, *more)
+
+    monkeypatch.setattr(cycles, "create", noted)
+    for _ in range(2):
+        render.render(life, 1)
+    bpy.ops.render.render()  # by Cycles: what is kept of ours is freed
+    render.render(life, 1)
+    assert engines.count(engine_override.ENGINE) == sessions
 
 
 def test_an_animation_is_lent_for_all_its_frames(
