@@ -452,7 +452,7 @@ def _with_more(
     for view, more in extra.items():
         alone = accumulate(own.views[view], [])
         gathered[view] = with_extra(own.gathered[view], alone, more, weight)
-        views[view] = enriched(own.views[view], more)
+        views[view] = enriched(own.views[view], alone, more)
     return replace(own, views=views, gathered=gathered) if extra else own
 
 

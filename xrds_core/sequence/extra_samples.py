@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..temporal.accumulate import accumulate
 from ..temporal.frame import pack, pack_counts, pack_parts
 from ..temporal.noise import brightness
 
@@ -56,18 +55,30 @@ def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
     return ExtraSamples(radiance, albedo, normal, alpha, total, light)
 
 
-def enriched(frame: Stored, extra: ExtraSamples) -> Stored:
-    """Return a frame whose own samples are extra ones as well."""
-    alone = accumulate(frame, [])
+def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
+    """Return a frame whose own samples are extra ones as well.
+
+    `alone` is the frame as accumulated without neighbours.
+    """
     found = with_extra(alone, alone, extra)
-    passes = found.radiance, found.albedo, found.normal, found.alpha
-    picture, invalid = pack(*passes, frame.picture.dtype)
+    rows = _rows(extra.samples)
+    width = frame.shape[1]
+    place = slice(rows.start * width, rows.stop * width)
+    picture = frame.picture.copy()
+    invalid = np.zeros(len(picture), bool)
+    if frame.invalid is not None:
+        invalid |= frame.invalid
+    light, alpha = (
+        None if x is None else x[rows] for x in (found.radiance, found.alpha)
+    )
+    guides = found.albedo[rows], found.normal[rows]
+    picture[place], invalid[place] = pack(light, *guides, alpha, picture.dtype)
     total = found.samples
     is_even = bool((total == total.flat[0]).all())
     noise = frame.noise
     if noise is not None:
-        share = (alone.samples / np.maximum(total, 1e-9)).ravel()
-        noise = noise.within(share, brightness(extra.radiance).ravel())
+        share = (alone.samples[rows] / np.maximum(total[rows], 1e-9)).ravel()
+        noise = noise.within(share, brightness(extra.radiance[rows]).ravel(), place)
     return replace(
         frame,
         samples=max(float(total.mean()), 1e-9),
@@ -87,14 +98,15 @@ def with_extra(
     `alone` is the frame without its neighbours, whose samples count as `worth` of its
     own.
     """
-    usable = np.isfinite(extra.alpha) & (extra.samples > 0.0)
+    rows = _rows(extra.samples)  # often few of many
+    usable = np.isfinite(extra.alpha[rows]) & (extra.samples[rows] > 0.0)
     for part in (extra.radiance, extra.albedo, extra.normal):
-        usable &= np.isfinite(part).all(axis=-1)
+        usable &= np.isfinite(part[rows]).all(axis=-1)
     neighbours = np.float32(worth)
     counts = (
-        frame.samples * neighbours,
-        alone.samples * (np.float32(1.0) - neighbours),
-        np.where(usable, extra.samples, np.float32(0.0)),
+        frame.samples[rows] * neighbours,
+        alone.samples[rows] * (np.float32(1.0) - neighbours),
+        np.where(usable, extra.samples[rows], np.float32(0.0)),
     )
     total = np.maximum(sum(counts), np.float32(1e-9))
     shares = [(count / total).astype(np.float32) for count in counts]
@@ -102,11 +114,12 @@ def with_extra(
     def mean(*values: Array) -> Array:
         whole = values[0]
         wide = (...,) + (None,) * (whole.ndim - 2)
-        mixed = np.zeros_like(whole)
+        mixed = np.zeros_like(whole[rows])
         for each, share in zip(values, shares, strict=True):
-            # NaN where there are no samples
-            mixed += np.where(share[wide] > 0.0, each, 0.0) * share[wide]
-        return np.where(usable[wide], mixed, whole)
+            if share.any():
+                # NaN where there are no samples
+                mixed += np.where(share[wide] > 0.0, each[rows], 0.0) * share[wide]
+        return _with_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
 
     def of(name: str) -> Array | None:
         whole = getattr(frame, name)
@@ -116,6 +129,7 @@ def with_extra(
     albedo, normal = of("albedo"), of("normal")
     assert albedo is not None
     assert normal is not None
+    counted = np.where(usable, total, frame.samples[rows])
     return replace(
         frame,
         radiance=of("radiance"),
@@ -126,5 +140,17 @@ def with_extra(
             name: mean(part, alone.parts[name], extra.parts[name])
             for name, part in frame.parts.items()
         },
-        samples=np.where(usable, total, frame.samples).astype(np.float32),
+        samples=_with_rows(frame.samples, rows, counted),
     )
+
+
+def _rows(samples: Array) -> slice:
+    """Return the rows from the first to the last one with samples."""
+    found = np.flatnonzero(samples.any(axis=1))
+    return slice(found[0], found[-1] + 1) if len(found) else slice(0, 0)
+
+
+def _with_rows(whole: Array, rows: slice, values: Array) -> Array:
+    found = whole.copy()
+    found[rows] = values
+    return found

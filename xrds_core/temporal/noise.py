@@ -59,20 +59,24 @@ class Noise:
             self.brightness * valid, self.difference * valid, self.guides * valid
         )
 
-    def within(self, share: Array, others: Array) -> Noise:
+    def within(self, share: Array, others: Array, place: slice = slice(None)) -> Noise:
         """Return the noise of a mean in which these samples have a `share` (H W).
 
         `others` (H W) is the brightness of the rest; NaN where there are none of them.
+        Both are of the pixels of a `place`; elsewhere the noise stays.
         """
         rest = np.nan_to_num(others, posinf=0.0, neginf=0.0)
-        old = self.brightness.astype(np.float32)
+        old = self.brightness[place].astype(np.float32)
         root = np.sqrt(share)
         parts = (
             rest + (old - rest) * share,
-            self.difference.astype(np.float32) * root,
-            self.guides.astype(np.float32) * root,
+            self.difference[place].astype(np.float32) * root,
+            self.guides[place].astype(np.float32) * root,
         )
-        return Noise(*(_packed(x, self.difference.dtype) for x in parts))
+        found = [x.copy() for x in (self.brightness, self.difference, self.guides)]
+        for whole, part in zip(found, parts, strict=True):
+            whole[place] = _packed(part, whole.dtype)
+        return Noise(*found)
 
 
 def brightness(radiance: Array) -> Array:

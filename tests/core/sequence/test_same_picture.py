@@ -176,7 +176,7 @@ def test_extra_samples_are_the_frames_own_from_then_on() -> None:
     found, _ = frames()
     frame, samples = found[1], np.zeros(found[1].shape, np.float32)
     samples[:BLOCK] = 3.0
-    more = enriched(frame, extra(samples, 7.0))
+    more = enriched(frame, accumulate(frame, []), extra(samples, 7.0))
     assert more.counts is not None
     counts = more.counts.reshape(frame.shape)
     assert (counts[:BLOCK] == 4.0).all()
@@ -192,6 +192,8 @@ def test_extra_samples_are_the_frames_own_from_then_on() -> None:
     )
     assert apart[:BLOCK].mean() == pytest.approx(earlier[:BLOCK].mean() / 2, rel=0.01)
     assert np.array_equal(apart[BLOCK:], earlier[BLOCK:])
-    whole = enriched(frame, extra(np.full(frame.shape, 3.0, np.float32), 7.0))
+    whole = enriched(
+        frame, accumulate(frame, []), extra(np.full(frame.shape, 3.0, np.float32), 7.0)
+    )
     assert whole.counts is None
     assert whole.samples == 4.0
