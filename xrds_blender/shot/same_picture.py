@@ -51,6 +51,7 @@ from .sampling import (
     is_even,
     sampling_of,
 )
+from .sooner import Clock
 
 FEWEST_SAMPLES = 8
 """Samples of the file from which it pays."""
@@ -196,6 +197,7 @@ class SamePicture:
     neighbours: int = 0
     exposure: float = 1.0
     _worth: Worth = field(default_factory=Worth)
+    _clock: Clock = field(default_factory=Clock)
     _measured_in: int = 0
     _tried: float = 1.0
     _ratio: float = 1.0
@@ -249,6 +251,10 @@ class SamePicture:
             further = self._top_up(shape, share, gained, part, spent.of(more))
             extra = _together(extra, further)
         own = _with_more(own, extra, self._weight)
+        if regions:
+            self._clock.leave_out(time.perf_counter())
+        else:
+            self._clock.add(time.perf_counter(), own.seconds, share)
         share *= own.views[view].samples / before
         if len(regions) == 1:  # all of the picture
             self._shares[own.number] = share
@@ -315,16 +321,21 @@ class SamePicture:
         view, length = next(iter(own.views)), max(1, self.samples // 2)
         shape = own.views[view].shape
         cells: list[list[Rendered]] = []
+        seconds = 0.0
         extra: dict[str, ExtraSamples] = {}
         for region in regions:
             place = None if (region.height, region.width) == shape else region
             halves = [more(Part(0, length, 0.5, place, other=i)) for i in (1, 2)]
+            started = time.perf_counter()
             cells.append([_rendered(method, each[view]) for each in halves])
+            seconds += time.perf_counter() - started
             for name in own.views:
                 found = mean_of([each[name] for each in halves])
                 whole = extra.setdefault(name, _nothing(shape, found.parts))
                 _put(whole, region, found)
         parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
+        measured = sum(region.width * region.height for region in regions)
+        self._clock.denoising = seconds / 2 * shape[0] * shape[1] / measured
         # with the neighbours' samples: what may be wrong in them has nothing to do with
         # what denoising takes, and the frame's own few are far noisier
         noisy = own.gathered[view].radiance

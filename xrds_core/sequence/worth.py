@@ -20,7 +20,7 @@ _USUAL, _SPREAD = 0.45, 0.25
 # No ratio is better known than this, relative to it: errors do not fall quite with one
 # power of the samples, nor does every measure of them see the same.
 _EXACT = 0.06
-_CAUTION = 0.3  # probability that it is worth less: the mean less half its deviation
+_CAUTION = 0.16  # probability that it is worth less: the mean less its standard error
 _STEPS = np.linspace(0.0, 1.0, 201)
 
 

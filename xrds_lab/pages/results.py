@@ -96,7 +96,7 @@ class Results:
     @cached_property
     def same_picture(self) -> Rows:
         """*Same Picture*: seconds and errors."""
-        return self._read("shots/same-picture.json")["scenes"]
+        return self._read("shots/same-picture.json")["shots"]
 
     @cached_property
     def gallery(self) -> Rows:

@@ -116,18 +116,28 @@ def light_parts(results: Results) -> Table:
 
 def same_picture(results: Results) -> Table:
     """Seconds and errors of *Same Picture*."""
-    rows = [
-        [
-            scene_name(x["scene"]),
-            f"{x['cycles_seconds']:.1f} s",
-            f"{x['seconds']:.1f} s",
-            f"{x['seconds'] / x['cycles_seconds']:.2f}",
-            f"{x['psnr_cycles']:.1f} to {x['psnr']:.1f}",
-            f"{x['flip_cycles']:.3f} to {x['flip']:.3f}",
-        ]
-        for x in results.same_picture
-    ]
-    return [["", "Cycles + OIDN", "Same Picture", "ratio", "PSNR", "FLIP"], *rows]
+    table = [["", "samples", "share of them", "seconds", "PSNR", "FLIP", "flicker"]]
+    for own in only(results.same_picture, method="same_picture"):
+        file = {name: own[name] for name in ("scene", "samples")}
+        (alone,) = only(results.same_picture, method="cycles_oidn", **file)
+        late = own["shares"][len(own["shares"]) * 2 // 3 :]
+        table.append(
+            [
+                scene_name(own["scene"]),
+                str(own["samples"]),
+                f"{sum(late) / len(late):.2f}",
+                f"{own['ratio']:.2f}",
+                *(
+                    f"{alone[name]:{digits}} to {own[name]:{digits}}"
+                    for name, digits in (
+                        ("psnr", ".1f"),
+                        ("flip", ".3f"),
+                        ("flicker", ".4f"),
+                    )
+                ),
+            ]
+        )
+    return table
 
 
 def stills(results: Results) -> Table:
