@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,8 @@ import pytest
 
 from xrds_core.errors import UsageError
 from xrds_lab.bench.windows import find_shots
+from xrds_lab.cards import cycles
+from xrds_lab.commands import measuring
 from xrds_lab.shots import motions, sooner
 from xrds_lab.shots.sooner import CYCLES, SAME_PICTURE, SAME_SAMPLES, Case
 
@@ -49,6 +52,13 @@ def test_each_method_has_a_row_that_is_measured_once(
     for name in ("_cycles", "_same_picture", "_same_samples"):
         monkeypatch.setattr(sooner, name, refuse)
     assert run(blend, Case("pan", 8))["shots"] == first["shots"]
+
+
+def test_a_card_that_is_not_here_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cycles, "find_card", lambda: cycles.CPU)
+    options = Namespace(card=True, motions=None, samples=(8,), noise_thresholds=None)
+    with pytest.raises(UsageError, match="no graphics card"):
+        measuring._bench_same_picture(options)
 
 
 def test_a_shot_that_is_too_short_is_refused(blend: Path) -> None:
