@@ -18,7 +18,9 @@ class _Registered:
 
 
 def register() -> None:
-    """Make the command known to Blender."""
+    """Make the command known to Blender; the module bpy would never ask for it."""
+    if getattr(bpy.app, "module", False):
+        return
     PROCESS.of(_Registered).handle = bpy.utils.register_cli_command("xrds", _run)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +18,7 @@ from .panel import panels
 @dataclass
 class _State:
     is_registered: bool = False
+    ends_by_itself: bool = False  # before the interpreter does
 
 
 def register(package: str = "xrds_blender") -> None:
@@ -36,7 +38,17 @@ def register(package: str = "xrds_blender") -> None:
     panels.register()
     for handlers in _render_jobs():
         handlers.append(_forget_frames)
-    PROCESS.of(_State).is_registered = True
+    state = PROCESS.of(_State)
+    state.is_registered = True
+    if getattr(bpy.app, "module", False) and not state.ends_by_itself:
+        # as a module bpy crashes at the interpreter's end where an engine is left
+        atexit.register(_end)
+        state.ends_by_itself = True
+
+
+def _end() -> None:
+    if PROCESS.of(_State).is_registered:
+        unregister()
 
 
 def unregister() -> None:

@@ -30,6 +30,7 @@ from xrds_core.sequence.same_picture import (
     error_ratio,
     gain,
 )
+from xrds_core.sequence.sooner import Clock
 from xrds_core.sequence.worth import Ratio, Worth
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.sample_subsets import SampleSubset
@@ -51,7 +52,6 @@ from .sampling import (
     is_even,
     sampling_of,
 )
-from .sooner import Clock
 
 FEWEST_SAMPLES = 8
 """Samples of the file from which it pays."""

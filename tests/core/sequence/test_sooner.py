@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from xrds_blender.shot.sooner import Clock
+from xrds_core.sequence.sooner import Clock
 
 
 def shot(taken: float) -> Clock:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from xrds_core.notices import warn
+from ..notices import warn
 
 _FRAMES = 3  # that are timed before anything is said
 _LATER = 1.1  # times Cycles' seconds, from which it is said
