@@ -236,10 +236,10 @@ class SamePicture:
         shape = own.views[view].shape
         extra: dict[str, ExtraSamples] = {}
         regions: list[Region] = []
-        more = self._priced(more, shape)
+        noted = spent.of(self._priced(more, shape))
         if self._worth.is_due(len(beside)):
             regions = measured_regions(shape)
-            ratio, extra = self._measure(method, own, others, regions, spent.of(more))
+            ratio, extra = self._measure(method, own, others, regions, noted)
             whole = gained.of(gained.errors > 0.0)
             self._worth.add(ratio, share, whole, len(beside))
             self._measured_in, self._tried = own.number, share
@@ -248,7 +248,7 @@ class SamePicture:
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
         self._choose_next(share, gained.of(rest), beside)
         for part in _rest(lacks, regions):  # where it was measured it has all now
-            further = self._top_up(shape, share, gained, part, spent.of(more))
+            further = self._top_up(shape, share, gained, part, noted)
             extra = _together(extra, further)
         own = _with_more(own, extra, self._weight)
         if regions:
