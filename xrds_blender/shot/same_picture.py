@@ -26,7 +26,6 @@ from xrds_core.sequence.same_picture import (
     BLOCK,
     Gain,
     Rendered,
-    error_fall,
     error_ratio,
     gain,
 )
@@ -340,17 +339,11 @@ class SamePicture:
         # what denoising takes, and the frame's own few are far noisier
         noisy = own.gathered[view].radiance
         assert noisy is not None
-        together, alone, noisy = (
+        together, noisy = (
             np.concatenate([x[_pixels(region)] for region in regions])
-            for x in (
-                method.finish(own, others, view).radiance,
-                method.finish(replace(own, gathered={}), (), view).radiance,
-                noisy,
-            )
+            for x in (method.finish(own, others, view).radiance, noisy)
         )
-        share = self._shares.get(own.number, 1.0)
-        fall = error_fall(alone, share, noisy, parts, self.exposure)
-        return error_ratio(together, noisy, parts, fall, self.exposure), extra
+        return error_ratio(together, noisy, parts, self.exposure), extra
 
     def _top_up(
         self,

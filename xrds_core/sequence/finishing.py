@@ -11,7 +11,7 @@ import numpy as np
 from ..light_parts.adding_up import completed
 from ..light_parts.sums import added_up, light_in
 from ..temporal.accumulate import Accumulated
-from ..temporal.local_filters import box
+from ..temporal.local_filters import box, extreme
 from .rectangles import rectangles
 from .same_picture import BLOCK, block_means
 
@@ -29,6 +29,11 @@ if TYPE_CHECKING:
 # The accumulated picture has full weight from this many reused samples for each of the
 # frame's own, and this many in all: few samples say little.
 _ENOUGH, _IN_ALL = 1.0, 3.0
+# Where less is usual around a pixel, less is enough: what a denoiser mistakes for detail
+# is noise that differs between neighbouring pixels. Full weight has what is not below
+# the usual over `_APART`. What is usual is the mean over `_USUAL` pixels across, the
+# largest within `_NEAR` of them.
+_APART, _USUAL, _NEAR = 1.5, 33, 24
 # What is missing in the 3x3 pixels around a pixel counts against it, times half of the
 # frame's samples, clipped to this range: the less noise there is, the more visible a
 # few noisy pixels are.
@@ -129,11 +134,13 @@ def _share(accumulated: Accumulated, alone: Accumulated, samples: float) -> Arra
 
     It depends on how many samples are reused. `samples` is the frame's own mean.
     """
-    enough = max(_ENOUGH, _IN_ALL / samples)
+    enough = np.float32(max(_ENOUGH, _IN_ALL / samples))
+    most = _APART * (1.0 + enough)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the frame has none
-        reused = accumulated.samples / alone.samples - np.float32(1.0)
-    reused = np.where(alone.samples > 0.0, np.clip(reused / enough, 0.0, 1.0), 1.0)
-    reused = reused.astype(np.float32)
+        times = np.clip(accumulated.samples / alone.samples, 1.0, most)
+    times = np.where(alone.samples > 0.0, times, most).astype(np.float32)
+    usual = extreme(box(times, _USUAL), np.fmax, _NEAR)
+    reused = np.clip((times * most / usual - 1.0) / enough, 0.0, 1.0)
     factor = np.float32(np.clip(samples / 2.0, _LEAST_FACTOR, _MOST_FACTOR))
     around = 1.0 - factor * (1.0 - box(reused, _SMOOTH))
     return np.clip(

@@ -18,7 +18,7 @@ from ..temporal.accumulate import sample_counts
 from ..temporal.half_floats import floats
 from ..temporal.local_filters import box
 from ..temporal.noise import luminance
-from .worth import Ratio
+from .worth import FALL, Ratio
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,14 +28,6 @@ if TYPE_CHECKING:
     from ..temporal.frame import Stored
 
 BLOCK = 32  # pixels across
-FALL = 0.7
-"""The error of a denoised picture falls with about this power of its samples."""
-_LEAST_FALL, _MOST_FALL = 0.5, 0.8  # beyond, a small picture shows chance
-# The more samples, the slower errors fall: from 4 to 16 samples 0.69 to 0.98 times as
-# fast as from 2 to 4, in seven scenes, 0.84 on the mean.
-_SLOWER = 0.85
-# Two counts of samples of which one is less than this many times the other say nothing.
-_APART = 1.5
 # Share of the blocks, those with most noise, that an error is not measured in.
 _NOISIEST = 0.01
 _DARKEST = 0.02  # of the mean luminance; darker pixels count as if they were as bright
@@ -61,7 +53,6 @@ def error_ratio(
     picture: Array,
     noisy: Array,
     parts: tuple[Rendered, Rendered],
-    fall: float = FALL,
     exposure: float = 1.0,
 ) -> Ratio:
     """Return the squared error of a picture over that of a frame of all samples.
@@ -70,35 +61,11 @@ def error_ratio(
     `noisy`, the mean of samples that the parts do not have either, were made without
     them. All are radiance. Errors count as they are seen: relative to the local
     luminance, and less where it is beyond white, 1 / `exposure`. The ratio is infinite
-    where noise hides the error of all samples; errors fall with their number's power
-    `fall`.
+    where noise hides the error of all samples.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
         ours, half = _errors(picture, noisy, parts, exposure)
-        return Ratio(*_ratio(ours, half * 0.5**fall), fall)
-
-
-def error_fall(
-    alone: Array,
-    share: float,
-    noisy: Array,
-    parts: tuple[Rendered, Rendered],
-    exposure: float = 1.0,
-) -> float:
-    """Return the power of the samples with which errors fall, up to all of them.
-
-    `alone` (H, W, 3) is a picture of a `share` of all, by themselves; `noisy`, `parts`
-    and `exposure` are as in `error_ratio`. Where they tell nothing it is `FALL`.
-    """
-    apart = 0.5 / share
-    if apart < _APART:
-        return FALL
-    with np.errstate(over="ignore", invalid="ignore"):
-        ratio, _ = _ratio(*_errors(alone, noisy, parts, exposure))
-    if not 0.0 < ratio < float("inf"):
-        return FALL
-    fall = _SLOWER * np.log(ratio) / np.log(apart)
-    return float(np.clip(fall, _LEAST_FALL, _MOST_FALL))
+        return Ratio(*_ratio(ours, half * 0.5**FALL))
 
 
 def _errors(

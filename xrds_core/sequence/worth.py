@@ -17,22 +17,22 @@ _SOON = 8  # frames; by then one has neighbours on both sides
 # What is known before anything is measured: mean and standard deviation over the
 # choosing half of the gallery, 4 samples with neighbours against 16 without.
 _USUAL, _SPREAD = 0.45, 0.25
-# No ratio is better known than this, relative to it: errors do not fall quite with one
-# power of the samples, nor does every measure of them see the same.
+# No ratio is better known than this, relative to it: errors do not fall quite with
+# `FALL`, nor does every measure of them see the same.
 _EXACT = 0.06
-_CAUTION = 0.16  # probability that it is worth less: the mean less its standard error
+FALL = 0.7
+"""The error of a denoised picture falls with about this power of its samples."""
 _STEPS = np.linspace(0.0, 1.0, 201)
 
 
 class Ratio(NamedTuple):
     """The squared error of fewer samples with neighbours over that of all without.
 
-    `spread` is its standard error. Errors fall with the power `fall` of the samples.
+    `spread` is its standard error.
     """
 
     value: float
     spread: float
-    fall: float
 
 
 @dataclass
@@ -61,17 +61,17 @@ class Worth:
         self._neighbours = neighbours
         self._next = max(2 * self._frames, _SOON)
         if np.isfinite(ratio.value):
-            expected = (share * (1.0 + (gain - 1.0) * _STEPS)) ** -ratio.fall
+            expected = (share * (1.0 + (gain - 1.0) * _STEPS)) ** -FALL
             error = np.hypot(ratio.spread, _EXACT * expected)
             away = (ratio.value - expected) / error
             self._likelihoods.append(-0.5 * np.square(away) - np.log(error))
 
     @property
     def value(self) -> float:
-        """What it is at least, but for chance; 0 where noise has hidden all errors."""
+        """What is to be expected of it; 0 where noise has hidden all errors."""
         if not self._likelihoods:
             return 0.0
         usual = -0.5 * np.square((_STEPS - _USUAL) / _SPREAD)
         logarithms = usual + np.sum(self._likelihoods, axis=0)
-        below = np.cumsum(np.exp(logarithms - logarithms.max()))
-        return float(np.interp(_CAUTION, below / below[-1], _STEPS))
+        likely = np.exp(logarithms - logarithms.max())
+        return float(np.average(_STEPS, weights=likely))

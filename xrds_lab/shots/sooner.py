@@ -74,8 +74,9 @@ class Case:
 class Made:
     """A method's middle frame (H, W, 3) and the next, seen at `stops`, and their price.
 
-    `seconds` are of a frame by the clock, `processor` of all cores; `shares` of the
-    file's samples, one for each frame.
+    `seconds` are of a frame by the clock, `processor` of all cores; `late` are those of
+    a frame of the last third of the shot, as its picture tells, None of one alone.
+    `shares` are of the file's samples, one for each frame.
     """
 
     radiance: Array
@@ -84,6 +85,7 @@ class Made:
     processor: float
     stops: float
     shares: tuple[float, ...] = ()
+    late: float | None = None
 
 
 def bench_same_picture(
@@ -178,6 +180,7 @@ class _Scene:
             "method": method,
             "seconds": round(made.seconds, 3),
             "ratio": ratios["seconds"],
+            "late_ratio": made.late and round(made.late / cycles["seconds"], 3),
             "processor_seconds": round(made.processor, 3),
             "processor_ratio": ratios["processor_seconds"],
             "mean_share": round(float(np.mean(made.shares or [1.0])), 3),
@@ -258,17 +261,19 @@ def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     middle = scene.frame_current
     numbers = range(middle - reach, middle + reach + 1)
     job = render_request(scale=1, temporal_radius=REACH, **choices)
-    shown, shares = {}, []
+    shown, shares, taken = {}, [], []
     started, busy = time.perf_counter(), time.process_time()
     for number, picture in render_shot(scene, job, numbers):
         assert picture.settings is not None
         shares.append(float(picture.settings.share))
+        taken.append(picture.seconds["total"])
         if number in (middle, middle + 1):
             shown[number] = np.asarray(picture.radiance, np.float32)
     seconds = (time.perf_counter() - started) / len(numbers)
     processor = (time.process_time() - busy) / len(numbers)
     pictures = shown[middle], shown[middle + 1]
-    return Made(*pictures, seconds, processor, _stops(scene), tuple(shares))
+    late = statistics.median(taken[-len(taken) // 3 :])
+    return Made(*pictures, seconds, processor, _stops(scene), tuple(shares), late)
 
 
 def _stops(scene: Any) -> float:
@@ -282,6 +287,7 @@ _COLUMNS = {
     "method": "method",
     "seconds": "s a frame",
     "ratio": "of Cycles'",
+    "late_ratio": "late in the shot",
     "processor_ratio": "of its processor seconds",
     "mean_share": "share of samples",
     "psnr": "PSNR",

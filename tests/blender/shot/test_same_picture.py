@@ -54,7 +54,7 @@ def picture(path: Path) -> np.ndarray:
 
 def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[float]:
     """Let the error of fewer samples be this; returns the counts that are rendered."""
-    monkeypatch.setattr(same_picture, "error_ratio", lambda *_: Ratio(ratio, 0.0, 0.7))
+    monkeypatch.setattr(same_picture, "error_ratio", lambda *_: Ratio(ratio, 0.0))
     lengths: list[float] = []
     inner = same_picture.more_samples
 
@@ -234,7 +234,7 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
     def noted(ours: Any, noisy: Any, parts: Any, *_: Any) -> Ratio:
         sizes.append(ours.shape[0] * ours.shape[1])
         assert ours.shape == noisy.shape == parts[0].noisy.shape
-        return Ratio(float("inf"), 0.0, 0.7)
+        return Ratio(float("inf"), 0.0)
 
     monkeypatch.setattr(same_picture, "error_ratio", noted)
     frames = render(shot, "same")

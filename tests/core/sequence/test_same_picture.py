@@ -12,9 +12,7 @@ from shots import World, camera, view
 from xrds_core.sequence.extra_samples import ExtraSamples, enriched, with_extra
 from xrds_core.sequence.same_picture import (
     BLOCK,
-    FALL,
     Rendered,
-    error_fall,
     error_ratio,
     gain,
 )
@@ -149,27 +147,6 @@ def test_neighbours_count_by_their_worth_beside_extra_samples(worth: float) -> N
         / (sum(counts)[..., None])
     )
     assert np.allclose(result.albedo, expected, atol=1e-4)
-
-
-@pytest.mark.parametrize("expected", [0.4, 0.7, 0.9, 1.2])
-def test_how_errors_fall_is_measured(expected: float) -> None:
-    truth = np.full((*SHAPE, 3), 0.5, np.float32)
-    half, share = 0.05, 0.125
-    few = half * (0.5 / share) ** (expected / 2)
-    parts = [
-        Rendered(noisy(truth, 0.2, i), denoised(truth, half, i + 10)) for i in (1, 2)
-    ]
-    own = noisy(truth, 0.4, 4)
-    found = error_fall(denoised(truth, few, 3), share, own, (parts[0], parts[1]))
-    # a little slower from there on
-    slower = float(np.clip(0.85 * expected, 0.5, 0.8))
-    assert found == pytest.approx(slower, abs=0.08)
-
-
-def test_counts_that_are_alike_say_nothing_of_it() -> None:
-    truth = np.full((*SHAPE, 3), 0.5, np.float32)
-    parts = [Rendered(noisy(truth, 0.2, i), noisy(truth, 0.05, 9)) for i in (1, 2)]
-    assert error_fall(truth, 0.4, truth, (parts[0], parts[1])) == FALL
 
 
 def test_extra_samples_are_the_frames_own_from_then_on() -> None:

@@ -102,25 +102,48 @@ class Counting:
         return self.denoiser(*passes, **more)
 
 
-def test_where_nothing_is_reused_the_picture_is_that_of_the_frame_alone(
+def noisy(number: int) -> Any:
+    """A still camera's frame of four samples, of noise of its own."""
+    made = replace(frame(1), number=number, still=True, samples=4)
+    noise = np.random.default_rng(number).uniform(0.9, 1.1, made.radiance.shape)
+    return replace(made, radiance=made.radiance * noise.astype(np.float32))
+
+
+def test_beside_many_samples_the_picture_of_few_is_that_of_the_frame_alone(
     denoiser: Denoiser,
 ) -> None:
-    """Also beside pixels of many samples, where denoisers keep more of the noise."""
-    own, other = (replace(frame(n), samples=4) for n in (1, 2))
-    half = other.radiance.shape[1] // 2
-    other.radiance[:, half:] = np.nan
+    """There denoisers keep more of the noise."""
+    own, *others = (noisy(n) for n in NUMBERS)
+    half = own.radiance.shape[1] // 2
+    lacking = []
+    for other in others:
+        radiance = other.radiance.copy()
+        radiance[:, half:] = np.nan
+        lacking.append(store(replace(other, radiance=radiance)))
     alone = finish_frame(store(own), [], denoiser, Accumulator()).picture
     counting, told = Counting(denoiser), []
-    shot = finish_frame(
-        store(own), [store(other)], counting, Accumulator(), told.append
-    )
+    shot = finish_frame(store(own), lacking, counting, Accumulator(), told.append)
     assert len(counting.pictures) == 2
     assert told == [0.0, 0.5, 0.5, 1.0]
     lent = shot.accumulated.samples > 4.0
     assert lent[:, : half - 4].mean() > 0.5
-    np.testing.assert_array_equal(shot.picture[:, half + 2 :], alone[:, half + 2 :])
-    # without halves much is doubted, and what is doubted stays the frame's own
+    beside = slice(half + 2, half + 12)
+    np.testing.assert_array_equal(shot.picture[:, beside], alone[:, beside])
     assert (shot.picture[:, : half - 8] != alone[:, : half - 8]).mean() > 0.1
+
+
+def test_where_little_is_reused_everywhere_all_of_it_counts(
+    denoiser: Denoiser,
+) -> None:
+    own, other = (replace(noisy(n), samples=16 // n**2) for n in (1, 2))
+    counting = Counting(denoiser)
+    shot = finish_frame(store(own), [store(other)], counting, Accumulator())
+    assert 16.5 < shot.accumulated.samples.mean() < 20.5
+    assert len(counting.pictures) == 1
+    whole = shot.accumulated
+    assert whole.radiance is not None
+    expected = denoiser(whole.radiance, whole.albedo, whole.normal).radiance
+    np.testing.assert_array_equal(shot.picture[..., :3], expected)
 
 
 def test_what_is_lent_everywhere_or_nowhere_is_denoised_once(
