@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 # The accumulated picture has full weight from this many reused samples for each of the
 # frame's own, and this many in all: few samples say little.
 _ENOUGH, _IN_ALL = 1.0, 3.0
-# Where less is usual around a pixel, less is enough: what a denoiser mistakes for detail
-# is noise that differs between neighbouring pixels. Full weight has what is not below
-# the usual over `_APART`. What is usual is the mean over `_USUAL` pixels across, the
-# largest within `_NEAR` of them.
+# Where less is usual around a pixel, less is enough: a denoiser mistakes for detail
+# what has more noise than its neighbours. Full weight has what is not below the usual
+# over `_APART`. What is usual is the mean over `_USUAL` pixels across, the largest
+# within `_NEAR` of them.
 _APART, _USUAL, _NEAR = 1.5, 33, 24
 # What is missing in the 3x3 pixels around a pixel counts against it, times half of the
 # frame's samples, clipped to this range: the less noise there is, the more visible a

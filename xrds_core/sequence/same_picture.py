@@ -30,11 +30,9 @@ if TYPE_CHECKING:
 BLOCK = 32  # pixels across
 # Share of the blocks, those with most noise, that an error is not measured in.
 _NOISIEST = 0.01
-_DARKEST = 0.02  # of the mean luminance; darker pixels count as if they were as bright
+_DARKEST = 0.02  # of the mean luminance, added to the light of each channel
 _SMOOTH = 7  # pixels across
-# Pixels across that what is left of a picture is smoothed over: noise is fine, errors
-# of denoised pictures are coarse. Over more, errors in fine texture are lost.
-_COARSE = 3
+_SEEN = 3  # pixels across: the light that an error is relative to
 # Standard deviation of noise that nobody sees, of the square root of luminance and
 # relative to it: 0.2 % of the light.
 _UNSEEN = 1e-3
@@ -59,9 +57,9 @@ def error_ratio(
 
     `parts` are half of all samples each, of seeds of their own; `picture` (H, W, 3) and
     `noisy`, the mean of samples that the parts do not have either, were made without
-    them. All are radiance. Errors count as they are seen: relative to the local
-    luminance, and less where it is beyond white, 1 / `exposure`. The ratio is infinite
-    where noise hides the error of all samples.
+    them. All are radiance. Errors count as they are seen: relative to the local light
+    of their channel, and less where it is beyond white, 1 / `exposure`. The ratio is
+    infinite where noise hides the error of all samples.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
         ours, half = _errors(picture, noisy, parts, exposure)
@@ -71,30 +69,34 @@ def error_ratio(
 def _errors(
     picture: Array, noisy: Array, parts: tuple[Rendered, Rendered], exposure: float
 ) -> tuple[Array, Array]:
-    """Return the errors of the picture and of half of all samples, by blocks."""
+    """Return the errors of the picture and of half of all samples, by blocks.
+
+    Each render hides an error by its noise: the product of two of them by the square.
+    So the picture's is that of half of the samples and the difference.
+    """
     one, two = parts
-    bright = box(luminance((picture + one.denoised + two.denoised) / 3), _SMOOTH)
-    bright += max(float(bright.mean()) * _DARKEST, _TINY)
-    shown = 1.0 + bright * np.float32(exposure)  # tones beyond white are pressed
-    scale = np.nan_to_num(1.0 / (bright * shown**2), posinf=0.0)[..., None]
+    shown = (picture + one.denoised + two.denoised) / 3
+    dark = max(float(np.nan_to_num(luminance(shown)).mean()) * _DARKEST, _TINY)
+    light = [box(np.nan_to_num(shown[..., i]), _SEEN) for i in range(3)]
+    bright = np.maximum(np.stack(light, axis=-1), 0.0) + np.float32(dark)
+    pressed = 1.0 + bright * np.float32(exposure)  # tones beyond white
+    scale = np.nan_to_num(1.0 / (bright * pressed**2), posinf=0.0)
 
     def product(first: Array, second: Array) -> Array:
-        light = (first * second * scale).mean(-1)
-        return block_means(np.nan_to_num(light, posinf=0.0, neginf=0.0))
-
-    def error(made: Array, first: Array, second: Array) -> Array:
-        return product(_smoothed(made - first), _smoothed(made - second))
+        found = (first * second * scale).mean(-1)
+        return block_means(np.nan_to_num(found, posinf=0.0, neginf=0.0))
 
     noise = product(one.noisy - two.noisy, one.noisy - two.noisy)
     kept = noise <= np.quantile(noise, 1.0 - _NOISIEST)
-    half = error(one.denoised, two.noisy, noisy) + error(two.denoised, one.noisy, noisy)
-    ours = error(picture, one.noisy, two.noisy)
-    return ours[kept], 0.5 * half[kept]
-
-
-def _smoothed(light: Array) -> Array:
-    planes = [box(np.nan_to_num(light[..., i]), _COARSE) for i in range(3)]
-    return np.stack(planes, axis=-1)
+    half, more = np.zeros((2, *noise.shape))
+    for made, other in ((one.denoised, two.noisy), (two.denoised, one.noisy)):
+        apart = made - other
+        half += product(apart, made - noisy)
+        # the difference of two squares: noise counts once in it, and little
+        step = picture - made
+        more += product(step, step + 2.0 * apart)
+    half, more = half[kept] / 2, more[kept] / 2
+    return half + more, half
 
 
 def _ratio(one: Array, two: Array) -> tuple[float, float]:

@@ -13,13 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-_SOON = 8  # frames; by then one has neighbours on both sides
+_SOON = 20  # frames; one of those before has neighbours on both sides
 # What is known before anything is measured: mean and standard deviation over the
 # choosing half of the gallery, 4 samples with neighbours against 16 without.
 _USUAL, _SPREAD = 0.45, 0.25
 # No ratio is better known than this, relative to it: errors do not fall quite with
 # `FALL`, nor does every measure of them see the same.
 _EXACT = 0.06
+_CAUTION = 0.16  # probability that it is worth less: the mean less its standard error
 FALL = 0.7
 """The error of a denoised picture falls with about this power of its samples."""
 _STEPS = np.linspace(0.0, 1.0, 201)
@@ -68,10 +69,10 @@ class Worth:
 
     @property
     def value(self) -> float:
-        """What is to be expected of it; 0 where noise has hidden all errors."""
+        """What it is at least, but for chance; 0 where noise has hidden all errors."""
         if not self._likelihoods:
             return 0.0
         usual = -0.5 * np.square((_STEPS - _USUAL) / _SPREAD)
         logarithms = usual + np.sum(self._likelihoods, axis=0)
-        likely = np.exp(logarithms - logarithms.max())
-        return float(np.average(_STEPS, weights=likely))
+        below = np.cumsum(np.exp(logarithms - logarithms.max()))
+        return float(np.interp(_CAUTION, below / below[-1], _STEPS))
