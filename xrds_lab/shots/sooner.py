@@ -3,7 +3,8 @@
 Each scene is made a shot, or moves as its file says. Cycles + OIDN renders frames of it
 with all samples, XRDS the whole shot with as few as it chooses, and nine frames with
 all. Seconds are wall clock, which needs a quiet machine, and the processor's own, which
-suffer less from others at work. The three take turns within a case, never at once.
+suffer less from others at work. The three take turns within a case, never at once;
+Cycles is timed before and after the shot with few samples.
 """
 
 from __future__ import annotations
@@ -156,8 +157,17 @@ class _Scene:
             made = work[method]()
             picture = {"radiance": made.radiance, "following": made.following}
             self.folder.write(self._picture(case, method), picture, {})
+            if method == SAME_PICTURE:
+                self._time_again(case, frames)
             self.rows[f"{case.label}-{method}"] = self._judged(case, method, made)
             write_json(self._path, self.rows)
+
+    def _time_again(self, case: Case, frames: int) -> None:
+        """Make Cycles' seconds the mean of those before and after a shot's."""
+        row = self.rows[f"{case.label}-{CYCLES}"]
+        seconds, processor = _cycles_again(self.shot, case, frames)
+        row["seconds"] = round((row["seconds"] + seconds) / 2, 3)
+        row["processor_seconds"] = round((row["processor_seconds"] + processor) / 2, 3)
 
     def _judged(self, case: Case, method: str, made: Made) -> Row:
         single = self.folder.read(self._picture(case, CYCLES))
@@ -226,20 +236,37 @@ def _opened(shot: Shot, case: Case, reach: int) -> Any:
 
 def _cycles(shot: Shot, case: Case, frames: int) -> Made:
     """Cycles and its denoiser, as a new file has it."""
+    scene = _opened(shot, case, frames // 2)
+    middle = scene.frame_current
+    numbers = range(middle - _TIMED // 2, middle + _TIMED // 2 + 1)
+    shown, *taken = _rendered(scene, numbers)
+    seconds, processor = (statistics.median(x) for x in taken)
+    return Made(shown[middle], shown[middle + 1], seconds, processor, _stops(scene))
+
+
+def _cycles_again(shot: Shot, case: Case, frames: int) -> tuple[float, float]:
+    """Seconds of its middle frame, by the clock and of all cores, without a sync."""
+    scene = _opened(shot, case, frames // 2)
+    middle = scene.frame_current
+    _, seconds, processor = _rendered(scene, (middle - 1, middle))
+    return seconds[-1], processor[-1]
+
+
+def _rendered(
+    scene: Any, numbers: Sequence[int]
+) -> tuple[dict[int, Array], list[float], list[float]]:
+    """Frames by Cycles, seconds of each by the clock, and of all cores."""
     from xrds_blender import render
 
-    scene = _opened(shot, case, frames // 2)
     seconds, processor, shown = [], [], {}
-    middle = scene.frame_current
-    for number in range(middle - _TIMED // 2, middle + _TIMED // 2 + 1):
+    for number in numbers:
         scene.frame_set(number)
         started, busy = time.perf_counter(), time.process_time()
         picture = render(scene, plain=True, denoiser=DEFAULT_DENOISING)
         seconds.append(time.perf_counter() - started)
         processor.append(time.process_time() - busy)
         shown[number] = np.asarray(picture.radiance, np.float32)
-    taken = statistics.median(seconds), statistics.median(processor)
-    return Made(shown[middle], shown[middle + 1], *taken, _stops(scene))
+    return shown, seconds, processor
 
 
 def _same_picture(shot: Shot, case: Case, frames: int) -> Made:

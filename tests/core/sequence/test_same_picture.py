@@ -16,6 +16,7 @@ from xrds_core.sequence.same_picture import (
     error_ratio,
     gain,
 )
+from xrds_core.sequence.worth import Ratio
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.frame import store
 
@@ -35,7 +36,7 @@ def denoised(truth: Array, deviation: float, seed: int) -> Array:
     return truth + np.float32(deviation) * error.repeat(4, 0).repeat(4, 1)
 
 
-def ratio(ours: float, theirs: float, noise: float = 0.3) -> float:
+def ratio(ours: float, theirs: float, noise: float = 0.3) -> Ratio:
     """Of pictures whose errors have these deviations; `theirs` of all samples."""
     truth = np.full((*SHAPE, 3), 0.5, np.float32)
     half = theirs * 2.0**0.35  # half of the samples have 2 ** 0.7 times the error
@@ -43,18 +44,26 @@ def ratio(ours: float, theirs: float, noise: float = 0.3) -> float:
         Rendered(noisy(truth, noise, i), denoised(truth, half, i + 10)) for i in (1, 2)
     )
     picture, own = denoised(truth, ours, 3), noisy(truth, noise * 1.4, 4)
-    found = error_ratio(picture, own, (first, second))
-    return found.value + found.spread
+    return error_ratio(picture, own, (first, second))
 
 
 @pytest.mark.parametrize("expected", [0.25, 1.0, 4.0])
 def test_errors_are_measured_without_a_reference(expected: float) -> None:
     found = ratio(0.05 * expected**0.5, 0.05)
-    assert 0.9 * expected < found < 1.3 * expected + 0.1  # too high rather than too low
+    # too high rather than too low
+    assert 0.9 * expected < found.value + found.spread < 1.3 * expected + 0.1
+
+
+def test_the_picture_of_half_of_the_samples_is_known_from_much_noise() -> None:
+    """Its error is that of half, whatever noise says."""
+    values = [ratio(0.05 * 2.0**0.35, 0.05, noise) for noise in (0.1, 0.6)]
+    for found in values:
+        assert found.value == pytest.approx(2.0**0.7, rel=0.1)
+        assert found.spread < 0.2
 
 
 def test_a_ratio_that_noise_hides_is_infinite() -> None:
-    assert ratio(0.001, 0.001, noise=3.0) == float("inf")
+    assert ratio(0.001, 0.001, noise=3.0).value == float("inf")
 
 
 def test_radiance_beyond_all_bounds_is_survived() -> None:
