@@ -470,12 +470,14 @@ def _bench_same_picture(options: argparse.Namespace) -> dict[str, Any]:
     from ..cards.cycles import CPU, find_card
     from ..shots.sooner import MOST_SAMPLES, SAMPLES, Case, bench_same_picture
 
+    thresholds = options.noise_thresholds or ()
+    counts = options.samples or (() if thresholds else SAMPLES)
     cases = [
         case
         for motion in options.motions or ("pan",)
         for case in (
-            *(Case(motion, samples) for samples in options.samples or SAMPLES),
-            *(Case(motion, MOST_SAMPLES, x) for x in options.noise_thresholds or ()),
+            *(Case(motion, samples) for samples in counts),
+            *(Case(motion, MOST_SAMPLES, threshold) for threshold in thresholds),
         )
     ]
     device = find_card() if options.card else CPU

@@ -115,25 +115,30 @@ def light_parts(results: Results) -> Table:
 
 
 def same_picture(results: Results) -> Table:
-    """Seconds and errors of *Same Picture*."""
-    table = [["", "samples", "share of them", "seconds", "PSNR", "FLIP", "flicker"]]
-    for own in only(results.same_picture, method="same_picture"):
-        file = {name: own[name] for name in ("scene", "samples")}
-        (alone,) = only(results.same_picture, method="cycles_oidn", **file)
-        late = own["shares"][len(own["shares"]) * 2 // 3 :]
+    """Seconds and errors of *Same Picture* as ratios to Cycles + OIDN's."""
+    head = ["samples", "scenes", "share of them", "seconds", "late", "PSNR", "worst"]
+    table = [[*head, "FLIP", "flicker"]]
+    kinds = [(x["samples"], x["noise_threshold"]) for x in results.same_picture]
+    for samples, threshold in dict.fromkeys(kinds):
+        file = {"samples": samples, "noise_threshold": threshold}
+        ours = only(results.same_picture, method="same_picture", **file)
+        cycles = only(results.same_picture, method="cycles_oidn", **file)
+        alone = {x["scene"]: x for x in cycles}
+        worst = min(ours, key=lambda x: float(x["gain"]))
+        late = [mean(x["shares"][len(x["shares"]) * 2 // 3 :]) for x in ours]
+        label = "" if threshold is None else f", threshold {threshold:g}"
         table.append(
             [
-                scene_name(own["scene"]),
-                str(own["samples"]),
-                f"{sum(late) / len(late):.2f}",
-                f"{own['ratio']:.2f}",
+                f"{samples}{label}",
+                str(len(ours)),
+                f"{mean(late):.2f}",
+                f"{mean(x['ratio'] for x in ours):.2f}",
+                f"{mean(x['late_ratio'] for x in ours):.2f}",
+                f"{mean(x['gain'] for x in ours):+.1f}",
+                f"{worst['gain']:+.1f} {scene_name(worst['scene'])}",
                 *(
-                    f"{alone[name]:{digits}} to {own[name]:{digits}}"
-                    for name, digits in (
-                        ("psnr", ".1f"),
-                        ("flip", ".3f"),
-                        ("flicker", ".4f"),
-                    )
+                    f"{mean(x[name] / alone[x['scene']][name] for x in ours):.2f}"
+                    for name in ("flip", "flicker")
                 ),
             ]
         )
