@@ -69,6 +69,8 @@ _TOO_MUCH, _TOO_LITTLE = 0.8, 1.1
 # Neighbours' samples of less worth count less beside more of the frame's own.
 _USEFUL = 0.25
 _OTHER = 1_299_709  # seeds apart; no frame's is near those of another
+# Under a noise threshold more samples are of a sequence that nothing measures by.
+_FURTHER = 3
 
 
 @dataclass(frozen=True)
@@ -157,12 +159,12 @@ def render_more(
     before. Raises Cancelled when the user stops it.
     """
     how = sampling_of(engine, depsgraph, request, place)
-    if part.other:
-        seed = (how.own_seed + part.other * _OTHER) % LARGEST_SEED
+    even = is_even(depsgraph.scene_eval, request)
+    if part.other or not even:
+        seed = (how.own_seed + (part.other or _FURTHER) * _OTHER) % LARGEST_SEED
         subset = SampleSubset(seed, part.length, 0, part.length)
     else:
         subset = how.further(part.taken, part.length, part.begin)
-    even = is_even(depsgraph.scene_eval, request)
     parts = [subset] if even or subset.length < 2 else subset.halves()
     share = None if even else part.share
     stages.begin(engine, how.named(stages.SAMPLES), 1, 2)

@@ -78,7 +78,8 @@ class Sampled:
 class Sampling:
     """How a frame is sampled, and the cameras that see it, by view.
 
-    `count` samples per pixel, of the `whole` of a sequence; `geometry` names passes.
+    `count` samples per pixel, of the `whole` of a sequence: all of it under a noise
+    threshold, where the first of many stop later; `geometry` names passes.
     `place` is the frame's in the shot where frames continue one sequence, None where
     each begins its own; its samples `begin` after so many, None is by its place.
     `still` is as in `Frame`. A frame that `has_halves` is sampled in two; one that
@@ -207,7 +208,7 @@ def sampling_of(
         number=scene.frame_current,
         cameras=cameras,
         count=settings.count(of_file),
-        whole=settings.samples or of_file,
+        whole=(settings.samples or of_file) if even else settings.count(of_file),
         seed=seed,
         geometry=geometry,
         place=place,
@@ -317,7 +318,8 @@ def noisy_frame(
         with Borrowed() as borrowed:
             if settings.share < 1.0:
                 scene = depsgraph.scene_eval
-                set_share(borrowed, scene, how.whole, settings.share)
+                most = session.samples_of(depsgraph)
+                set_share(borrowed, scene, most, settings.share)
             if how.has_halves:
                 return _frames_of_halves(engine, depsgraph, how)
             noisy, clock = sample_layer(

@@ -14,6 +14,7 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
+from xrds_blender.cycles import settings
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
 from xrds_blender.shot import same_picture, sampling
@@ -137,8 +138,17 @@ def test_a_noise_threshold_is_kept_and_raised(
     render(shot, "time", same_picture=False)
     all_of_them, sampled[:] = sampled[2], []  # the mean of the middle frame's pixels
     measured(monkeypatch, 0.5)
+    asked: list[int] = []
+    set_sampling = settings.set_sampling
+
+    def keep(borrowed: Any, scene: Any, samples: int, seed: int) -> None:
+        asked.append(samples)
+        set_sampling(borrowed, scene, samples, seed)
+
+    monkeypatch.setattr(settings, "set_sampling", keep)
     render(shot, "same")
     assert sampled[2] < 0.6 * all_of_them
+    assert max(asked) < 64  # Cycles lets the first of many samples stop later
     scene = bpy.context.scene
     assert scene.cycles.adaptive_threshold == pytest.approx(0.2)
 
