@@ -71,8 +71,8 @@ def _errors(
 ) -> tuple[Array, Array]:
     """Return the errors of the picture and of half of all samples, by blocks.
 
-    Each render hides an error by its noise: the product of two of them by the square.
-    So the picture's is that of half of the samples and the difference.
+    An error by two noisy renders has the product of their noises in it. So the
+    picture's is that of half of the samples, and their difference by one render.
     """
     one, two = parts
     shown = (picture + one.denoised + two.denoised) / 3

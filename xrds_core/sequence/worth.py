@@ -1,9 +1,9 @@
 """What a sample of a neighbour is worth beside one of a frame's own, in a shot.
 
 It is measured in the first frame, again in the first one with neighbours on both sides,
-and then each time that the shot is twice as far: so chance counts less and less, and
-the seconds of measuring are soon a small part of the shot's. Where a small picture
-shows more chance than anything else, what other shots have shown counts.
+in the 20th, and then each time that the shot is twice as far: so chance counts less and
+less, and the seconds of measuring are soon a small part of the shot's. Where a small
+picture shows more chance than anything else, what other shots have shown counts.
 """
 
 from __future__ import annotations
