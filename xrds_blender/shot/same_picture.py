@@ -32,7 +32,6 @@ from xrds_core.sequence.same_picture import (
 from xrds_core.sequence.sooner import Clock
 from xrds_core.sequence.worth import Ratio, Worth
 from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.sample_subsets import SampleSubset
 
 from ..cycles.low_camera import Region
 from ..cycles.more_samples import more_samples
@@ -44,7 +43,6 @@ from ..planning.plan import SAME_PICTURE, Decision
 from ..planning.request import Request
 from ..planning.settings import Mode
 from .sampling import (
-    LARGEST_SEED,
     Sampled,
     can_continue,
     has_neighbours,
@@ -68,28 +66,23 @@ _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
 _TOO_MUCH, _TOO_LITTLE = 0.8, 1.1
 # Neighbours' samples of less worth count less beside more of the frame's own.
 _USEFUL = 0.25
-_OTHER = 1_299_709  # seeds apart; no frame's is near those of another
-# Under a noise threshold more samples are of a sequence that nothing measures by.
-_FURTHER = 3
 
 
 @dataclass(frozen=True)
 class Part:
-    """More samples of a frame that has `taken` some: `length` of its sequence.
+    """More samples of a frame: `length` of a sequence that has a number.
 
-    With `begin` they are of another one, after so many that frames took of it.
+    With `begin` they are of one that all frames share, after so many taken of it.
 
     Where the file has a noise threshold, pixels stop at `share` of what it asks for.
-    `region` is a part of the picture, None all of it. `other` sequences have seeds of
-    their own.
+    `region` is a part of the picture, None all of it.
     """
 
-    taken: int
     length: int
     share: float
     region: Region | None = None
     begin: int | None = None
-    other: int = 0
+    sequence: int = 1
 
 
 More = Callable[[Part], tuple[dict[str, ExtraSamples], dict[str, float]]]
@@ -160,11 +153,7 @@ def render_more(
     """
     how = sampling_of(engine, depsgraph, request, place)
     even = is_even(depsgraph.scene_eval, request)
-    if part.other or not even:
-        seed = (how.own_seed + (part.other or _FURTHER) * _OTHER) % LARGEST_SEED
-        subset = SampleSubset(seed, part.length, 0, part.length)
-    else:
-        subset = how.further(part.taken, part.length, part.begin)
+    subset = how.further(part.length, part.begin, part.sequence)
     parts = [subset] if even or subset.length < 2 else subset.halves()
     share = None if even else part.share
     stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
@@ -247,7 +236,9 @@ class SamePicture:
             self._ratio = ratio.value
         lacks = self._lacks(share, gained)
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
-        self._choose_next(share, gained.of(rest), beside)
+        lent = self._lent(share, beside)
+        even = gain(accumulated[view], own.views[view], lent)
+        self._choose_next(even.of(rest))
         for part in _rest(lacks, regions):  # where it was measured it has all now
             further = self._top_up(shape, share, gained, part, noted)
             extra = _together(extra, further)
@@ -326,7 +317,7 @@ class SamePicture:
         extra: dict[str, ExtraSamples] = {}
         for region in regions:
             place = None if (region.height, region.width) == shape else region
-            halves = [more(Part(0, length, 0.5, place, other=i)) for i in (1, 2)]
+            halves = [more(Part(length, 0.5, place, sequence=i)) for i in (2, 3)]
             started = time.perf_counter()
             cells.append([_rendered(method, each[view]) for each in halves])
             seconds += time.perf_counter() - started
@@ -366,11 +357,10 @@ class SamePicture:
             length = self._missing(share, gained, there)
             if length < 1:
                 continue
-            first = round(self.samples * share)
             region = _region(rows, columns, shape)
             begin = None if self.history is None else self._taken_more
             self._taken_more += length
-            part = Part(first, length, length / self.samples, region, begin)
+            part = Part(length, length / self.samples, region, begin)
             for view, samples in more(part).items():
                 whole = extra.setdefault(view, _nothing(shape, samples.parts))
                 _put(whole, region, samples)
@@ -395,15 +385,22 @@ class SamePicture:
         most = self.samples - round(self.samples * share)
         return min(max(round(self.samples * (1.0 - equal)), 0), most)
 
-    def _choose_next(self, share: float, gain: float, others: Sequence[int]) -> None:
-        """Let the next frames have about the share that is enough if all have it.
+    def _lent(self, share: float, others: Sequence[int]) -> float:
+        """What neighbours will lend if all frames have a `share`, over what they do.
 
-        `gain` is what a frame of `share` has from `others`, which may have another.
+        The first frames have fewer of them than those that are sampled next.
         """
         beside = [self._shares.get(number, 1.0) for number in others]
-        if beside:  # the first frames have fewer than those that are sampled next
-            more = max(self.neighbours / len(beside), 1.0)
-            gain = 1.0 + (gain - 1.0) * share / float(np.mean(beside)) * more
+        if not beside:
+            return 1.0
+        more = max(self.neighbours / len(beside), 1.0)
+        return share / float(np.mean(beside)) * more
+
+    def _choose_next(self, gain: float) -> None:
+        """Let the next frames have about the share that is enough if all have it.
+
+        `gain` is how many times its own samples a frame has then.
+        """
         least = _FIRST if self.history is None else self.share * _FALL
         needed = self.possible(max(1.0 / float(self._equal(1.0, gain)), least))
         if not _TOO_MUCH <= needed / self.share <= _TOO_LITTLE:

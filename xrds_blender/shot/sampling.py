@@ -40,7 +40,8 @@ from .stopping import finish_samples
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
-LARGEST_SEED = 2**31 - 1
+_LARGEST_SEED = 2**31 - 1
+_OTHER = 1_299_709  # seeds apart; no frame's is near those of another
 _FEWEST = 1.0  # samples, on the mean of a frame
 
 
@@ -78,10 +79,10 @@ class Sampled:
 class Sampling:
     """How a frame is sampled, and the cameras that see it, by view.
 
-    `count` samples per pixel, of the `whole` of a sequence: all of it under a noise
-    threshold, where the first of many stop later; `geometry` names passes.
-    `place` is the frame's in the shot where frames continue one sequence, None where
-    each begins its own; its samples `begin` after so many, None is by its place.
+    `count` samples per pixel; `geometry` names passes. `place` is the frame's in the
+    shot where frames continue one sequence, None where each has one of its own; its
+    samples `begin` after so many, None is by its place. `most` are the samples that a
+    frame may take there.
     `still` is as in `Frame`. A frame that `has_halves` is sampled in two; one that
     `needs_motion` is rendered once more without motion blur for its motion. One that
     `is_alone` has no neighbours: it is sampled as its file has it. `light` are the
@@ -91,7 +92,7 @@ class Sampling:
     number: int
     cameras: dict[str, Camera] = field(default_factory=dict)
     count: int = 0
-    whole: int = 0
+    most: int = 0
     seed: int = 0
     geometry: Sequence[tuple[str, str]] = ()
     place: int | None = None
@@ -120,9 +121,9 @@ class Sampling:
         if self.place is None:
             return None
         if self.begin is not None:
-            return running_subset(self.begin, self.count, self.whole, self.seed)
+            return running_subset(self.begin, self.count, self.most, self.seed)
         return consecutive_subset(
-            self.place, self.count, self.radius, self.seed, self.whole
+            self.place, self.count, self.radius, self.seed, self.most
         )
 
     def other_subset(self, count: int) -> SampleSubset | None:
@@ -133,24 +134,27 @@ class Sampling:
 
     @property
     def first(self) -> SampleSubset:
-        """The samples that the frame takes."""
-        return self.subset() or SampleSubset(self.own_seed, self.whole, 0, self.count)
+        """The samples that the frame takes.
 
-    def further(
-        self, taken: int, length: int, begin: int | None = None
-    ) -> SampleSubset:
-        """More samples of a frame that has `taken` some of its own sequence.
+        All of their sequence where that is its own: the first of a longer one are of a
+        worse pattern, and under a noise threshold stop later.
+        """
+        return self.subset() or SampleSubset(self.own_seed, self.count, 0, self.count)
+
+    def further(self, length: int, begin: int | None, sequence: int) -> SampleSubset:
+        """More samples of the frame, of a sequence of their own that has a number.
 
         With `begin` they are of one that all frames share, after so many taken of it.
         """
         if begin is not None:
-            return running_subset(begin, length, self.whole, self.seed + 1)
-        return SampleSubset(self.own_seed, self.whole, taken, length)
+            return running_subset(begin, length, self.most, self.seed + 1)
+        seed = (self.own_seed + sequence * _OTHER) % _LARGEST_SEED
+        return SampleSubset(seed, length, 0, length)
 
     @property
     def own_seed(self) -> int:
         """One that no other frame has."""
-        return (self.seed + self.number * SEED_STEP) % LARGEST_SEED
+        return (self.seed + self.number * SEED_STEP) % _LARGEST_SEED
 
 
 def has_neighbours(scene: Any, request: Request) -> bool:
@@ -208,7 +212,7 @@ def sampling_of(
         number=scene.frame_current,
         cameras=cameras,
         count=settings.count(of_file),
-        whole=(settings.samples or of_file) if even else settings.count(of_file),
+        most=settings.samples or of_file,
         seed=seed,
         geometry=geometry,
         place=place,

@@ -58,7 +58,9 @@ def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
 def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
     """Return a frame whose own samples are extra ones as well.
 
-    `alone` is the frame as accumulated without neighbours.
+    `alone` is the frame as accumulated without neighbours. `noise` stays that of the
+    samples which the frame had: the mean root of more samples is larger, and would be
+    other light beside frames that have fewer.
     """
     found = with_extra(alone, alone, extra)
     rows = _rows(extra.samples)
@@ -77,8 +79,8 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
     is_even = bool((total == total.flat[0]).all())
     noise = frame.noise
     if noise is not None:
-        share = (alone.samples[rows] / np.maximum(total[rows], 1e-9)).ravel()
-        noise = noise.within(share, brightness(extra.radiance[rows]).ravel(), place)
+        had = (alone.samples[rows] > 0.0).ravel().astype(np.float32)
+        noise = noise.within(had, brightness(extra.radiance[rows]).ravel(), place)
     return replace(
         frame,
         samples=max(float(total.mean()), 1e-9),

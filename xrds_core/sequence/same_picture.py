@@ -137,16 +137,18 @@ class Gain:
         return float(max(error, _TINY) ** (-1.0 / FALL))
 
 
-def gain(accumulated: Accumulated, own: Stored) -> Gain:
+def gain(accumulated: Accumulated, own: Stored, lent: float = 1.0) -> Gain:
     """Return what a frame of its own samples has gained by accumulation.
 
+    It is what it would have gained if neighbours had lent `lent` times their samples.
     Errors fall with `FALL`; the noise of a pixel is its weight.
     """
     assert own.noise is not None
     noise = np.square(floats(own.noise.difference)).reshape(own.shape)
     noise = box(noise, _SMOOTH) + np.float32(_TINY)  # halves may agree by chance
     alone = sample_counts(own, slice(None), noise.size).reshape(own.shape)
-    share = np.clip(alone / np.maximum(accumulated.samples, _TINY), 0.0, 1.0)
+    reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(lent)
+    share = alone / np.maximum(alone + reused, _TINY)
     weights, weighted = block_means(noise), block_means(noise * share**FALL)
     light = np.square(floats(own.noise.brightness)).reshape(own.shape)
     seen = weights > np.maximum(_UNSEEN**2 * block_means(light), 2.0 * _TINY)

@@ -93,10 +93,10 @@ def test_all_samples_are_taken_where_neighbours_are_of_no_use(
     assert {*lengths} == {SAMPLES // 2, SAMPLES - SAMPLES // 4}
 
 
-def test_the_rest_of_a_sequence_is_the_picture_of_all(
+def test_more_samples_make_the_picture_of_all(
     shot: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where no neighbour is used, it is what one render of all samples gives."""
+    """Where no neighbour is used, it is one render of all samples, but for noise."""
     measured(monkeypatch, float("inf"))
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     for obj in bpy.data.objects:
