@@ -19,8 +19,8 @@ from ..frame import stages
 from ..scene.contents import frame_range, requested_passes
 from ..scene.cuts import cuts
 from .methods import Method
-from .pace import pace_of
-from .same_picture import Part, render_more
+from .pace.choose import pace_of
+from .pace.more import Part, render_more
 from .sampling import Sampled, can_continue, first_sample
 from .visiting import go_to
 

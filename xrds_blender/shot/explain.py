@@ -14,7 +14,7 @@ from ..planning.plan import deadline, neighbours, same_picture
 from ..planning.request import Request
 from ..scene.contents import frame_range
 from ..scene.cuts import cuts
-from .same_picture import can_save
+from .pace.same_picture import can_save
 from .sampling import has_neighbours
 
 

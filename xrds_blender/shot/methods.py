@@ -14,7 +14,7 @@ from xrds_core.arrays import Array
 from ..frame import stages
 from ..frame.picture import Picture
 from ..planning.request import Request
-from .pace import Pace
+from .pace.interface import Pace
 from .sampling import Sampled
 
 Report = Callable[[float], bool]

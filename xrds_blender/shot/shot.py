@@ -23,9 +23,9 @@ from ..scene.cuts import cuts
 from .cache import SampleCache
 from .methods import Method
 from .overlap import Overlap, samples_on_card
-from .pace import pace_of
+from .pace.choose import pace_of
+from .pace.more import Part, render_more
 from .render import method_of
-from .same_picture import Part, render_more
 from .sampling import Sampled
 
 

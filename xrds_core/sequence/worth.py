@@ -1,7 +1,7 @@
 """What a sample of a neighbour is worth beside one of a frame's own, in a shot.
 
-It is measured in the first frame, again in the first one with neighbours on both sides,
-in the 20th, and then each time that the shot is twice as far: so chance counts less and
+It is measured in the first frame, again in the first one beyond its neighbours, in the
+20th, and then each time that the shot is twice as far: so chance counts less and
 less, and the seconds of measuring are soon a small part of the shot's. Where a small
 picture shows more chance than anything else, what other shots have shown counts.
 """
@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-_SOON = 20  # frames; one of those before has neighbours on both sides
+_SOON = 20  # frames; one of those before has all its neighbours
 # What is known before anything is measured: mean and standard deviation over the
 # choosing half of the gallery, 4 samples with neighbours against 16 without.
 _USUAL, _SPREAD = 0.45, 0.25

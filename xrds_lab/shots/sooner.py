@@ -47,8 +47,9 @@ if TYPE_CHECKING:
     Row = dict[str, Any]
 
 SAMPLES = (16, 64, 256)
-FRAMES = 17
-"""Frames of a shot: from 16 on it may have fewer samples."""
+FRAMES = 21
+"""Frames of a shot: no neighbour of the middle one is measured in, with more samples.
+"""
 MOST_SAMPLES = 4096
 """Of a pixel under a noise threshold, as in a new file."""
 CYCLES, SAME_PICTURE, SAME_SAMPLES = "cycles_oidn", "same_picture", "same_samples"

@@ -18,8 +18,8 @@ from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
-from xrds_blender.shot import deadline as deadline_module
-from xrds_blender.shot.deadline import Deadline
+from xrds_blender.shot.pace import deadline as deadline_module
+from xrds_blender.shot.pace.deadline import Deadline
 from xrds_blender.shot.sampling import Sampled
 from xrds_core.errors import UsageError
 from xrds_core.temporal.window import Shot, Window

@@ -20,7 +20,7 @@ from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.interface.properties import request_of
 from xrds_blender.planning.request import render_request
 from xrds_blender.scene.light import passes_looked_at
-from xrds_blender.shot import same_picture
+from xrds_blender.shot.pace import same_picture
 from xrds_blender.shot.shot import render_shot
 from xrds_core.errors import UsageError
 from xrds_core.light_parts.table import read_renderers

@@ -17,16 +17,22 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles import settings
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
-from xrds_blender.shot import same_picture, sampling
+from xrds_blender.shot import sampling
+from xrds_blender.shot.pace import measuring, more, same_picture
+from xrds_blender.shot.pace.regions import (
+    blocks_beside,
+    measured_regions,
+    pixels_of,
+)
 from xrds_core.sequence.worth import Ratio
 from xrds_core.temporal.frame import Frame, Stored
 
 pytestmark = pytest.mark.skipif(
     not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
 )
-FRAMES = [1, 2, 3, 4, 5]
+FRAMES = [1, 2, 3, 4, 5, 6, 7]
 SAMPLES = 16
-MEASURED = [1, 3]  # the first frame, and the first with neighbours on both sides
+MEASURED = [1, 4]  # the first frame, and the first beyond its neighbours
 
 
 @pytest.fixture
@@ -55,15 +61,15 @@ def picture(path: Path) -> np.ndarray:
 
 def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[float]:
     """Let the error of fewer samples be this; returns the counts that are rendered."""
-    monkeypatch.setattr(same_picture, "error_ratio", lambda *_: Ratio(ratio, 0.0))
+    monkeypatch.setattr(measuring, "error_ratio", lambda *_: Ratio(ratio, 0.0))
     lengths: list[float] = []
-    inner = same_picture.more_samples
+    inner = more.more_samples
 
     def noted(engine: Any, depsgraph: Any, parts: Any, **more: Any) -> Any:
         lengths.append(sum(part.length for part in parts))
         return inner(engine, depsgraph, parts, **more)
 
-    monkeypatch.setattr(same_picture, "more_samples", noted)
+    monkeypatch.setattr(more, "more_samples", noted)
     return lengths
 
 
@@ -84,7 +90,8 @@ def test_all_samples_are_taken_where_neighbours_are_of_no_use(
 ) -> None:
     lengths = measured(monkeypatch, float("inf"))
     frames = render(shot, "same")
-    shares = [1.25 if number in MEASURED else 1.0 for number in FRAMES]
+    # the second was sampled when the first had shown that all are needed
+    shares = [{1: 1.25, 4: 2.0}.get(number, 1.0) for number in FRAMES]
     assert [frame["share"] for frame in frames] == pytest.approx(shares)
     # two halves in the first frame, and where neighbours lie on both sides; then the
     # rest of those sampled before it was done
@@ -158,14 +165,14 @@ def test_what_rules_it_out_is_said(
     what: str, shot: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["render", str(shot), "-o", str(shot.parent / "#.exr"), "--same-picture"]
-    words += ["--frames", "1-5", *what.split()]
+    words += ["--frames", "1-7", *what.split()]
     assert main.main(words) == 2
     assert "--same-picture cannot be had with" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("job", "frames"),
-    [({"samples": 16}, 5), ({"temporal_radius": 0}, 5), ({}, 4), ({"scale": 2}, 5)],
+    [({"samples": 16}, 7), ({"temporal_radius": 0}, 7), ({}, 6), ({"scale": 2}, 7)],
 )
 def test_elsewhere_frames_have_the_samples_of_the_file(
     job: dict[str, Any], frames: int, shot: Path
@@ -175,9 +182,9 @@ def test_elsewhere_frames_have_the_samples_of_the_file(
     scene = bpy.context.scene
     assert not same_picture.can_save(scene, render_request(**request), frames)
     possible = render_request(1, temporal_radius=2, same_picture=True)
-    assert same_picture.can_save(scene, possible, 5)
+    assert same_picture.can_save(scene, possible, len(FRAMES))
     scene.view_layers[0].samples = 32  # a layer's own
-    assert not same_picture.can_save(scene, possible, 5)
+    assert not same_picture.can_save(scene, possible, len(FRAMES))
 
 
 def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
@@ -199,7 +206,7 @@ def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
         assert np.allclose(*pair, rtol=1e-3, atol=1e-4)
 
 
-@pytest.mark.parametrize(("frames", "is_said"), [("1-5", True), ("1-4", False)])
+@pytest.mark.parametrize(("frames", "is_said"), [("1-7", True), ("1-6", False)])
 def test_the_plan_of_a_shot_says_so(
     frames: str, is_said: bool, shot: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -215,19 +222,19 @@ def test_the_plan_of_a_shot_says_so(
 def test_large_pictures_are_measured_in_parts_from_top_to_bottom(
     shape: tuple[int, int], share: float
 ) -> None:
-    regions = same_picture.measured_regions(shape)
+    regions = measured_regions(shape)
     covered = np.zeros(shape, int)
     for region in regions:
         assert share == 1.0 or region.x % 32 == region.width % 32 == 0
         assert region.height == shape[0]
-        covered[same_picture._pixels(region)] += 1
+        covered[pixels_of(region)] += 1
     assert covered.max() == 1
     assert covered.mean() == pytest.approx(share, abs=0.04)
     blocks = np.ones([-(-side // 32) for side in shape], bool)
-    rest = np.sum(same_picture._rest(blocks, regions), axis=0)
+    rest = np.sum(blocks_beside(blocks, regions), axis=0)
     assert rest.max(initial=0) == (share < 1.0)
     for region in regions:
-        assert not rest[same_picture._blocks(region)].any()
+        assert not rest[:, region.x // 32 : (region.x + region.width) // 32].any()
 
 
 def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
@@ -237,8 +244,8 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
     render_settings = bpy.context.scene.render
     render_settings.resolution_x, render_settings.resolution_y = 128, 96
     bpy.ops.wm.save_mainfile()
-    monkeypatch.setattr(same_picture, "_LEAST_AREA", 2000)
-    assert len(same_picture.measured_regions((96, 128))) == 2
+    monkeypatch.setattr("xrds_blender.shot.pace.regions._LEAST_AREA", 2000)
+    assert len(measured_regions((96, 128))) == 2
     sizes: list[int] = []
 
     def noted(ours: Any, noisy: Any, parts: Any, *_: Any) -> Ratio:
@@ -246,13 +253,12 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
         assert ours.shape == noisy.shape == parts[0].noisy.shape
         return Ratio(float("inf"), 0.0)
 
-    monkeypatch.setattr(same_picture, "error_ratio", noted)
+    monkeypatch.setattr(measuring, "error_ratio", noted)
     frames = render(shot, "same")
     assert sizes == [2 * 32 * 96] * 2
     shares = {number: x["share"] for number, x in zip(FRAMES, frames, strict=True)}
+    # all samples everywhere; where it was measured, in half of the picture, frame 1
+    # has a quarter more, and frame 4 had them all before
+    expected = {1: 1.125, 4: 1.5}
     for number in FRAMES:
-        # all samples everywhere, and a quarter more where it was measured
-        if number in MEASURED:
-            assert shares[number] == pytest.approx(1.125), shares
-        else:
-            assert shares[number] == pytest.approx(1.0)
+        assert shares[number] == pytest.approx(expected.get(number, 1.0)), shares

@@ -14,7 +14,7 @@ from ...planning.estimates import Capabilities, Estimate, resolved
 from ...planning.request import Request
 from ...planning.settings import Mode
 from ...scene.contents import frame_range
-from ...shot.same_picture import can_save
+from ...shot.pace.same_picture import can_save
 from ...shot.sampling import has_neighbours
 from . import paragraph, words
 from .paragraph import translated

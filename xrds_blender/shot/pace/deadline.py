@@ -16,11 +16,12 @@ from xrds_core.notices import warn
 from xrds_core.temporal.window import Shot
 from xrds_core.time_left import duration
 
-from ..planning.plan import DEADLINE, Decision
-from ..planning.request import MOST_SAMPLES, Request
-from ..planning.settings import counted
-from .same_picture import Finishing, More
-from .sampling import Sampled, can_continue
+from ...planning.plan import DEADLINE, Decision
+from ...planning.request import MOST_SAMPLES, Request
+from ...planning.settings import counted
+from ..sampling import Sampled, can_continue
+from .interface import Finishing
+from .more import More
 
 _FIRST_TRY, _GROWTH = 2, 4  # samples, and how many times those of the try before
 # A further try may take this share of the time of all frames, or of one.

@@ -10,45 +10,31 @@ file asks for, where neighbours add nothing.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from xrds_core.arrays import Array
 from xrds_core.sequence.accumulator import Accumulator
-from xrds_core.sequence.extra_samples import ExtraSamples, enriched, mean_of, with_extra
+from xrds_core.sequence.extra_samples import ExtraSamples
 from xrds_core.sequence.history import History
 from xrds_core.sequence.rectangles import rectangles
-from xrds_core.sequence.same_picture import (
-    BLOCK,
-    Gain,
-    Rendered,
-    error_ratio,
-    gain,
-)
+from xrds_core.sequence.same_picture import BLOCK, Gain, gain
 from xrds_core.sequence.sooner import Clock
-from xrds_core.sequence.worth import Ratio, Worth
-from xrds_core.temporal.accumulate import Accumulated, accumulate
+from xrds_core.sequence.worth import Worth
 
-from ..cycles.low_camera import Region
-from ..cycles.more_samples import more_samples
-from ..cycles.samples import Samples
-from ..cycles.settings import has_subsets
-from ..frame import stages
-from ..frame.picture import Picture
-from ..planning.plan import SAME_PICTURE, Decision
-from ..planning.request import Request
-from ..planning.settings import Mode
-from .sampling import (
-    Sampled,
-    can_continue,
-    has_neighbours,
-    is_even,
-    sampling_of,
-)
+from ...cycles.low_camera import Region
+from ...cycles.settings import has_subsets
+from ...planning.plan import SAME_PICTURE, Decision
+from ...planning.request import Request
+from ...planning.settings import Mode
+from ..sampling import Sampled, can_continue, has_neighbours
+from .interface import Finishing
+from .measuring import Render, measure
+from .more import More, Part, nothing, put, together, with_more
+from .regions import blocks_beside, measured_regions, region_of
 
 FEWEST_SAMPLES = 8
 """Samples of the file from which it pays."""
@@ -56,7 +42,6 @@ FEWEST_FRAMES = 16
 """Frames of a shot from which it pays: the first costs more than the file asks for."""
 _FIRST = 0.25  # share that the first frames have; less was not tried by then
 _FALL = 0.5  # the next share over the present one, at least, where frames add up
-_LEAST_AREA = 200_000  # pixels that are measured in, where there are more
 _LEAST = 2  # samples of a frame, which has halves then
 # Blocks with less than this share of what they need get more samples, and frames.
 _LACKING, _ENOUGH = 0.5, 0.8
@@ -66,45 +51,6 @@ _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
 _TOO_MUCH, _TOO_LITTLE = 0.8, 1.1
 # Neighbours' samples of less worth count less beside more of the frame's own.
 _USEFUL = 0.25
-
-
-@dataclass(frozen=True)
-class Part:
-    """More samples of a frame: `length` of a sequence that has a number.
-
-    With `begin` they are of one that all frames share, after so many taken of it.
-
-    Where the file has a noise threshold, pixels stop at `share` of what it asks for.
-    `region` is a part of the picture, None all of it.
-    """
-
-    length: int
-    share: float
-    region: Region | None = None
-    begin: int | None = None
-    sequence: int = 1
-
-
-More = Callable[[Part], tuple[dict[str, ExtraSamples], dict[str, float]]]
-"""Renders more samples of a frame, by view, and says in how many seconds."""
-
-
-_More = Callable[[Part], dict[str, ExtraSamples]]
-
-
-class Finishing(Protocol):
-    """What makes pictures of frames: `FullSize`."""
-
-    def accumulate(
-        self, own: Sampled, others: Sequence[Sampled], view: str
-    ) -> Accumulated:
-        """One view with the samples of its neighbours."""
-
-    def finish(self, own: Sampled, others: Sequence[Sampled], view: str) -> Picture:
-        """The picture of one view."""
-
-    def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
-        """Samples by themselves, denoised."""
 
 
 def can_save(scene: Any, request: Request, frames: int) -> bool:
@@ -143,34 +89,6 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     return found
 
 
-def render_more(
-    engine: Any, depsgraph: Any, request: Request, place: int | None, part: Part
-) -> tuple[dict[str, ExtraSamples], dict[str, float]]:
-    """Render more samples of the frame that the dependency graph is at.
-
-    `place` is as in `sampling_of`. The result has the passes afterwards that it had
-    before. Raises Cancelled when the user stops it.
-    """
-    how = sampling_of(engine, depsgraph, request, place)
-    even = is_even(depsgraph.scene_eval, request)
-    subset = how.further(part.length, part.begin, part.sequence)
-    parts = [subset] if even or subset.length < 2 else subset.halves()
-    share = None if even else part.share
-    stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
-    try:
-        found, seconds = more_samples(
-            engine,
-            depsgraph,
-            parts,
-            region=part.region,
-            share=share,
-            light=how.light,
-        )
-    finally:
-        stages.end()
-    return {v: mean_of([_extra(x[v]) for x in found]) for v in found[0]}, seconds
-
-
 @dataclass
 class SamePicture:
     """How many samples the frames of a shot take, from the first that is finished.
@@ -188,7 +106,7 @@ class SamePicture:
     exposure: float = 1.0
     _worth: Worth = field(default_factory=Worth)
     _clock: Clock = field(default_factory=Clock)
-    _measured_in: int = 0
+    _measured_in: int | None = None
     _tried: float = 1.0
     _ratio: float = 1.0
     _shares: dict[int, float] = field(default_factory=dict)  # that all pixels have
@@ -227,22 +145,28 @@ class SamePicture:
         extra: dict[str, ExtraSamples] = {}
         regions: list[Region] = []
         noted = spent.of(self._priced(more, shape))
-        if self._worth.is_due(len(beside)):
+        # One frame of many samples is worth less than many of few: all its pixels lie
+        # as far beside this one's. So it is not to be among the neighbours.
+        if self._worth.is_due(len(beside)) and self._measured_in not in beside:
             regions = measured_regions(shape)
-            ratio, extra = self._measure(method, own, others, regions, noted)
+            exposure = self.exposure
+            found = measure(method, own, others, self.samples, exposure, noted)
+            extra, self._clock.denoising = found.extra, found.denoising
             whole = gained.of(gained.errors > 0.0)
-            self._worth.add(ratio, share, whole, len(beside))
+            self._worth.add(found.ratio, share, whole, len(beside))
             self._measured_in, self._tried = own.number, share
-            self._ratio = ratio.value
+            self._ratio = found.ratio.value
         lacks = self._lacks(share, gained)
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
         lent = self._lent(share, beside)
         even = gain(accumulated[view], own.views[view], lent)
         self._choose_next(even.of(rest))
-        for part in _rest(lacks, regions):  # where it was measured it has all now
+        for part in blocks_beside(
+            lacks, regions
+        ):  # where it was measured it has all now
             further = self._top_up(shape, share, gained, part, noted)
-            extra = _together(extra, further)
-        own = _with_more(own, extra, self._weight)
+            extra = together(extra, further)
+        own = with_more(own, extra, self._weight)
         if regions:
             self._clock.leave_out(time.perf_counter())
         else:
@@ -296,55 +220,13 @@ class SamePicture:
         enough = self._equal(share, gained.of(whole)) >= _ENOUGH
         return lacks if enough and lacks.mean() < _MOST_LACKING else whole
 
-    def _measure(
-        self,
-        method: Finishing,
-        own: Sampled,
-        others: Sequence[Sampled],
-        regions: Sequence[Region],
-        more: _More,
-    ) -> tuple[Ratio, dict[str, ExtraSamples]]:
-        """The squared error of a frame with its neighbours over that of all samples.
-
-        In some regions, by two renders of half of the file's samples, of two seeds:
-        halves of one sequence would not be independent. The frame has them from then
-        on.
-        """
-        view, length = next(iter(own.views)), max(1, self.samples // 2)
-        shape = own.views[view].shape
-        cells: list[list[Rendered]] = []
-        seconds = 0.0
-        extra: dict[str, ExtraSamples] = {}
-        for region in regions:
-            place = None if (region.height, region.width) == shape else region
-            halves = [more(Part(length, 0.5, place, sequence=i)) for i in (2, 3)]
-            started = time.perf_counter()
-            cells.append([_rendered(method, each[view]) for each in halves])
-            seconds += time.perf_counter() - started
-            for name in own.views:
-                found = mean_of([each[name] for each in halves])
-                whole = extra.setdefault(name, _nothing(shape, found.parts))
-                _put(whole, region, found)
-        parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
-        measured = sum(region.width * region.height for region in regions)
-        self._clock.denoising = seconds / 2 * shape[0] * shape[1] / measured
-        # with the neighbours' samples: what may be wrong in them has nothing to do with
-        # what denoising takes, and the frame's own few are far noisier
-        noisy = own.gathered[view].radiance
-        assert noisy is not None
-        together, noisy = (
-            np.concatenate([x[_pixels(region)] for region in regions])
-            for x in (method.finish(own, others, view).radiance, noisy)
-        )
-        return error_ratio(together, noisy, parts, self.exposure), extra
-
     def _top_up(
         self,
         shape: tuple[int, int],
         share: float,
         gained: Gain,
         lacks: NDArray[np.bool_],
-        more: _More,
+        more: Render,
     ) -> dict[str, ExtraSamples]:
         """Render more samples where a frame lacks them, up to all of the file's."""
         extra: dict[str, ExtraSamples] = {}
@@ -357,13 +239,13 @@ class SamePicture:
             length = self._missing(share, gained, there)
             if length < 1:
                 continue
-            region = _region(rows, columns, shape)
+            region = region_of(rows, columns, shape)
             begin = None if self.history is None else self._taken_more
             self._taken_more += length
             part = Part(length, length / self.samples, region, begin)
             for view, samples in more(part).items():
-                whole = extra.setdefault(view, _nothing(shape, samples.parts))
-                _put(whole, region, samples)
+                whole = extra.setdefault(view, nothing(shape, samples.parts))
+                put(whole, region, samples)
         return extra
 
     def _priced(self, more: More, shape: tuple[int, int]) -> More:
@@ -419,7 +301,7 @@ class _Seconds:
 
     stages: dict[str, float] = field(default_factory=dict)
 
-    def of(self, more: More) -> _More:
+    def of(self, more: More) -> Render:
         """The same without the seconds, which are noted here."""
 
         def noted(part: Part) -> dict[str, ExtraSamples]:
@@ -433,120 +315,3 @@ class _Seconds:
         """Together with others."""
         names = self.stages.keys() | seconds.keys()
         return {x: self.stages.get(x, 0.0) + seconds.get(x, 0.0) for x in names}
-
-
-def _extra(samples: Samples) -> ExtraSamples:
-    picture = samples.picture
-    return ExtraSamples(
-        np.ascontiguousarray(picture[..., :3]),
-        samples.albedo,
-        samples.normal,
-        picture[..., 3],
-        samples.counts,
-        samples.parts,
-    )
-
-
-def _with_more(
-    own: Sampled, extra: Mapping[str, ExtraSamples], weight: float
-) -> Sampled:
-    """A frame with extra samples; beside them neighbours' count with a weight."""
-    views, gathered = dict(own.views), dict(own.gathered)
-    for view, more in extra.items():
-        alone = accumulate(own.views[view], [])
-        gathered[view] = with_extra(own.gathered[view], alone, more, weight)
-        views[view] = enriched(own.views[view], alone, more)
-    return replace(own, views=views, gathered=gathered) if extra else own
-
-
-def _nothing(shape: tuple[int, int], parts: Iterable[str]) -> ExtraSamples:
-    """No samples anywhere."""
-    radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
-    alpha, samples = np.zeros((2, *shape), np.float32)
-    dark = {name: np.zeros_like(radiance) for name in parts}
-    return ExtraSamples(radiance, albedo, normal, alpha, samples, dark)
-
-
-def _put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:
-    """Write the samples of a region into those of the whole picture."""
-    place = _pixels(region)
-    for name in ("radiance", "albedo", "normal", "alpha", "samples"):
-        getattr(whole, name)[place] = getattr(part, name)
-    for name, pixels in part.parts.items():
-        whole.parts[name][place] = pixels
-
-
-def _together(
-    one: Mapping[str, ExtraSamples], two: Mapping[str, ExtraSamples]
-) -> dict[str, ExtraSamples]:
-    """Both, by view."""
-    names = one.keys() | two.keys()
-    return {v: mean_of([x[v] for x in (one, two) if v in x]) for v in names}
-
-
-def measured_regions(shape: tuple[int, int]) -> list[Region]:
-    """The parts of a picture (H, W) that show how large its errors are.
-
-    Two strips from top to bottom, a quarter of a large picture and half of a smaller
-    one; all where that would leave too few blocks.
-    """
-    height, width = shape
-    for share in (0.25, 0.5):
-        across = int(width * share / 2) // BLOCK * BLOCK
-        if across >= BLOCK and across * height * 2 >= _LEAST_AREA:
-            middles = (width // 4, 3 * width // 4)
-            starts = [(x - across // 2) // BLOCK * BLOCK for x in middles]
-            return [Region(x, 0, across, height) for x in starts]
-    return [Region(0, 0, width, height)]
-
-
-def _rest(
-    blocks: NDArray[np.bool_], regions: Sequence[Region]
-) -> list[NDArray[np.bool_]]:
-    """The blocks that are not in any of these strips, left, between and right."""
-    if not regions:
-        return [blocks]
-    places = [_blocks(region)[1] for region in regions]
-    ends = [0, *(x.stop for x in places)]
-    starts = [*(x.start for x in places), blocks.shape[1]]
-    found = []
-    for first, last in zip(ends, starts, strict=True):
-        part = np.zeros_like(blocks)
-        part[:, first:last] = blocks[:, first:last]
-        found.append(part)
-    return found
-
-
-def _pixels(region: Region) -> tuple[slice, slice]:
-    rows = slice(region.y, region.y + region.height)
-    return rows, slice(region.x, region.x + region.width)
-
-
-def _blocks(region: Region) -> tuple[slice, slice]:
-    """The blocks that a region covers; it begins with one, and ends with one."""
-    rows, columns = _pixels(region)
-    return (
-        slice(rows.start // BLOCK, -(-rows.stop // BLOCK)),
-        slice(columns.start // BLOCK, -(-columns.stop // BLOCK)),
-    )
-
-
-def _rendered(method: Finishing, samples: ExtraSamples) -> Rendered:
-    radiance = samples.radiance
-    return Rendered(radiance, method.denoised(radiance, samples.albedo, samples.normal))
-
-
-def _joined(cells: Sequence[Rendered]) -> Rendered:
-    """One picture of several, one below the other."""
-    return Rendered(
-        np.concatenate([x.noisy for x in cells]),
-        np.concatenate([x.denoised for x in cells]),
-    )
-
-
-def _region(rows: slice, columns: slice, shape: tuple[int, int]) -> Region:
-    """A rectangle of blocks, in pixels of the picture."""
-    top, left = rows.start * BLOCK, columns.start * BLOCK
-    bottom = min(rows.stop * BLOCK, shape[0])
-    right = min(columns.stop * BLOCK, shape[1])
-    return Region(left, top, right - left, bottom - top)

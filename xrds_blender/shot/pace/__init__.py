@@ -1,0 +1,1 @@
+"""What chooses how many samples the frames of a shot take, as they are rendered."""

@@ -1,0 +1,89 @@
+"""How large the error of a frame with its neighbours is, measured as it is rendered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from xrds_core.sequence.extra_samples import ExtraSamples, mean_of
+from xrds_core.sequence.same_picture import Rendered, error_ratio
+from xrds_core.sequence.worth import Ratio
+
+from ..sampling import Sampled
+from .interface import Finishing
+from .more import Part, nothing, put
+from .regions import measured_regions, pixels_of
+
+Render = Callable[[Part], dict[str, ExtraSamples]]
+"""Renders more samples of a frame, by view."""
+
+
+class Measured(NamedTuple):
+    """What was measured in a frame, and the samples by view that it took.
+
+    `ratio` is the squared error of its picture over that of all samples; denoising a
+    frame of this size by itself takes so many seconds.
+    """
+
+    ratio: Ratio
+    extra: dict[str, ExtraSamples]
+    denoising: float
+
+
+def measure(
+    method: Finishing,
+    own: Sampled,
+    others: Sequence[Sampled],
+    samples: int,
+    exposure: float,
+    more: Render,
+) -> Measured:
+    """Compare an accumulated frame with one of all `samples` without neighbours.
+
+    In `measured_regions`, by two renders of half of the samples each, of two seeds:
+    halves of one sequence would not be independent. White is a luminance of 1 /
+    `exposure`.
+    """
+    view, length = next(iter(own.views)), max(1, samples // 2)
+    shape = own.views[view].shape
+    regions = measured_regions(shape)
+    cells: list[list[Rendered]] = []
+    seconds = 0.0
+    extra: dict[str, ExtraSamples] = {}
+    for region in regions:
+        place = None if (region.height, region.width) == shape else region
+        halves = [more(Part(length, 0.5, place, sequence=i)) for i in (2, 3)]
+        started = time.perf_counter()
+        cells.append([_rendered(method, each[view]) for each in halves])
+        seconds += time.perf_counter() - started
+        for name in own.views:
+            found = mean_of([each[name] for each in halves])
+            put(extra.setdefault(name, nothing(shape, found.parts)), region, found)
+    parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
+    area = sum(region.width * region.height for region in regions)
+    # with the neighbours' samples: what may be wrong in them has nothing to do with
+    # what denoising takes, and the frame's own few are far noisier
+    noisy = own.gathered[view].radiance
+    assert noisy is not None
+    together, noisy = (
+        np.concatenate([x[pixels_of(region)] for region in regions])
+        for x in (method.finish(own, others, view).radiance, noisy)
+    )
+    ratio = error_ratio(together, noisy, parts, exposure)
+    return Measured(ratio, extra, seconds / 2 * shape[0] * shape[1] / area)
+
+
+def _rendered(method: Finishing, samples: ExtraSamples) -> Rendered:
+    radiance = samples.radiance
+    return Rendered(radiance, method.denoised(radiance, samples.albedo, samples.normal))
+
+
+def _joined(cells: Sequence[Rendered]) -> Rendered:
+    """One picture of several, one below the other."""
+    return Rendered(
+        np.concatenate([x.noisy for x in cells]),
+        np.concatenate([x.denoised for x in cells]),
+    )

@@ -1,0 +1,118 @@
+"""More samples of a frame of a shot, of all of it or of parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from xrds_core.sequence.extra_samples import ExtraSamples, enriched, mean_of, with_extra
+from xrds_core.temporal.accumulate import accumulate
+
+from ...cycles.low_camera import Region
+from ...cycles.more_samples import more_samples
+from ...cycles.samples import Samples
+from ...frame import stages
+from ...planning.request import Request
+from ..sampling import Sampled, is_even, sampling_of
+from .regions import pixels_of
+
+
+@dataclass(frozen=True)
+class Part:
+    """More samples of a frame: `length` of a sequence that has a number.
+
+    With `begin` they are of one that all frames share, after so many taken of it.
+
+    Where the file has a noise threshold, pixels stop at `share` of what it asks for.
+    `region` is a part of the picture, None all of it.
+    """
+
+    length: int
+    share: float
+    region: Region | None = None
+    begin: int | None = None
+    sequence: int = 1
+
+
+More = Callable[[Part], tuple[dict[str, ExtraSamples], dict[str, float]]]
+"""Renders more samples of a frame, by view, and says in how many seconds."""
+
+
+def render_more(
+    engine: Any, depsgraph: Any, request: Request, place: int | None, part: Part
+) -> tuple[dict[str, ExtraSamples], dict[str, float]]:
+    """Render more samples of the frame that the dependency graph is at.
+
+    `place` is as in `sampling_of`. The result has the passes afterwards that it had
+    before. Raises Cancelled when the user stops it.
+    """
+    how = sampling_of(engine, depsgraph, request, place)
+    even = is_even(depsgraph.scene_eval, request)
+    subset = how.further(part.length, part.begin, part.sequence)
+    parts = [subset] if even or subset.length < 2 else subset.halves()
+    share = None if even else part.share
+    stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
+    try:
+        found, seconds = more_samples(
+            engine,
+            depsgraph,
+            parts,
+            region=part.region,
+            share=share,
+            light=how.light,
+        )
+    finally:
+        stages.end()
+    return {v: mean_of([_extra(x[v]) for x in found]) for v in found[0]}, seconds
+
+
+def _extra(samples: Samples) -> ExtraSamples:
+    picture = samples.picture
+    return ExtraSamples(
+        np.ascontiguousarray(picture[..., :3]),
+        samples.albedo,
+        samples.normal,
+        picture[..., 3],
+        samples.counts,
+        samples.parts,
+    )
+
+
+def with_more(
+    own: Sampled, extra: Mapping[str, ExtraSamples], weight: float
+) -> Sampled:
+    """A frame with extra samples; beside them neighbours' count with a weight."""
+    views, gathered = dict(own.views), dict(own.gathered)
+    for view, more in extra.items():
+        alone = accumulate(own.views[view], [])
+        gathered[view] = with_extra(own.gathered[view], alone, more, weight)
+        views[view] = enriched(own.views[view], alone, more)
+    return replace(own, views=views, gathered=gathered) if extra else own
+
+
+def nothing(shape: tuple[int, int], parts: Iterable[str]) -> ExtraSamples:
+    """No samples anywhere."""
+    radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
+    alpha, samples = np.zeros((2, *shape), np.float32)
+    dark = {name: np.zeros_like(radiance) for name in parts}
+    return ExtraSamples(radiance, albedo, normal, alpha, samples, dark)
+
+
+def put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:
+    """Write the samples of a region into those of the whole picture."""
+    place = pixels_of(region)
+    for name in ("radiance", "albedo", "normal", "alpha", "samples"):
+        getattr(whole, name)[place] = getattr(part, name)
+    for name, pixels in part.parts.items():
+        whole.parts[name][place] = pixels
+
+
+def together(
+    one: Mapping[str, ExtraSamples], two: Mapping[str, ExtraSamples]
+) -> dict[str, ExtraSamples]:
+    """Both, by view."""
+    names = one.keys() | two.keys()
+    return {v: mean_of([x[v] for x in (one, two) if v in x]) for v in names}
