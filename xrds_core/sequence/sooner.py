@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from ..notices import warn
 
-_FRAMES = 3  # that are timed before anything is said
+_FRAMES = 5  # that are timed before anything is said
 _LATER = 1.1  # times Cycles' seconds, from which it is said
 
 
@@ -25,8 +25,13 @@ class Clock:
     _is_said: bool = False
 
     def leave_out(self, now: float) -> None:
-        """A frame was measured in, which takes longer than others."""
+        """A frame was measured in, which takes longer than others.
+
+        Those before it had other samples than those that come, often more.
+        """
         self._last = now
+        self._ours.clear()
+        self._theirs.clear()
 
     def add(self, now: float, seconds: Mapping[str, float], share: float) -> None:
         """Note a frame that took `seconds` by stage for a `share` of all samples.

@@ -36,3 +36,17 @@ def test_frames_that_are_measured_in_do_not_count(
         clock.leave_out(now)
         clock.add(now + 5.0, {"sync": 1.0, "beauty": 3.0}, 0.5)
     assert not capsys.readouterr().err
+
+
+def test_the_first_frames_do_not_count_once_it_is_measured_again(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    clock, now = Clock(denoising=2.0), 0.0
+    for taken in (None, *[20.0] * 4, None, *[5.0] * 6):
+        if taken is None:
+            now += 30.0
+            clock.leave_out(now)
+        else:
+            now += taken
+            clock.add(now, {"sync": 1.0, "beauty": 3.0}, 0.5)
+    assert not capsys.readouterr().err

@@ -161,9 +161,8 @@ class SamePicture:
         lent = self._lent(share, beside)
         even = gain(accumulated[view], own.views[view], lent)
         self._choose_next(even.of(rest))
-        for part in blocks_beside(
-            lacks, regions
-        ):  # where it was measured it has all now
+        # where it was measured it has all now
+        for part in blocks_beside(lacks, regions):
             further = self._top_up(shape, share, gained, part, noted)
             extra = together(extra, further)
         own = with_more(own, extra, self._weight)
