@@ -141,15 +141,26 @@ class Sampling:
         """
         return self.subset() or SampleSubset(self.own_seed, self.count, 0, self.count)
 
-    def further(self, length: int, begin: int | None, sequence: int) -> SampleSubset:
+    def further(
+        self, length: int, begin: int | None, sequence: int, each: int = 0
+    ) -> list[SampleSubset]:
         """More samples of the frame, of a sequence of their own that has a number.
 
-        With `begin` they are of one that all frames share, after so many taken of it.
+        Of several ones of `each` samples where that is not 0. With `begin` they are of
+        one that all frames share, after so many taken of it.
         """
         if begin is not None:
-            return running_subset(begin, length, self.most, self.seed + 1)
-        seed = (self.own_seed + sequence * _OTHER) % _LARGEST_SEED
-        return SampleSubset(seed, length, 0, length)
+            return [running_subset(begin, length, self.most, self.seed + 1)]
+        each = each or length
+        return [
+            SampleSubset(
+                (self.own_seed + (sequence + i) * _OTHER) % _LARGEST_SEED,
+                each,
+                0,
+                min(each, length - first),
+            )
+            for i, first in enumerate(range(0, length, each))
+        ]
 
     @property
     def own_seed(self) -> int:

@@ -59,14 +59,17 @@ def picture(path: Path) -> np.ndarray:
     return np.dstack([channels[name] for name in "RGB"])
 
 
-def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[float]:
-    """Let the error of fewer samples be this; returns the counts that are rendered."""
+def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[tuple[int, int]]:
+    """Let the error of fewer samples be this.
+
+    Returns the counts that are rendered beside frames' own, and those of a sequence.
+    """
     monkeypatch.setattr(measuring, "error_ratio", lambda *_: Ratio(ratio, 0.0))
-    lengths: list[float] = []
+    lengths: list[tuple[int, int]] = []
     inner = more.more_samples
 
     def noted(engine: Any, depsgraph: Any, parts: Any, **more: Any) -> Any:
-        lengths.append(sum(part.length for part in parts))
+        lengths.append((sum(part.length for part in parts), parts[0].whole))
         return inner(engine, depsgraph, parts, **more)
 
     monkeypatch.setattr(more, "more_samples", noted)
@@ -95,9 +98,12 @@ def test_all_samples_are_taken_where_neighbours_are_of_no_use(
     assert [frame["share"] for frame in frames] == pytest.approx(shares)
     # two halves in the first frame, and where neighbours lie on both sides; then the
     # rest of those sampled before it was done
-    assert lengths[:2] == [SAMPLES // 2, SAMPLES // 2]
-    assert lengths.count(SAMPLES // 2) == 4
-    assert {*lengths} == {SAMPLES // 2, SAMPLES - SAMPLES // 4}
+    half = SAMPLES // 2, SAMPLES // 2
+    assert lengths[:2] == [half, half]
+    assert lengths.count(half) == 4
+    # of sequences as long as that of the frame sampled last, which has all: for another
+    # length Cycles would sync the scene again
+    assert {*lengths} == {half, (SAMPLES - SAMPLES // 4, SAMPLES)}
 
 
 def test_more_samples_make_the_picture_of_all(

@@ -24,7 +24,9 @@ from .regions import pixels_of
 class Part:
     """More samples of a frame: `length` of a sequence that has a number.
 
-    With `begin` they are of one that all frames share, after so many taken of it.
+    With `begin` they are of one that all frames share, after so many taken of it. Where
+    `each` is not 0 they are of several with so many: Cycles syncs the scene again for
+    another number than it had before.
 
     Where the file has a noise threshold, pixels stop at `share` of what it asks for.
     `region` is a part of the picture, None all of it.
@@ -34,6 +36,7 @@ class Part:
     share: float
     region: Region | None = None
     begin: int | None = None
+    each: int = 0
     sequence: int = 1
 
 
@@ -51,8 +54,10 @@ def render_more(
     """
     how = sampling_of(engine, depsgraph, request, place)
     even = is_even(depsgraph.scene_eval, request)
-    subset = how.further(part.length, part.begin, part.sequence)
-    parts = [subset] if even or subset.length < 2 else subset.halves()
+    each = part.each if even else 0
+    parts = how.further(part.length, part.begin, part.sequence, each)
+    if not even and part.length > 1:
+        parts = [*parts[0].halves()]
     share = None if even else part.share
     stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
     try:

@@ -111,6 +111,7 @@ class SamePicture:
     _ratio: float = 1.0
     _shares: dict[int, float] = field(default_factory=dict)  # that all pixels have
     _call: float = 0.0  # what more samples cost each time, in samples of a block
+    _newest: int = 0  # samples of the frame that was sampled last
     _taken: int = 0  # of the sequence that frames continue under a still camera
     _taken_more: int = 0  # of that of more samples
 
@@ -122,7 +123,8 @@ class SamePicture:
     def takes(self, method: Finishing, frame: Sampled) -> bool:
         """Note that a frame was sampled with the present share."""
         self._shares[frame.number] = self.share
-        self._taken += round(self.samples * self.share)
+        self._newest = round(self.samples * self.share)
+        self._taken += self._newest
         return True
 
     def complete(
@@ -241,7 +243,7 @@ class SamePicture:
             region = region_of(rows, columns, shape)
             begin = None if self.history is None else self._taken_more
             self._taken_more += length
-            part = Part(length, length / self.samples, region, begin)
+            part = Part(length, length / self.samples, region, begin, self._newest)
             for view, samples in more(part).items():
                 whole = extra.setdefault(view, nothing(shape, samples.parts))
                 put(whole, region, samples)
