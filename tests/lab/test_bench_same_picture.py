@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from argparse import Namespace
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,8 @@ def test_each_method_has_a_row_that_is_measured_once(
     assert rows[CYCLES]["ratio"] == 1.0
     assert rows[CYCLES]["gain"] == 0.0
     assert len(rows[SAME_PICTURE]["shares"]) == sooner.FRAMES
+    late = statistics.median(rows[SAME_PICTURE]["shares"][-7:])
+    assert rows[SAME_PICTURE]["late_share"] == pytest.approx(late, abs=1e-3)
     assert rows[SAME_PICTURE]["mean_share"] <= 1.0
     assert rows[SAME_SAMPLES]["gain"] > rows[SAME_PICTURE]["gain"] - 1.0
     assert all(0 < row["flicker"] < 0.1 for row in rows.values())

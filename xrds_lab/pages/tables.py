@@ -125,13 +125,12 @@ def same_picture(results: Results) -> Table:
         cycles = only(results.same_picture, method="cycles_oidn", **file)
         alone = {x["scene"]: x for x in cycles}
         worst = min(ours, key=lambda x: float(x["gain"]))
-        late = [mean(x["shares"][len(x["shares"]) * 2 // 3 :]) for x in ours]
         label = "" if threshold is None else f", threshold {threshold:g}"
         table.append(
             [
                 f"{samples}{label}",
                 str(len(ours)),
-                f"{mean(late):.2f}",
+                f"{mean(x['late_share'] for x in ours):.2f}",
                 f"{mean(x['ratio'] for x in ours):.2f}",
                 f"{mean(x['late_ratio'] for x in ours):.2f}",
                 f"{mean(x['gain'] for x in ours):+.1f}",

@@ -195,6 +195,7 @@ class _Scene:
             "processor_seconds": round(made.processor, 3),
             "processor_ratio": ratios["processor_seconds"],
             "mean_share": round(float(np.mean(made.shares or [1.0])), 3),
+            "late_share": round(_late(made.shares), 3) if made.shares else None,
             "shares": [round(x, 3) for x in made.shares],
             "psnr": round(verdict.psnr, 3),
             "gain": round(verdict.gain, 3),
@@ -300,8 +301,13 @@ def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     seconds = (time.perf_counter() - started) / len(numbers)
     processor = (time.process_time() - busy) / len(numbers)
     pictures = shown[middle], shown[middle + 1]
-    late = statistics.median(taken[-len(taken) // 3 :])
-    return Made(*pictures, seconds, processor, _stops(scene), tuple(shares), late)
+    stops = _stops(scene)
+    return Made(*pictures, seconds, processor, stops, tuple(shares), _late(taken))
+
+
+def _late(values: Sequence[float]) -> float:
+    """The median of the last third of a shot's frames."""
+    return statistics.median(values[-len(values) // 3 :])
 
 
 def _stops(scene: Any) -> float:
@@ -318,6 +324,7 @@ _COLUMNS = {
     "late_ratio": "late in the shot",
     "processor_ratio": "of its processor seconds",
     "mean_share": "share of samples",
+    "late_share": "late",
     "psnr": "PSNR",
     "gain": "gain",
     "flip": "FLIP",
