@@ -185,6 +185,10 @@ def test_extra_samples_are_the_frames_own_from_then_on() -> None:
     light, before = (x.picture[:, :3].reshape(*x.shape, 3) for x in (more, frame))
     assert np.allclose(light[:BLOCK], before[:BLOCK] / 4 + 7.0 * 3 / 4, atol=1e-2)
     assert np.array_equal(light[BLOCK:], before[BLOCK:])
+    assert more.noise is not None
+    assert frame.noise is not None
+    assert np.array_equal(more.noise.difference, frame.noise.difference)
+    assert np.allclose(more.noise.brightness, frame.noise.brightness, rtol=1e-6)
     whole = enriched(
         frame, accumulate(frame, []), extra(np.full(frame.shape, 3.0, np.float32), 7.0)
     )

@@ -12,6 +12,7 @@ from xrds_core.sequence.extra_samples import ExtraSamples, mean_of
 from xrds_core.sequence.same_picture import Rendered, error_ratio
 from xrds_core.sequence.worth import Ratio
 
+from ...cycles.low_camera import Region
 from ..sampling import Sampled
 from .interface import Finishing
 from .more import Part, nothing, put
@@ -22,12 +23,13 @@ Render = Callable[[Part], dict[str, ExtraSamples]]
 
 
 class Measured(NamedTuple):
-    """What was measured in a frame, and the samples by view that it took.
+    """What was measured in some regions of a frame, and the samples that it took.
 
-    `ratio` is the squared error of its picture over that of all samples; denoising a
-    frame of this size by itself takes so many seconds.
+    `ratio` is the squared error of its picture over that of all samples; `extra` are by
+    view; denoising a frame of this size by itself takes so many seconds.
     """
 
+    regions: list[Region]
     ratio: Ratio
     extra: dict[str, ExtraSamples]
     denoising: float
@@ -73,7 +75,8 @@ def measure(
         for x in (method.finish(own, others, view).radiance, noisy)
     )
     ratio = error_ratio(together, noisy, parts, exposure)
-    return Measured(ratio, extra, seconds / 2 * shape[0] * shape[1] / area)
+    denoising = seconds / 2 * shape[0] * shape[1] / area
+    return Measured(regions, ratio, extra, denoising)
 
 
 def _rendered(method: Finishing, samples: ExtraSamples) -> Rendered:

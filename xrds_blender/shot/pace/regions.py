@@ -36,7 +36,7 @@ def blocks_beside(
     """The blocks that are not in any of these strips, left, between and right."""
     if not regions:
         return [blocks]
-    places = [_blocks_of(region)[1] for region in regions]
+    places = [_columns_of(region) for region in regions]
     ends = [0, *(x.stop for x in places)]
     starts = [*(x.start for x in places), blocks.shape[1]]
     found = []
@@ -53,13 +53,9 @@ def pixels_of(region: Region) -> tuple[slice, slice]:
     return rows, slice(region.x, region.x + region.width)
 
 
-def _blocks_of(region: Region) -> tuple[slice, slice]:
-    """The blocks that a region covers; it begins with one, and ends with one."""
-    rows, columns = pixels_of(region)
-    return (
-        slice(rows.start // BLOCK, -(-rows.stop // BLOCK)),
-        slice(columns.start // BLOCK, -(-columns.stop // BLOCK)),
-    )
+def _columns_of(region: Region) -> slice:
+    """The columns of blocks that a region covers; it begins with one."""
+    return slice(region.x // BLOCK, -(-(region.x + region.width) // BLOCK))
 
 
 def region_of(rows: slice, columns: slice, shape: tuple[int, int]) -> Region:

@@ -34,7 +34,7 @@ from ..sampling import Sampled, can_continue, has_neighbours
 from .interface import Finishing
 from .measuring import Render, measure
 from .more import More, Part, nothing, put, together, with_more
-from .regions import blocks_beside, measured_regions, region_of
+from .regions import blocks_beside, region_of
 
 FEWEST_SAMPLES = 8
 """Samples of the file from which it pays."""
@@ -150,9 +150,9 @@ class SamePicture:
         # One frame of many samples is worth less than many of few: all its pixels lie
         # as far beside this one's. So it is not to be among the neighbours.
         if self._worth.is_due(len(beside)) and self._measured_in not in beside:
-            regions = measured_regions(shape)
             exposure = self.exposure
             found = measure(method, own, others, self.samples, exposure, noted)
+            regions = found.regions
             extra, self._clock.denoising = found.extra, found.denoising
             whole = gained.of(gained.errors > 0.0)
             self._worth.add(found.ratio, share, whole, len(beside))
@@ -161,7 +161,9 @@ class SamePicture:
         lacks = self._lacks(share, gained)
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
         lent = self._lent(share, beside)
-        even = gain(accumulated[view], own.views[view], lent)
+        even = gained
+        if lent != 1.0:  # among frames of other shares
+            even = gain(accumulated[view], own.views[view], lent)
         self._choose_next(even.of(rest))
         # where it was measured it has all now
         for part in blocks_beside(lacks, regions):
