@@ -106,6 +106,25 @@ def test_all_samples_are_taken_where_neighbours_are_of_no_use(
     assert {*lengths} == {half, (SAMPLES - SAMPLES // 4, SAMPLES)}
 
 
+def test_one_frame_that_needs_more_does_not_raise_those_of_the_rest() -> None:
+    pace = same_picture.SamePicture(SAMPLES, neighbours=8)
+    pace._worth.add(Ratio(0.8, 0.02), share=0.375, gain=4.0, neighbours=8)
+    shares = []
+    for gain in (4.0, 4.0, 4.0, 4.0, 3.2, 4.0, 4.0, 4.0, 4.0):
+        pace._choose_next(gain)
+        shares.append(pace.share)
+    assert len({*shares}) == 1, shares
+    assert 0.25 < shares[-1] < 0.5
+    needed = 1.0 / pace._equal(1.0, 4.0)
+    assert 0.0 <= shares[-1] - needed < 1.0 / SAMPLES  # the next number of samples
+    for _ in range(4):
+        pace._choose_next(2.0)
+    assert pace.share > 1.2 * shares[-1]
+    for _ in range(4):
+        pace._choose_next(1.2)
+    assert pace.share == 1.0  # where nearly all are needed
+
+
 def test_more_samples_make_the_picture_of_all(
     shot: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

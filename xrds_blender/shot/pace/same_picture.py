@@ -10,8 +10,10 @@ file asks for, where neighbours add nothing.
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -46,9 +48,12 @@ _LEAST = 2  # samples of a frame, which has halves then
 # Blocks with less than this share of what they need get more samples, and frames.
 _LACKING, _ENOUGH = 0.5, 0.8
 _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
-# The share of the next frames stays as it is as long as it is off by no more: Cycles
-# syncs the scene again for another number of samples.
-_TOO_MUCH, _TOO_LITTLE = 0.8, 1.1
+# The share of the next frames stays as it is as long as it is off by no more from what
+# the last frames needed: Cycles syncs the scene again for another number of samples.
+_TOO_MUCH, _TOO_LITTLE = 0.9, 1.1
+_LAST = 4  # frames: one alone may need more by chance
+# Where so many are needed all are taken: a frame of a few less is no sooner, and worse.
+_ALL = 0.8
 # Neighbours' samples of less worth count less beside more of the frame's own.
 _USEFUL = 0.25
 
@@ -110,6 +115,7 @@ class SamePicture:
     _tried: float = 1.0
     _ratio: float = 1.0
     _shares: dict[int, float] = field(default_factory=dict)  # that all pixels have
+    _gains: deque[float] = field(default_factory=partial(deque, maxlen=_LAST))
     _call: float = 0.0  # what more samples cost each time, in samples of a block
     _newest: int = 0  # samples of the frame that was sampled last
     _taken: int = 0  # of the sequence that frames continue under a still camera
@@ -286,14 +292,16 @@ class SamePicture:
 
         `gain` is how many times its own samples a frame has then.
         """
+        self._gains.append(gain)
+        needed = 1.0 / float(self._equal(1.0, np.mean(self._gains)))
         least = _FIRST if self.history is None else self.share * _FALL
-        needed = self.possible(max(1.0 / float(self._equal(1.0, gain)), least))
+        needed = max(needed, least)
         if not _TOO_MUCH <= needed / self.share <= _TOO_LITTLE:
-            self.share = needed
+            self.share = self.possible(needed)
 
     def possible(self, share: float) -> float:
-        """The nearest share of whole samples."""
-        if not share < 1.0:
+        """The next share of whole samples."""
+        if not share < _ALL:
             return 1.0
         return max(_LEAST, np.ceil(self.samples * share)) / self.samples
 
