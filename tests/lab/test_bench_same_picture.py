@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import statistics
 from argparse import Namespace
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 import pytest
 
 from xrds_core.errors import UsageError
-from xrds_lab.bench.windows import find_shots
+from xrds_lab.bench.windows import Window, find_shots
 from xrds_lab.cards import cycles
 from xrds_lab.commands import measuring
 from xrds_lab.shots import motions, sooner
@@ -55,6 +56,48 @@ def test_each_method_has_a_row_that_is_measured_once(
     for name in ("_cycles", "_same_picture", "_same_samples"):
         monkeypatch.setattr(sooner, name, refuse)
     assert run(blend, Case("pan", 8))["shots"] == first["shots"]
+
+
+def test_more_can_be_rendered_than_is_judged(blend: Path) -> None:
+    windows = blend.parent / "windows.json"
+    window = {"resolution": [96, 72], "window": [30, 40, 32, 32], "floor_psnr": None}
+    windows.write_text(json.dumps({blend.stem: window}))
+    out, cache = blend.parent / "out", blend.parent / "cache"
+
+    def measured(around: tuple[int, int] | None) -> dict[str, Any]:
+        found = sooner.bench_same_picture(
+            [blend],
+            out,
+            [Case("pan", 8)],
+            windows=windows,
+            around=around,
+            cache=cache,
+            reference_samples=16,
+        )
+        assert found["failures"] == {}
+        return {row["method"]: row for row in found["shots"]}
+
+    small, large = measured(None), measured((64, 72))
+    assert small[CYCLES]["size"] == "32x32"
+    assert large[CYCLES]["size"] == "64x72"
+    # the same window of the same frame; a denoiser sees what is around it
+    assert large[CYCLES]["psnr"] == pytest.approx(small[CYCLES]["psnr"], abs=1.0)
+    with pytest.raises(UsageError, match="16x72 is not between the window, 32x32"):
+        measured((16, 72))
+
+
+@pytest.mark.parametrize(
+    ("place", "expected"), [((30, 40), (14, 0)), ((0, 0), (0, 0)), ((64, 8), (32, 0))]
+)
+def test_a_larger_window_ends_where_the_frame_does(
+    place: tuple[int, int], expected: tuple[int, int]
+) -> None:
+    window = Window(96, 72, *place, 32, 32)
+    larger = window.around(64, 72)
+    assert (larger.x, larger.y) == expected
+    rows, columns = window.within(larger)
+    assert (columns.start + larger.x, rows.start + larger.y) == place
+    assert (columns.stop - columns.start, rows.stop - rows.start) == (32, 32)
 
 
 def test_a_card_that_is_not_here_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

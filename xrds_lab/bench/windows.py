@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from xrds_core.errors import UsageError
@@ -34,6 +34,30 @@ class Window:
         size = self.frame_width, self.frame_height
         return Window(*size, 0, 0, *size)
 
+    def around(self, width: int, height: int) -> Window:
+        """A larger window with this one in its middle, as far as the frame reaches.
+
+        Raises UsageError where it does not hold this one or the frame does not hold it.
+        """
+        inner, frame = (self.width, self.height), (self.frame_width, self.frame_height)
+        starts = []
+        for start, size, wanted, limit in zip(
+            (self.x, self.y), inner, (width, height), frame, strict=True
+        ):
+            if not size <= wanted <= limit:
+                raise UsageError(
+                    f"{width}x{height} is not between the window, "
+                    f"{inner[0]}x{inner[1]}, and its frame, {frame[0]}x{frame[1]}"
+                )
+            first = start + size // 2 - wanted // 2
+            starts.append(min(max(first, 0), limit - wanted))
+        return replace(self, x=starts[0], y=starts[1], width=width, height=height)
+
+    def within(self, other: Window) -> tuple[slice, slice]:
+        """Its rows and columns in a picture of another window."""
+        top, left = self.y - other.y, self.x - other.x
+        return slice(top, top + self.height), slice(left, left + self.width)
+
     @property
     def label(self) -> str:
         """Name in files: frame size, then x, y, width and height."""
@@ -60,7 +84,8 @@ class Shot:
     """A scene file seen through a window, with the reference to compare with.
 
     Without one, `xrds bench` renders its own. Cycles renders on a `device`: the
-    processor, or a kind of card as `find_card` names it.
+    processor, or a kind of card as `find_card` names it. Of shots that are timed
+    pictures of a `size` are rendered, width and height, and judged in the window.
     """
 
     path: Path
@@ -68,6 +93,12 @@ class Shot:
     reference: Path | None
     digest: str
     device: str = CPU
+    size: tuple[int, int] | None = None
+
+    @property
+    def rendered(self) -> Window:
+        """What is rendered of shots that are timed."""
+        return self.window if self.size is None else self.window.around(*self.size)
 
     @property
     def name(self) -> str:

@@ -271,6 +271,12 @@ def _add_shots(group: Any) -> None:
         help="with --same-picture: Cycles renders on this machine's graphics card",
     )
     add(
+        "--around",
+        type=arguments.size,
+        metavar="WxH",
+        help="with --same-picture: render so much around each of the --windows",
+    )
+    add(
         "--light-parts",
         action="store_true",
         help="judge the parts of the light under a moving camera",
@@ -484,7 +490,12 @@ def _bench_same_picture(options: argparse.Namespace) -> dict[str, Any]:
     if options.card and device == CPU:
         raise UsageError("Cycles finds no graphics card here: leave out --card")
     return bench_same_picture(
-        options.scenes, options.out, cases, device=device, **_inputs(options)
+        options.scenes,
+        options.out,
+        cases,
+        around=options.around,
+        device=device,
+        **_inputs(options),
     )
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -89,6 +89,11 @@ class Made:
     shares: tuple[float, ...] = ()
     late: float | None = None
 
+    def within(self, place: tuple[slice, slice]) -> Made:
+        """The same of rows and columns of the pictures."""
+        pictures = self.radiance[place], self.following[place]
+        return replace(self, radiance=pictures[0], following=pictures[1])
+
 
 def bench_same_picture(
     scenes: Sequence[Path],
@@ -99,6 +104,7 @@ def bench_same_picture(
     windows: Path | None = None,
     references: Path | None = None,
     resolution: tuple[int, int] | None = None,
+    around: tuple[int, int] | None = None,
     cache: Path | None = None,
     reference_samples: int = 256,
     device: str = CPU,
@@ -107,8 +113,9 @@ def bench_same_picture(
 
     Errors are of the shot's middle frame, which is the file's own view, against two
     renders of `reference_samples` each, without their noise; with `references` against
-    these. Cycles renders on a `device` as in `Shot`. Raises UsageError for missing
-    files and too short a shot.
+    these. `around` is the width and height of what is rendered around the windows.
+    Cycles renders on a `device` as in `Shot`. Raises UsageError for missing files, what
+    does not fit, and too short a shot.
     """
     if frames < 2 * REACH + 1:
         raise UsageError(f"{frames} frames: give {2 * REACH + 1} or more")
@@ -117,9 +124,14 @@ def bench_same_picture(
     journal = Journal(folder.directory / "journal-same-picture.json", report_line)
     with streams.stdout_to(folder.directory / "blender.log"):
         networks = Networks(None, "cpu")
+        shots = find_shots(scenes, windows, references, resolution, device)
         parts = [
-            _Scene(shot, folder, Pictures(shot, folder, networks, reference_samples))
-            for shot in find_shots(scenes, windows, references, resolution, device)
+            _Scene(
+                replace(shot, size=around),
+                folder,
+                Pictures(shot, folder, networks, reference_samples),
+            )
+            for shot in shots
         ]
         for methods in _IN_TURN:
             for case, part in product(cases, parts):
@@ -134,7 +146,8 @@ class _Scene:
 
     def __init__(self, shot: Shot, folder: Folder, pictures: Pictures) -> None:
         self.shot, self.folder, self.pictures = shot, folder, pictures
-        name = f"{shot.identity}-{shot.window.label}-same-picture.json"
+        self._place = shot.window.within(shot.rendered)
+        name = f"{shot.identity}-{shot.rendered.label}-same-picture.json"
         self._path = folder.directory / name
         self.rows: dict[str, Row] = (
             read_json(self._path) if self._path.is_file() else {}
@@ -155,7 +168,7 @@ class _Scene:
         self.pictures.render(self.pictures.missing([]), journal, lambda _: None)
         for method in missing:
             report_line(f"{self.shot.name}: {case.label}, {method}")
-            made = work[method]()
+            made = work[method]().within(self._place)
             picture = {"radiance": made.radiance, "following": made.following}
             self.folder.write(self._picture(case, method), picture, {})
             if method == SAME_PICTURE:
@@ -188,6 +201,7 @@ class _Scene:
             "motion": case.motion,
             "samples": case.samples,
             "noise_threshold": case.noise_threshold,
+            "size": f"{self.shot.rendered.width}x{self.shot.rendered.height}",
             "method": method,
             "seconds": round(made.seconds, 3),
             "ratio": ratios["seconds"],
@@ -210,10 +224,11 @@ class _Scene:
         from xrds_blender import render
 
         case = Case(case.motion, self.pictures.reference_samples)
-        name = self._picture(case, "following")
+        shot = replace(self.shot, size=None)
+        name = f"{shot.identity}-{shot.window.label}-{case.label}-following.npz"
         kept = self.folder.read(name)
         if kept is None:
-            scene = _opened(self.shot, case, REACH)
+            scene = _opened(shot, case, REACH)
             scene.cycles.seed = HALF_SEEDS[0]  # of other noise than the methods'
             scene.frame_set(scene.frame_current + 1)
             picture = render(scene, plain=True, denoiser=DEFAULT_DENOISING)
@@ -222,12 +237,12 @@ class _Scene:
         return kept["radiance"]
 
     def _picture(self, case: Case, method: str) -> str:
-        window = self.shot.window.label
+        window = self.shot.rendered.label
         return f"{self.shot.identity}-{window}-{case.label}-{method}.npz"
 
 
 def _opened(shot: Shot, case: Case, reach: int) -> Any:
-    scene = open_scene(shot.path, shot.window, shot.device)
+    scene = open_scene(shot.path, shot.rendered, shot.device)
     scene.cycles.samples = case.samples
     if case.noise_threshold is not None:
         sample_adaptively(scene, case.samples, case.noise_threshold)
@@ -318,6 +333,7 @@ _COLUMNS = {
     "scene": "scene",
     "samples": "samples",
     "noise_threshold": "threshold",
+    "size": "size",
     "method": "method",
     "seconds": "s a frame",
     "ratio": "of Cycles'",
