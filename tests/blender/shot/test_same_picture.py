@@ -185,6 +185,19 @@ def test_a_noise_threshold_is_kept_and_raised(
     assert scene.cycles.adaptive_threshold == pytest.approx(0.2)
 
 
+@pytest.mark.parametrize(
+    ("is_even", "value"),
+    [
+        (True, "25% of the file's samples"),
+        # four times the samples halve noise; how many that is, the pixels decide
+        (False, "2.00 times the file's noise threshold"),
+    ],
+)
+def test_what_is_told_is_what_is_set(is_even: bool, value: str) -> None:
+    pace = same_picture.SamePicture(64, is_even=is_even)
+    assert pace._decision(0.25).value == value
+
+
 @pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--sample-cache c"])
 def test_what_rules_it_out_is_said(
     what: str, shot: Path, capsys: pytest.CaptureFixture[str]

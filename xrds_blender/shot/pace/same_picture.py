@@ -32,7 +32,7 @@ from ...cycles.settings import has_subsets
 from ...planning.plan import SAME_PICTURE, Decision
 from ...planning.request import Request
 from ...planning.settings import Mode
-from ..sampling import Sampled, can_continue, has_neighbours
+from ..sampling import Sampled, can_continue, has_neighbours, is_even
 from .interface import Finishing
 from .measuring import Render, measure
 from .more import More, Part, nothing, put, together, with_more
@@ -88,7 +88,11 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     neighbours = 2 * request.settings.temporal_radius
     exposure = 2.0**scene.view_settings.exposure
     found = SamePicture(
-        scene.cycles.samples, history, neighbours=neighbours, exposure=exposure
+        scene.cycles.samples,
+        history,
+        neighbours=neighbours,
+        exposure=exposure,
+        is_even=is_even(scene, request),
     )
     found.share = found.possible(_FIRST)
     return found
@@ -101,7 +105,8 @@ class SamePicture:
     `samples` are the file's, with a noise threshold the most that a pixel takes. Under
     a camera that stands still frames that have left the window count, as `history`. The
     next frame to be sampled takes a `share` of them. Frames have so many `neighbours`,
-    but fewer near the ends of the shot. White is a luminance of 1 / `exposure`.
+    but fewer near the ends of the shot. White is a luminance of 1 / `exposure`. Where
+    samples are not even, a share is what the noise threshold of a frame asks for.
     """
 
     samples: int
@@ -109,6 +114,7 @@ class SamePicture:
     share: float = _FIRST
     neighbours: int = 0
     exposure: float = 1.0
+    is_even: bool = True
     _worth: Worth = field(default_factory=Worth)
     _clock: Clock = field(default_factory=Clock)
     _measured_in: int | None = None
@@ -201,9 +207,13 @@ class SamePicture:
     def _decision(self, share: float) -> Decision:
         """What a frame was sampled with, and why."""
         value = f"{share:.0%} of the file's samples"
+        tried = f"{self._tried:.0%} of them"
+        if not self.is_even:  # a pixel has a least number, and Cycles stops in steps
+            value = f"{share**-0.5:.2f} times the file's noise threshold"
+            tried = f"{self._tried**-0.5:.2f} times the threshold"
         reason = (
-            f"measured in frame {self._measured_in}: with neighbours, "
-            f"{self._tried:.0%} of them had {self._ratio:.2f} times the error of all"
+            f"measured in frame {self._measured_in}: with neighbours, {tried} "
+            f"had {self._ratio:.2f} times the error of the file's"
         )
         return Decision(SAME_PICTURE, value, reason)
 
