@@ -102,6 +102,24 @@ class FullSize(Method):
         neighbours = own.neighbours(view, others)
         return self._accumulate(own.views[view], neighbours)
 
+    def radiance(
+        self,
+        own: Sampled,
+        others: Sequence[Sampled],
+        view: str,
+        region: tuple[slice, slice],
+    ) -> Array:
+        """Rows and columns of the picture of one view, (H, W, 3), denoised alone."""
+        finished = finish_frame(
+            own.views[view],
+            own.neighbours(view, others),
+            self._denoiser,
+            self._accumulate,
+            region=region,
+            accumulated=own.gathered.get(view),
+        )
+        return finished.picture[..., :3]
+
     def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
         """Samples by themselves, denoised."""
         return self._denoiser(radiance, albedo, normal).radiance

@@ -275,6 +275,29 @@ def test_large_pictures_are_measured_in_parts_from_top_to_bottom(
         assert not rest[:, region.x // 32 : (region.x + region.width) // 32].any()
 
 
+def test_what_is_measured_is_the_picture(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of it, without the parts of its light; or a strip of it."""
+    inner, differences = measuring.measure, []
+
+    def noted(method: Any, own: Any, others: Any, *more: Any) -> Any:
+        (view,) = own.views
+        shown = np.asarray(method.finish(own, others, view).radiance)
+        height, width = shown.shape[:2]
+        for columns in (slice(0, width), slice(0, width // 2)):
+            part = method.radiance(own, others, view, (slice(0, height), columns))
+            assert part.shape == (height, columns.stop, 3)
+            differences.append(np.abs(part - shown[:, columns]).mean() / shown.mean())
+        return inner(method, own, others, *more)
+
+    monkeypatch.setattr(same_picture, "measure", noted)
+    render(shot, "same")
+    assert len(differences) == 2 * len(MEASURED)
+    assert max(differences[::2]) == 0.0
+    assert 0.0 < max(differences[1::2]) < 0.05  # the denoiser sees less
+
+
 def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
     shot: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,6 +25,15 @@ class Finishing(Protocol):
     def finish(self, own: Sampled, others: Sequence[Sampled], view: str) -> Picture:
         """The picture of one view."""
 
+    def radiance(
+        self,
+        own: Sampled,
+        others: Sequence[Sampled],
+        view: str,
+        region: tuple[slice, slice],
+    ) -> Array:
+        """Rows and columns of the picture of one view, (H, W, 3), denoised alone."""
+
     def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
         """Samples by themselves, denoised."""
 

@@ -70,11 +70,15 @@ def measure(
     # what denoising takes, and the frame's own few are far noisier
     noisy = own.gathered[view].radiance
     assert noisy is not None
-    together, noisy = (
-        np.concatenate([x[pixels_of(region)] for region in regions])
-        for x in (method.finish(own, others, view).radiance, noisy)
+    places = [pixels_of(region) for region in regions]
+    # a part by itself, as its halves are
+    together = [method.radiance(own, others, view, place) for place in places]
+    ratio = error_ratio(
+        np.concatenate(together),
+        np.concatenate([noisy[place] for place in places]),
+        parts,
+        exposure,
     )
-    ratio = error_ratio(together, noisy, parts, exposure)
     denoising = seconds / 2 * shape[0] * shape[1] / area
     return Measured(regions, ratio, extra, denoising)
 
