@@ -10,6 +10,8 @@ from .results import MEDIAN, SCENES, Results, only, scene_name
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from .results import Rows
+
     Table = list[list[str]]
 
 MOTIONS = ("pan", "objects", "both")
@@ -115,24 +117,38 @@ def light_parts(results: Results) -> Table:
 
 
 def same_picture(results: Results) -> Table:
-    """Seconds and errors of *Same Picture* as ratios to Cycles + OIDN's."""
-    head = ["samples", "scenes", "share of them", "seconds", "late", "PSNR", "worst"]
-    table = [[*head, "FLIP", "flicker"]]
-    kinds = [(x["samples"], x["noise_threshold"]) for x in results.same_picture]
-    for samples, threshold in dict.fromkeys(kinds):
-        file = {"samples": samples, "noise_threshold": threshold}
-        ours = only(results.same_picture, method="same_picture", **file)
-        cycles = only(results.same_picture, method="cycles_oidn", **file)
+    """Seconds and errors of *Same Picture* as ratios to Cycles + OIDN's.
+
+    What a card rendered, only of scenes that the processor did not.
+    """
+    head = ["samples", "pictures", "scenes", "share of them", "seconds", "late"]
+    table = [[*head, "PSNR", "worst", "FLIP", "flicker"]]
+    case = ("scene", "samples", "noise_threshold")
+    timed = {
+        tuple(x[name] for name in case)
+        for x in only(results.same_picture, by="processor")
+    }
+    rows = [
+        x
+        for x in results.same_picture
+        if x["by"] == "processor" or tuple(x[name] for name in case) not in timed
+    ]
+    names = ("samples", "noise_threshold", "size", "by")
+    for kind in dict.fromkeys(tuple(x[name] for name in names) for x in rows):
+        file = dict(zip(names, kind, strict=True))
+        ours = only(rows, method="same_picture", **file)
+        cycles = only(rows, method="cycles_oidn", **file)
         alone = {x["scene"]: x for x in cycles}
         worst = min(ours, key=lambda x: float(x["gain"]))
+        samples, threshold, size, by = kind
         label = "" if threshold is None else f", threshold {threshold:g}"
         table.append(
             [
                 f"{samples}{label}",
+                f"{size}, card" if by == "card" else size,
                 str(len(ours)),
                 f"{mean(x['late_share'] for x in ours):.2f}",
-                f"{mean(x['ratio'] for x in ours):.2f}",
-                f"{mean(x['late_ratio'] for x in ours):.2f}",
+                *(_mean_if_timed(ours, name) for name in ("ratio", "late_ratio")),
                 f"{mean(x['gain'] for x in ours):+.1f}",
                 f"{worst['gain']:+.1f} {scene_name(worst['scene'])}",
                 *(
@@ -142,6 +158,13 @@ def same_picture(results: Results) -> Table:
             ]
         )
     return table
+
+
+def _mean_if_timed(rows: Rows, name: str) -> str:
+    """The mean of seconds; nothing where other work ran beside it."""
+    if any(x[name] is None for x in rows):
+        return "-"
+    return f"{mean(x[name] for x in rows):.2f}"
 
 
 def stills(results: Results) -> Table:
