@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
 from statistics import mean, median
 from typing import TYPE_CHECKING
 
@@ -123,18 +124,15 @@ def same_picture(results: Results) -> Table:
     """
     head = ["samples", "pictures", "scenes", "share of them", "seconds", "late"]
     table = [[*head, "PSNR", "worst", "FLIP", "flicker"]]
-    case = ("scene", "samples", "noise_threshold")
-    timed = {
-        tuple(x[name] for name in case)
-        for x in only(results.same_picture, by="processor")
-    }
+    case = itemgetter("scene", "samples", "noise_threshold")
+    timed = {case(x) for x in only(results.same_picture, by="processor")}
     rows = [
         x
         for x in results.same_picture
-        if x["by"] == "processor" or tuple(x[name] for name in case) not in timed
+        if x["by"] == "processor" or case(x) not in timed
     ]
     names = ("samples", "noise_threshold", "size", "by")
-    for kind in dict.fromkeys(tuple(x[name] for name in names) for x in rows):
+    for kind in dict.fromkeys(map(itemgetter(*names), rows)):
         file = dict(zip(names, kind, strict=True))
         ours = only(rows, method="same_picture", **file)
         cycles = only(rows, method="cycles_oidn", **file)
