@@ -18,11 +18,13 @@ from xrds_core.light_parts.light import passes_by_name
 from xrds_core.temporal.halves import Halves
 from xrds_core.temporal.sample_subsets import SampleSubset
 
+from ..internals.borrowed import Borrowed
 from . import session
 from .clock import StageClock
 from .layer_session import LayerSession
 from .pass_names import SAMPLE_COUNT, is_of_first_sample
 from .samples import COUNTS, GEOMETRY, Samples, sample_layer
+from .settings import set_share
 
 _Passes = dict[tuple[str, str], Array]
 _Geometry = Sequence[tuple[str, str]]
@@ -50,8 +52,10 @@ def sample_halves(
     are in samples. Raises Cancelled when the user stops it.
     """
     is_even = COUNTS not in geometry
-    with LayerSession(engine, depsgraph) as layer:
-        parts, passes, clocks = [], [], []
+    parts, passes, clocks = [], [], []
+    with LayerSession(engine, depsgraph) as layer, Borrowed() as borrowed:
+        if not is_even:  # so that their mean has the noise that is asked for
+            set_share(borrowed, depsgraph.scene_eval, subset.whole, 0.5)
         for part in subset.halves():
             samples, clock = sample_layer(
                 engine,

@@ -32,7 +32,7 @@ def more_samples(
     """Render parts of sequences; samples of each by view, and the seconds.
 
     `region` is a part of the picture, in its own pixels; None is all of it. `share`
-    keeps the file's noise threshold, as `set_share` has it: the parts are halves then.
+    keeps the file's noise threshold, as `set_share` has it, for each part.
     All samples have counts, and the parts of the `light`. The result has the passes
     afterwards that it had before. Raises Cancelled when the user stops it.
     """

@@ -55,21 +55,14 @@ def set_samples(
 ) -> None:
     """Take samples as `set_sampling`, or in their place a part of a sequence.
 
-    If not `is_even` that is half of one, whose pixels stop where its noise is what the
-    file's threshold leaves when both halves are added up.
+    If not `is_even` the scene's noise threshold stays: pixels stop at it.
     """
     if subset is None:
         set_sampling(borrowed, scene, samples, seed)
         return
-    threshold, least = _stops_at(scene.cycles, subset.whole)
     set_sampling(borrowed, scene, subset.whole, subset.seed)
     if not is_even:
-        borrowed.set(
-            scene.cycles,
-            use_adaptive_sampling=True,
-            adaptive_threshold=threshold * math.sqrt(2.0),
-            adaptive_min_samples=max(1, least // 2),
-        )
+        borrowed.set(scene.cycles, use_adaptive_sampling=True)
     if subset.length != subset.whole:
         borrowed.set(
             scene.cycles,
@@ -79,10 +72,11 @@ def set_samples(
         )
 
 
-def _stops_at(cycles: Any, samples: int) -> tuple[float, int]:
+def stops_at(cycles: Any, samples: int) -> tuple[float, int]:
     """The noise threshold and the least samples of a pixel, also if Cycles finds them.
 
-    As Cycles' `intern/cycles/scene/integrator.cpp` has it.
+    `samples` are the most of one. As Cycles' `intern/cycles/scene/integrator.cpp` has
+    it.
     """
     threshold = cycles.adaptive_threshold or max(0.001, 1.0 / samples)
     least = cycles.adaptive_min_samples or math.ceil(16.0 / threshold**0.3)
@@ -94,11 +88,11 @@ def set_share(borrowed: Borrowed, scene: Any, samples: int, share: float) -> Non
 
     `samples` are the most that the file allows: an automatic threshold follows them.
     """
-    threshold, least = _stops_at(scene.cycles, samples)
+    threshold, least = stops_at(scene.cycles, samples)
     borrowed.set(
         scene.cycles,
         adaptive_threshold=threshold / math.sqrt(share),
-        adaptive_min_samples=max(1, round(least * share)),
+        adaptive_min_samples=max(1, int(least * share)),
     )
 
 

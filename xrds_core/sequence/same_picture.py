@@ -52,27 +52,28 @@ def error_ratio(
     noisy: Array,
     parts: tuple[Rendered, Rendered],
     exposure: float = 1.0,
+    share: float = 0.5,
 ) -> Ratio:
     """Return the squared error of a picture over that of a frame of all samples.
 
-    `parts` are half of all samples each, of seeds of their own; `picture` (H, W, 3) and
-    `noisy`, the mean of samples that the parts do not have either, were made without
-    them. All are radiance. Errors count as they are seen: relative to the local light
-    of their channel, and less where it is beyond white, 1 / `exposure`. The ratio is
-    infinite where noise hides the error of all samples.
+    `parts` are a `share` of all samples each, of seeds of their own; `picture`
+    (H, W, 3) and `noisy`, the mean of samples that the parts do not have either, were
+    made without them. All are radiance. Errors count as they are seen: relative to the
+    local light of their channel, and less where it is beyond white, 1 / `exposure`. The
+    ratio is infinite where noise hides the error of all samples.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
-        ours, half = _errors(picture, noisy, parts, exposure)
-        return Ratio(*_ratio(ours, half * 0.5**FALL))
+        ours, one = _errors(picture, noisy, parts, exposure)
+        return Ratio(*_ratio(ours, one * share**FALL))
 
 
 def _errors(
     picture: Array, noisy: Array, parts: tuple[Rendered, Rendered], exposure: float
 ) -> tuple[Array, Array]:
-    """Return the errors of the picture and of half of all samples, by blocks.
+    """Return the errors of the picture and of one of the parts, by blocks.
 
     An error by two noisy renders has the product of their noises in it. So the
-    picture's is that of half of the samples, and their difference by one render.
+    picture's is that of a part, and their difference by one render.
     """
     one, two = parts
     shown = (picture + one.denoised + two.denoised) / 3
@@ -143,16 +144,22 @@ def gain(accumulated: Accumulated, own: Stored, lent: float = 1.0) -> Gain:
     It is what it would have gained if neighbours had lent `lent` times their samples.
     Errors fall with `FALL`; the noise of a pixel is its weight.
     """
-    assert own.noise is not None
-    noise = np.square(floats(own.noise.difference)).reshape(own.shape)
-    noise = box(noise, _SMOOTH) + np.float32(_TINY)  # halves may agree by chance
+    noise = root_noise(own)
     alone = sample_counts(own, slice(None), noise.size).reshape(own.shape)
     reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(lent)
     share = alone / np.maximum(alone + reused, _TINY)
     weights, weighted = block_means(noise), block_means(noise * share**FALL)
+    assert own.noise is not None
     light = np.square(floats(own.noise.brightness)).reshape(own.shape)
     seen = weights > np.maximum(_UNSEEN**2 * block_means(light), 2.0 * _TINY)
     return Gain(np.maximum(weighted / weights, _TINY), weights, seen)
+
+
+def root_noise(frame: Stored) -> Array:
+    """Return the noise (H, W) of a frame: the variance of the root of its luminance."""
+    assert frame.noise is not None
+    noise = np.square(floats(frame.noise.difference)).reshape(frame.shape)
+    return box(noise, _SMOOTH) + np.float32(_TINY)  # halves may agree by chance
 
 
 def block_means(plane: Array, size: int = BLOCK) -> Array:

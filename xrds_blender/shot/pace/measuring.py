@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from xrds_core.arrays import Array
 from xrds_core.sequence.extra_samples import ExtraSamples, mean_of
 from xrds_core.sequence.same_picture import Rendered, error_ratio
 from xrds_core.sequence.worth import Ratio
@@ -17,6 +18,7 @@ from ..sampling import Sampled
 from .interface import Finishing
 from .more import Part, nothing, put
 from .regions import measured_regions, pixels_of
+from .threshold import counts_of_file
 
 Render = Callable[[Part], dict[str, ExtraSamples]]
 """Renders more samples of a frame, by view."""
@@ -26,13 +28,15 @@ class Measured(NamedTuple):
     """What was measured in some regions of a frame, and the samples that it took.
 
     `ratio` is the squared error of its picture over that of all samples; `extra` are by
-    view; denoising a frame of this size by itself takes so many seconds.
+    view; denoising a frame of this size by itself takes so many seconds. `asked` (H, W)
+    are the samples that the file takes, 0 elsewhere.
     """
 
     regions: list[Region]
     ratio: Ratio
     extra: dict[str, ExtraSamples]
     denoising: float
+    asked: Array
 
 
 def measure(
@@ -42,12 +46,13 @@ def measure(
     samples: int,
     exposure: float,
     more: Render,
+    least: int | None = None,
 ) -> Measured:
     """Compare an accumulated frame with one of all `samples` without neighbours.
 
     In `measured_regions`, by two renders of half of the samples each, of two seeds:
     halves of one sequence would not be independent. White is a luminance of 1 /
-    `exposure`.
+    `exposure`. Under a noise threshold a pixel takes at `least` so many.
     """
     view, length = next(iter(own.views)), max(1, samples // 2)
     shape = own.views[view].shape
@@ -73,14 +78,18 @@ def measure(
     places = [pixels_of(region) for region in regions]
     # a part by itself, as its halves are
     together = [method.radiance(own, others, view, place) for place in places]
+    both = extra[view].samples
+    asked = both if least is None else counts_of_file(both, least, samples)
+    asked = np.where(both > 0.0, asked, np.float32(0.0))
     ratio = error_ratio(
         np.concatenate(together),
         np.concatenate([noisy[place] for place in places]),
         parts,
         exposure,
+        float(both.sum() / 2 / asked.sum()),
     )
     denoising = seconds / 2 * shape[0] * shape[1] / area
-    return Measured(regions, ratio, extra, denoising)
+    return Measured(regions, ratio, extra, denoising, asked)
 
 
 def _rendered(method: Finishing, samples: ExtraSamples) -> Rendered:

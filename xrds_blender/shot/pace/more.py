@@ -56,8 +56,6 @@ def render_more(
     even = is_even(depsgraph.scene_eval, request)
     each = part.each if even else 0
     parts = how.further(part.length, part.begin, part.sequence, each)
-    if not even and part.length > 1:
-        parts = [*parts[0].halves()]
     share = None if even else part.share
     stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
     try:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xrds_core.arrays import Array
 from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.extra_samples import ExtraSamples
 from xrds_core.sequence.history import History
@@ -28,15 +29,17 @@ from xrds_core.sequence.sooner import Clock
 from xrds_core.sequence.worth import Worth
 
 from ...cycles.low_camera import Region
-from ...cycles.settings import has_subsets
+from ...cycles.settings import has_subsets, stops_at
 from ...planning.plan import SAME_PICTURE, Decision
 from ...planning.request import Request
 from ...planning.settings import Mode
+from ...scene.contents import stands_still
 from ..sampling import Sampled, can_continue, has_neighbours, is_even
 from .interface import Finishing
-from .measuring import Render, measure
+from .measuring import Measured, Render, measure
 from .more import More, Part, nothing, put, together, with_more
 from .regions import blocks_beside, region_of
+from .threshold import Threshold, learn
 
 FEWEST_SAMPLES = 8
 """Samples of the file from which it pays."""
@@ -85,14 +88,16 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     history = None
     if can_continue(scene, request):
         history = History(Accumulator(request.machine.accumulate_on))
-    neighbours = 2 * request.settings.temporal_radius
-    exposure = 2.0**scene.view_settings.exposure
+    least = None
+    if not is_even(scene, request):
+        _, least = stops_at(scene.cycles, scene.cycles.samples)
     found = SamePicture(
         scene.cycles.samples,
         history,
-        neighbours=neighbours,
-        exposure=exposure,
-        is_even=is_even(scene, request),
+        neighbours=2 * request.settings.temporal_radius,
+        exposure=2.0**scene.view_settings.exposure,
+        least=least,
+        moves=not stands_still(scene.camera),
     )
     found.share = found.possible(_FIRST)
     return found
@@ -102,11 +107,11 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
 class SamePicture:
     """How many samples the frames of a shot take, from the first that is finished.
 
-    `samples` are the file's, with a noise threshold the most that a pixel takes. Under
-    a camera that stands still frames that have left the window count, as `history`. The
-    next frame to be sampled takes a `share` of them. Frames have so many `neighbours`,
-    but fewer near the ends of the shot. White is a luminance of 1 / `exposure`. Where
-    samples are not even, a share is what the noise threshold of a frame asks for.
+    `samples` are the file's, with a noise threshold the most that a pixel takes, and
+    `least` the fewest. Under a camera that stands still, and never `moves`, frames that
+    have left the window count, as `history`. The next frame to be sampled takes a
+    `share` of what the file does. Frames have so many `neighbours`, but fewer near the
+    ends of the shot. White is a luminance of 1 / `exposure`.
     """
 
     samples: int
@@ -114,7 +119,9 @@ class SamePicture:
     share: float = _FIRST
     neighbours: int = 0
     exposure: float = 1.0
-    is_even: bool = True
+    least: int | None = None
+    moves: bool = True
+    _threshold: Threshold | None = None
     _worth: Worth = field(default_factory=Worth)
     _clock: Clock = field(default_factory=Clock)
     _measured_in: int | None = None
@@ -129,12 +136,14 @@ class SamePicture:
 
     def request(self, request: Request) -> Request:
         """The request of the next frame that is sampled."""
+        if self._is_few():
+            return request.with_settings(samples=self._of_file, share=self.share)
         begin = None if self.history is None else self._taken
         return request.with_settings(share=self.share, begin=begin)
 
     def takes(self, method: Finishing, frame: Sampled) -> bool:
         """Note that a frame was sampled with the present share."""
-        self._shares[frame.number] = self.share
+        self._shares[frame.number] = self._share(frame, self.share)
         self._newest = round(self.samples * self.share)
         self._taken += self._newest
         return True
@@ -162,15 +171,16 @@ class SamePicture:
         # One frame of many samples is worth less than many of few: all its pixels lie
         # as far beside this one's. So it is not to be among the neighbours.
         if self._worth.is_due(len(beside)) and self._measured_in not in beside:
-            exposure = self.exposure
-            found = measure(method, own, others, self.samples, exposure, noted)
-            regions = found.regions
-            extra, self._clock.denoising = found.extra, found.denoising
+            found = self._measure(method, own, others, noted)
+            extra, regions = found.extra, found.regions
+            share = self._learn(own, share, found.asked)
             whole = gained.of(gained.errors > 0.0)
             self._worth.add(found.ratio, share, whole, len(beside))
-            self._measured_in, self._tried = own.number, share
-            self._ratio = found.ratio.value
-        lacks = self._lacks(share, gained)
+            self._tried = share
+        shares = np.full_like(gained.errors, share)
+        if self._threshold is not None and own.samples is not None:  # even ones
+            shares /= self._threshold.density(own.views[view])
+        lacks = self._lacks(shares, gained)
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
         lent = self._lent(share, beside)
         even = gained
@@ -179,7 +189,7 @@ class SamePicture:
         self._choose_next(even.of(rest))
         # where it was measured it has all now
         for part in blocks_beside(lacks, regions):
-            further = self._top_up(shape, share, gained, part, noted)
+            further = self._top_up(shape, shares, gained, part, noted)
             extra = together(extra, further)
         own = with_more(own, extra, self._weight)
         if regions:
@@ -191,10 +201,22 @@ class SamePicture:
             self._shares[own.number] = share
         return replace(
             own,
+            samples=None,
             seconds=spent.added_to(own.seconds),
             share=share,
             decisions=(self._decision(share),),
         )
+
+    def _measure(
+        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: Render
+    ) -> Measured:
+        """Compare a frame with its neighbours to one of all samples."""
+        found = measure(
+            method, own, others, self.samples, self.exposure, more, self.least
+        )
+        self._clock.denoising = found.denoising
+        self._measured_in, self._ratio = own.number, found.ratio.value
+        return found
 
     def _before(self, own: Sampled, others: Sequence[Sampled]) -> list[Sampled]:
         """What frames before the window have left, as one that lies beside it."""
@@ -206,18 +228,49 @@ class SamePicture:
 
     def _decision(self, share: float) -> Decision:
         """What a frame was sampled with, and why."""
-        value = f"{share:.0%} of the file's samples"
-        tried = f"{self._tried:.0%} of them"
-        if not self.is_even:  # a pixel has a least number, and Cycles stops in steps
-            value = f"{share**-0.5:.2f} times the file's noise threshold"
-            tried = f"{self._tried**-0.5:.2f} times the threshold"
         reason = (
-            f"measured in frame {self._measured_in}: with neighbours, {tried} "
-            f"had {self._ratio:.2f} times the error of the file's"
+            f"measured in frame {self._measured_in}: with neighbours, "
+            f"{self._tried:.0%} of them had {self._ratio:.2f} times the error of the "
+            "file's"
         )
-        return Decision(SAME_PICTURE, value, reason)
+        return Decision(SAME_PICTURE, f"{share:.0%} of the file's samples", reason)
 
-    def _equal(self, share: float, gain: Any) -> Any:
+    @property
+    def _of_file(self) -> int:
+        """Samples of the file's frames, on the mean of their pixels."""
+        threshold = self._threshold
+        return self.samples if threshold is None else round(threshold.samples)
+
+    def _is_few(self) -> bool:
+        """Whether the next frame takes even samples, of a file with a threshold.
+
+        Under a camera that stands still its samples would be of another sequence.
+        """
+        threshold = self._threshold
+        return self.moves and threshold is not None and threshold.is_few(self.share)
+
+    def _share(self, frame: Sampled, asked: float) -> float:
+        """What a frame has of the file's samples.
+
+        Under a noise threshold that is not what it was `asked` for: a pixel has a
+        least number, and Cycles stops in steps.
+        """
+        if self._threshold is None:
+            return asked
+        return float(next(iter(frame.views.values())).samples / self._threshold.samples)
+
+    def _learn(self, own: Sampled, share: float, asked: Array) -> float:
+        """Learn what the noise threshold asks for; the share that a frame has."""
+        if self.least is None:
+            return share
+        is_first = self._threshold is None
+        self._threshold = learn(next(iter(own.views.values())), asked)
+        found = self._share(own, share)
+        if is_first:  # what the others have is known now as well
+            self._shares = {n: x * found / share for n, x in self._shares.items()}
+        return found
+
+    def _equal(self, share: Any, gain: Any) -> Any:
         """The share of all samples that is as good without neighbours.
 
         `gain` is how many times its own samples the frame has with them.
@@ -229,20 +282,20 @@ class SamePicture:
         """What neighbours' samples count beside more of the frame's own."""
         return min(self._worth.value / _USEFUL, 1.0)
 
-    def _lacks(self, share: float, gained: Gain) -> NDArray[np.bool_]:
-        """Which blocks are to get more samples."""
+    def _lacks(self, shares: Array, gained: Gain) -> NDArray[np.bool_]:
+        """Which blocks, that have `shares` of the file's samples, are to get more."""
         whole = np.ones(gained.errors.shape, bool)
-        if share == 1.0:
+        if (shares >= 1.0).all():
             return ~whole
         with np.errstate(invalid="ignore"):  # blocks without noise lack nothing
-            lacks = self._equal(share, gained.blocks) < _LACKING
-        enough = self._equal(share, gained.of(whole)) >= _ENOUGH
+            lacks = self._equal(shares, gained.blocks) < _LACKING
+        enough = self._equal(shares.mean(), gained.of(whole)) >= _ENOUGH
         return lacks if enough and lacks.mean() < _MOST_LACKING else whole
 
     def _top_up(
         self,
         shape: tuple[int, int],
-        share: float,
+        shares: Array,
         gained: Gain,
         lacks: NDArray[np.bool_],
         more: Render,
@@ -251,11 +304,11 @@ class SamePicture:
         extra: dict[str, ExtraSamples] = {}
         if not lacks.any():
             return extra
-        length = self._missing(share, gained, lacks)
+        length = self._missing(shares, gained, lacks)
         for rows, columns in rectangles(lacks, self._call / max(length, 1)):
             there = np.zeros_like(lacks)
             there[rows, columns] = lacks[rows, columns]
-            length = self._missing(share, gained, there)
+            length = self._missing(shares, gained, there)
             if length < 1:
                 continue
             region = region_of(rows, columns, shape)
@@ -280,8 +333,9 @@ class SamePicture:
 
         return priced
 
-    def _missing(self, share: float, gained: Gain, blocks: NDArray[np.bool_]) -> int:
+    def _missing(self, shares: Array, gained: Gain, blocks: NDArray[np.bool_]) -> int:
         """How many samples some blocks lack, up to all of the file's."""
+        share = float(shares[blocks].mean())
         equal = float(self._equal(share, gained.of(blocks)))
         most = self.samples - round(self.samples * share)
         return min(max(round(self.samples * (1.0 - equal)), 0), most)
@@ -313,7 +367,7 @@ class SamePicture:
         """The next share of whole samples."""
         if not share < _ALL:
             return 1.0
-        return max(_LEAST, np.ceil(self.samples * share)) / self.samples
+        return max(_LEAST, np.ceil(self._of_file * share)) / self._of_file
 
 
 @dataclass

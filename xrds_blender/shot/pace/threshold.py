@@ -1,0 +1,81 @@
+"""How many samples a file with a noise threshold takes, and where.
+
+Cycles looks at the noise of a pixel after every 16 samples, and not before a least
+number of them. So fewer samples than some steps are sooner taken evenly.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xrds_core.arrays import Array
+from xrds_core.sequence.same_picture import block_means, root_noise
+from xrds_core.temporal.accumulate import sample_counts
+from xrds_core.temporal.frame import Stored
+
+_STEP = 16  # samples, `adaptive_step` in Cycles
+# Fewer samples than this, on the mean, are taken evenly: both halves of a frame under a
+# threshold have at least one step, and two to differ in.
+_FEW = 4 * _STEP
+
+
+def counts_of_file(both: Array, least: int, most: int) -> Array:
+    """Samples that pixels take in the file, from those of two renders of a half each.
+
+    `both` is how many these have taken together; under the file's own threshold they
+    would have been looked at in the middle of the last step as well. `least` and `most`
+    are the samples of a pixel that the file allows.
+    """
+    first = (least + _STEP + 1) // _STEP * _STEP
+    return np.clip(both - np.float32(_STEP), min(first, most), most)
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """What the file's noise threshold asks for, as one of its frames has shown.
+
+    `samples` on the mean; a pixel takes `noise` times the variance of one sample of it,
+    within the `least` and the `most` that any has taken.
+    """
+
+    samples: float
+    least: float
+    most: float
+    noise: float
+
+    def is_few(self, share: float) -> bool:
+        """Whether such a share of the samples is sooner taken evenly."""
+        return share < 1.0 and share * self.samples < _FEW
+
+    def density(self, frame: Stored) -> Array:
+        """Samples that the file takes in each block of a frame, over the mean."""
+        asked = np.clip(self.noise * _noise(frame), self.least, self.most)
+        return block_means(asked) / self.samples
+
+
+def learn(frame: Stored, asked: Array) -> Threshold:
+    """Learn from a frame what its file asks for.
+
+    `asked` (H, W) are the samples that each pixel takes in the file, 0 where that is
+    not known.
+    """
+    known = asked > 0.0
+    counts, noise = asked[known], _noise(frame)[known]
+    least, most, mean = (float(f(counts)) for f in (np.min, np.max, np.mean))
+    low, high = 0.0, most / max(float(noise.mean()), 1e-12)
+    for _ in range(40):  # by bisection: as many on the mean
+        middle = (low + high) / 2
+        if np.clip(middle * noise, least, most).mean() < mean:
+            low = middle
+        else:
+            high = middle
+    return Threshold(mean, least, most, low)
+
+
+def _noise(frame: Stored) -> Array:
+    """Variance (H, W) of one sample."""
+    height, width = frame.shape
+    counts = sample_counts(frame, slice(None), height * width)
+    return root_noise(frame) * counts.reshape(frame.shape)
