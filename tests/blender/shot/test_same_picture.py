@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from xrds_blender.shot.pace.regions import (
     measured_regions,
     pixels_of,
 )
+from xrds_blender.shot.pace.threshold import Threshold
+from xrds_blender.shot.sampling import Sampled
 from xrds_core.sequence.worth import Ratio
 from xrds_core.temporal.frame import Frame, Stored
 
@@ -192,6 +195,17 @@ def test_a_noise_threshold_is_kept_and_raised(
     assert max(asked) < 64  # Cycles lets the first of many samples stop later
     scene = bpy.context.scene
     assert scene.cycles.adaptive_threshold == pytest.approx(0.2)
+
+
+def test_what_is_told_is_what_a_frame_has() -> None:
+    pace = same_picture.SamePicture(64)
+    assert pace._decision(0.25).value == "25% of the file's samples"
+    # under a noise threshold the pixels decide: of what the file takes on the mean
+    pace = same_picture.SamePicture(4096, least=32)
+    pace._threshold = Threshold(54.0, 48.0, 4096.0, 1.0)
+    frame = SimpleNamespace(samples=27.0)
+    share = pace._share(Sampled(1, {"": frame}, {}), asked=0.25)
+    assert pace._decision(share).value == "50% of the file's samples"
 
 
 @pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--sample-cache c"])
