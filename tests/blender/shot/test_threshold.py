@@ -76,7 +76,8 @@ def test_what_was_not_measured_does_not_count() -> None:
     ("samples", "share", "expected"),
     [
         (54.0, 0.25, True),
-        (54.0, 1.0, False),  # the file's own way
+        (54.0, 1.0, True),  # two halves under a threshold would have 64
+        (70.0, 1.0, False),  # the file's own way
         (300.0, 0.15, True),
         (300.0, 0.25, False),  # enough for Cycles to find where noise is
     ],

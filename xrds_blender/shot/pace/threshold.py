@@ -17,7 +17,7 @@ from xrds_core.temporal.frame import Stored
 
 _STEP = 16  # samples, `adaptive_step` in Cycles
 # Fewer samples than this, on the mean, are taken evenly: both halves of a frame under a
-# threshold have at least one step, and two to differ in.
+# threshold have at least one step, and two to differ in. A file of 48 then takes 64.
 _FEW = 4 * _STEP
 
 
@@ -47,7 +47,7 @@ class Threshold:
 
     def is_few(self, share: float) -> bool:
         """Whether such a share of the samples is sooner taken evenly."""
-        return share < 1.0 and share * self.samples < _FEW
+        return share * self.samples < _FEW
 
     def density(self, frame: Stored) -> Array:
         """Samples that the file takes in each block of a frame, over the mean."""
