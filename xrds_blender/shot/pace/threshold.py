@@ -17,7 +17,8 @@ from xrds_core.temporal.frame import Stored
 
 _STEP = 16  # samples, `adaptive_step` in Cycles
 # Fewer samples than this, on the mean, are taken evenly: both halves of a frame under a
-# threshold have at least one step, and two to differ in. A file of 48 then takes 64.
+# threshold have at least one step, and two to differ in. So where a file takes 48, its
+# halves would take 64.
 _FEW = 4 * _STEP
 
 
