@@ -1,7 +1,8 @@
 """Two halves of a frame's samples out of one Cycles session.
 
 They are two parts of one sample sequence, so their mean is what one render of all
-samples gives, and the scene is synced once. The result then holds the means of both.
+samples gives, and the scene is synced once. Under a noise threshold they are two
+sequences: pixels stop later in a part of one. The result then holds the means of both.
 """
 
 from __future__ import annotations
@@ -52,11 +53,12 @@ def sample_halves(
     are in samples. Raises Cancelled when the user stops it.
     """
     is_even = COUNTS not in geometry
+    halves = subset.halves() if is_even else subset.sequences()
     parts, passes, clocks = [], [], []
     with LayerSession(engine, depsgraph) as layer, Borrowed() as borrowed:
         if not is_even:  # so that their mean has the noise that is asked for
             set_share(borrowed, depsgraph.scene_eval, subset.whole, 0.5)
-        for part in subset.halves():
+        for part in halves:
             samples, clock = sample_layer(
                 engine,
                 depsgraph,

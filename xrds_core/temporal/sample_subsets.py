@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 
 _SEEDS = 2**31  # Cycles takes a signed 32-bit integer
 _LONG = 64  # frames
+_APART = 15_485_863  # of seeds: a prime, and no multiple of how far others are apart
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,15 @@ class SampleSubset:
         first = self.length - self.length // 2
         second = replace(self, offset=self.offset + first, length=self.length - first)
         return replace(self, length=first), second
+
+    def sequences(self) -> tuple[SampleSubset, SampleSubset]:
+        """Return two sequences as long as the halves, each with a seed of its own."""
+        first, second = (half.length for half in self.halves())
+        other = (self.seed + _APART) % _SEEDS
+        return (
+            SampleSubset(self.seed, first, 0, first),
+            SampleSubset(other, second, 0, second),
+        )
 
     def shares(self) -> tuple[float, float]:
         """Return the share of the samples that each half has."""

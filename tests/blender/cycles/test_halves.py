@@ -82,6 +82,19 @@ def test_a_noise_threshold_is_kept_and_its_samples_are_counted(
     assert cycles.samples == 128
 
 
+def test_halves_under_a_noise_threshold_take_about_what_one_render_does(
+    scene: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cycles = scene.cycles
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, 0.005
+    cycles.samples = 4096
+    frame = sampled(scene)
+    monkeypatch.setattr(sampling, "_has_halves", lambda *_: False)
+    whole = sampled(scene)
+    # one more look by Cycles, of 16 samples; halves of one sequence took 1.8 times it
+    assert frame.samples < 1.2 * whole.samples
+
+
 def test_with_a_time_limit_a_frame_has_no_halves(scene: Any) -> None:
     scene.cycles.time_limit, scene.cycles.samples = 10.0, 8
     assert sampled(scene).halves is None

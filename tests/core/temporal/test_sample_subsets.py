@@ -51,3 +51,17 @@ def test_a_still_camera_continues_one_sequence() -> None:
     parts = [consecutive_subset(place, 4, 1, seed=3) for place in FRAMES]
     assert [x.offset for x in parts[:4]] == [0, 4, 8, 0]
     assert {(x.seed, x.whole) for x in parts} == {(3, 12)}
+
+
+@pytest.mark.parametrize("length", [2, 5, 64])
+@pytest.mark.parametrize("seed", [0, 7, 2**31 - 1])
+def test_sequences_of_their_own_are_as_long_as_the_halves(
+    length: int, seed: int
+) -> None:
+    subset = SampleSubset(seed, length, 0, length)
+    sequences = subset.sequences()
+    for one, half in zip(sequences, subset.halves(), strict=True):
+        assert one.whole == one.length == half.length
+        assert one.offset == 0
+        assert 0 <= one.seed < 2**31
+    assert not taken(sequences[0]) & taken(sequences[1])
