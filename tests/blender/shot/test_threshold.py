@@ -34,7 +34,8 @@ def stored(noise: NDArray[np.float32]) -> Stored:
         # by Cycles' own counts: at a threshold of 0.1, whose least number is 32, it
         # first looks after 48; halves of least 16 first after 32
         (64, 32, 48),
-        (96, 32, 80),
+        (96, 32, 96),
+        (80, 32, 80),
         (96, 64, 80),
         (32, 4, 16),
         (5000, 32, 4096),

@@ -25,12 +25,19 @@ _FEW = 4 * _STEP
 def counts_of_file(both: Array, least: int, most: int) -> Array:
     """Samples that pixels take in the file, from those of two renders of a half each.
 
-    `both` is how many these have taken together; under the file's own threshold they
-    would have been looked at in the middle of the last step as well. `least` and `most`
-    are the samples of a pixel that the file allows.
+    `both` is how many these have taken together. Where each stopped as soon as it
+    could, so does the file. `least` and `most` are the samples of a pixel that the file
+    allows.
     """
-    first = (least + _STEP + 1) // _STEP * _STEP
-    return np.clip(both - np.float32(_STEP), min(first, most), most)
+    soonest = _soonest(least)
+    at_once = both < 2 * _soonest(least // 2) + 1
+    asked = np.where(at_once, np.float32(soonest), both)
+    return np.clip(asked, min(soonest, most), most)
+
+
+def _soonest(least: int) -> int:
+    """Samples after which Cycles looks first, of a pixel that has at `least` so many."""
+    return (least + _STEP + 1) // _STEP * _STEP
 
 
 @dataclass(frozen=True)
