@@ -36,7 +36,7 @@ def counts_of_file(both: Array, least: int, most: int) -> Array:
 
 
 def _soonest(least: int) -> int:
-    """Samples after which Cycles looks first, of a pixel that has at `least` so many."""
+    """After how many samples Cycles first looks at a pixel; `least` are its fewest."""
     return (least + _STEP + 1) // _STEP * _STEP
 
 
