@@ -1,8 +1,9 @@
 """Two halves of a frame's samples out of one Cycles session.
 
 They are two parts of one sample sequence, so their mean is what one render of all
-samples gives, and the scene is synced once. Under a noise threshold they are two
-sequences: pixels stop later in a part of one. The result then holds the means of both.
+samples gives, and the scene is synced once. Where a noise threshold may stop a pixel
+they are two sequences: it stops later in a part of one. The result then holds the means
+of both.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from .clock import StageClock
 from .layer_session import LayerSession
 from .pass_names import SAMPLE_COUNT, is_of_first_sample
 from .samples import COUNTS, GEOMETRY, Samples, sample_layer
-from .settings import set_share
+from .settings import first_look, set_share
 
 _Passes = dict[tuple[str, str], Array]
 _Geometry = Sequence[tuple[str, str]]
@@ -53,11 +54,14 @@ def sample_halves(
     are in samples. Raises Cancelled when the user stops it.
     """
     is_even = COUNTS not in geometry
-    halves = subset.halves() if is_even else subset.sequences()
     parts, passes, clocks = [], [], []
     with LayerSession(engine, depsgraph) as layer, Borrowed() as borrowed:
+        halves = subset.halves()
         if not is_even:  # so that their mean has the noise that is asked for
-            set_share(borrowed, depsgraph.scene_eval, subset.whole, 0.5)
+            scene = depsgraph.scene_eval
+            set_share(borrowed, scene, subset.whole, 0.5)
+            if halves[0].length > first_look(scene.cycles.adaptive_min_samples):
+                halves = subset.sequences()
         for part in halves:
             samples, clock = sample_layer(
                 engine,

@@ -10,6 +10,9 @@ from xrds_core.temporal.sample_subsets import SampleSubset
 from ..internals.borrowed import Borrowed
 from ..planning.settings import Denoising
 
+LOOKS_EVERY = 16
+"""Samples after which Cycles looks again at a pixel's noise: its `adaptive_step`."""
+
 
 def set_sampling(
     borrowed: Borrowed, scene: Any, samples: int | None, seed: int | None
@@ -81,6 +84,14 @@ def stops_at(cycles: Any, samples: int) -> tuple[float, int]:
     threshold = cycles.adaptive_threshold or max(0.001, 1.0 / samples)
     least = cycles.adaptive_min_samples or math.ceil(16.0 / threshold**0.3)
     return threshold, max(4, least)
+
+
+def first_look(least: int) -> int:
+    """After how many samples Cycles first looks whether a pixel may stop.
+
+    `least` are the fewest samples of one.
+    """
+    return (least + LOOKS_EVERY + 1) // LOOKS_EVERY * LOOKS_EVERY
 
 
 def set_share(borrowed: Borrowed, scene: Any, samples: int, share: float) -> None:

@@ -82,6 +82,22 @@ def test_a_noise_threshold_is_kept_and_its_samples_are_counted(
     assert cycles.samples == 128
 
 
+@pytest.mark.parametrize("samples", [6, 33])
+def test_where_no_pixel_can_stop_both_halves_are_one_render(
+    scene: Any, samples: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    cycles = scene.cycles
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, 0.5
+    cycles.adaptive_min_samples = 2
+    cycles.samples = samples
+    frame = sampled(scene)
+    cycles.use_adaptive_sampling = False
+    monkeypatch.setattr(sampling, "_has_halves", lambda *_: False)
+    whole = sampled(scene)
+    is_one = np.allclose(frame.radiance, whole.radiance, rtol=1e-3, atol=1e-4)
+    assert is_one == (samples < 32)  # each half is looked at after 16
+
+
 def test_halves_under_a_noise_threshold_take_about_what_one_render_does(
     scene: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:

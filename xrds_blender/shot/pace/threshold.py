@@ -15,11 +15,12 @@ from xrds_core.sequence.same_picture import block_means, root_noise
 from xrds_core.temporal.accumulate import sample_counts
 from xrds_core.temporal.frame import Stored
 
-_STEP = 16  # samples, `adaptive_step` in Cycles
+from ...cycles.settings import LOOKS_EVERY, first_look
+
 # Fewer samples than this, on the mean, are taken evenly: both halves of a frame under a
 # threshold have at least one step, and two to differ in. So where a file takes 48, its
 # halves would take 64.
-_FEW = 4 * _STEP
+_FEW = 4 * LOOKS_EVERY
 
 
 def counts_of_file(both: Array, least: int, most: int) -> Array:
@@ -29,15 +30,10 @@ def counts_of_file(both: Array, least: int, most: int) -> Array:
     could, so does the file. `least` and `most` are the samples of a pixel that the file
     allows.
     """
-    soonest = _soonest(least)
-    at_once = both < 2 * _soonest(least // 2) + 1
+    soonest = first_look(least)
+    at_once = both < 2 * first_look(least // 2) + 1
     asked = np.where(at_once, np.float32(soonest), both)
     return np.clip(asked, min(soonest, most), most)
-
-
-def _soonest(least: int) -> int:
-    """After how many samples Cycles first looks at a pixel; `least` are its fewest."""
-    return (least + _STEP + 1) // _STEP * _STEP
 
 
 @dataclass(frozen=True)
