@@ -31,7 +31,7 @@ def counts_of_file(both: Array, least: int, most: int) -> Array:
     allows.
     """
     soonest = first_look(least)
-    at_once = both < 2 * first_look(least // 2) + 1
+    at_once = both < 2 * first_look(least // 2) + 1  # counts are not quite whole
     asked = np.where(at_once, np.float32(soonest), both)
     return np.clip(asked, min(soonest, most), most)
 
