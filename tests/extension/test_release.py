@@ -195,3 +195,10 @@ def test_an_earlier_release_is_replaced(laid_out: Path, tmp_path: Path) -> None:
     (out / "SHA256SUMS").write_text(release.checksums(out))
     release.release(laid_out.parent / "zips", out, SITE)
     assert names(out) == names(laid_out)
+
+
+def test_the_page_of_sizes_tells_that_of_the_bare_zip(laid_out: Path) -> None:
+    text = (ROOT / "docs" / "compatibility.md").read_text("utf-8")
+    (told,) = re.findall(r"\| `bare`.*?\| ([\d.]+) MB \|", text)
+    (path,) = (laid_out / "bare").glob("*.zip")
+    assert path.stat().st_size / 1e6 == pytest.approx(float(told), rel=0.05)

@@ -161,6 +161,25 @@ def test_parts_of_the_light_have_the_weights_of_the_whole(
             np.testing.assert_allclose(found.parts[name], part, rtol=1e-4, atol=1e-6)
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (2, 1), (3, 5)])
+def test_small_pictures_have_parts(
+    card: CardAccumulator, shape: tuple[int, int]
+) -> None:
+    height, width = shape
+    frames = []
+    for k in range(3):
+        light = np.full((*shape, 3), 0.5 + k, np.float32)
+        normal = np.broadcast_to(np.float32([0, 0, -1]), (*shape, 3))
+        eye = replace(camera(0.0), size=(width, height))
+        depth = np.full(shape, 5.0, np.float32)
+        frames.append(Frame(k, eye, light, light, normal, depth, parts={"Emit": light}))
+    stored = [store(x) for x in frames]
+    expected = accumulate(stored[1], [stored[0], stored[2]])
+    found = accumulate(stored[1], [stored[0], stored[2]], card=card)
+    assert found.device == card.name
+    np.testing.assert_allclose(found.parts["Emit"], expected.parts["Emit"], rtol=1e-4)
+
+
 def test_a_picture_in_bands_is_the_same(
     card: CardAccumulator, monkeypatch: pytest.MonkeyPatch
 ) -> None:
