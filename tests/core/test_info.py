@@ -61,7 +61,6 @@ def test_presets_cost_what_their_names_say(scale: int) -> None:
     assert order == ["fast", "balanced", "paper"]
 
 
-@pytest.mark.timeout(600)
 def test_what_is_shipped_is_what_is_counted() -> None:
     assert info.shipped_costs() == operations.costs(), "call write_costs()"
 

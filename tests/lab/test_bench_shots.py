@@ -61,7 +61,6 @@ def gain(points: list[dict[str, Any]], motion: str, radius: int) -> float:
     return float(found[XRDS, radius] - found[DEFAULT, 0])
 
 
-@pytest.mark.timeout(300)
 def test_a_second_run_renders_nothing_and_gives_the_same_files(
     blend: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -161,7 +161,6 @@ def test_countdown_tells_task_and_time(capsys: pytest.CaptureFixture[str]) -> No
     assert told == ["demo: 1:00 left: first", "demo: 2:05 left: second"]
 
 
-@pytest.mark.timeout(600)
 def test_demo_leaves_figures_pictures_and_the_scene(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -191,7 +191,6 @@ def test_every_shot_can_be_built(tmp_path: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)  # takes handlers away as well
 
 
-@pytest.mark.timeout(300)
 def test_three_shots_are_rendered_judged_and_resumed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

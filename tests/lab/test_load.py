@@ -41,7 +41,6 @@ def untrained(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.timeout(600)
 def test_frames_leave_neither_memory_nor_data_blocks(
     moving: Any, untrained: Path
 ) -> None:

@@ -30,7 +30,6 @@ def test_synthetic_frames_lend_to_each_other() -> None:
     assert shot[1].noise is not None  # of halves, as rendered frames have them
 
 
-@pytest.mark.timeout(300)
 def test_a_run_has_a_process_of_its_own(blend: Path) -> None:
     stages = growth.apart(Run(growth.PIXELS, SIZES[0], radius=1))
     assert [row["stage"] for row in stages] == ["accumulate", "denoise"]

@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import textwrap
-import time
 from pathlib import Path
 from typing import Any
 
@@ -315,7 +314,6 @@ def test_a_failure_is_one_json_object(tmp_path: Path) -> None:
     assert done.stderr == f"xrds: {told['error']}\n"
 
 
-@pytest.mark.timeout(300)
 def test_info_json_fields() -> None:
     done = run(MAIN, "info", "--json")
     result = json.loads(done.stdout)
@@ -356,19 +354,17 @@ def test_a_signal_does_not_wait_for_c(tmp_path: Path, name: str, told: str) -> N
     with replacing(Path({str(tmp_path)!r}) / "frame.exr") as part:
         part.write_text("half")
         print("ready", flush=True)
-        for _ in range(100):
+        while True:
             libc.usleep(900_000)
     """
     with started(code) as child:
         assert child.stdout is not None
         assert child.stdout.readline() == "ready\n"
-        start = time.perf_counter()
         number = signal.Signals[name]
         child.send_signal(number)
-        _, err = child.communicate(timeout=20)
+        _, err = child.communicate()
     assert child.returncode == 128 + number
     assert err == f"xrds: {told}\n"
-    assert time.perf_counter() - start < 10
     assert not list(tmp_path.iterdir())
 
 
@@ -442,14 +438,14 @@ def test_an_interrupted_command_is_json_too() -> None:
     console.prepare()
     def work():
         print("ready", file=sys.stderr)
-        time.sleep(60)
+        time.sleep(10_000)
     console.leave(console.status_with_json(work))
     """
     with started(code) as child:
         assert child.stderr is not None
         assert child.stderr.readline() == "ready\n"
         child.send_signal(signal.SIGTERM)
-        out, err = child.communicate(timeout=20)
+        out, err = child.communicate()
     assert child.returncode == 143
     assert json.loads(out) == {"error": "terminated", "status": 143}
     assert err == "xrds: terminated\n"

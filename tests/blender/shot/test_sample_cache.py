@@ -260,10 +260,8 @@ def test_a_killed_render_is_resumed(blend: Path) -> None:
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
-    deadline = time.monotonic() + 60
     while not list((folder / "out").glob("0[3-9].exr")):
         assert child.poll() is None
-        assert time.monotonic() < deadline
         time.sleep(0.005)
     child.send_signal(signal.SIGKILL)
     child.wait()
