@@ -170,6 +170,28 @@ def test_pixels_without_samples_are_no_holes_in_the_frame_alone(
     assert all(np.isfinite(x[:20, :40]).all() for x in counting.pictures)
 
 
+def test_frames_of_one_seed_are_denoised_alone(
+    tmp_path: Path, denoiser: Denoiser
+) -> None:
+    """A renderer that repeats its noise gains nothing, loses nothing, and is told."""
+    noise = np.random.default_rng(7).gamma(4, 1 / 4, (*frame(1).shape, 1))
+    for number in NUMBERS:
+        clean = frame(number, noise=0.0)
+        light = (clean.radiance * noise).astype(np.float32)
+        write(tmp_path / "in", replace(clean, radiance=light))
+    said: list[str] = []
+    told = denoise(tmp_path, denoiser, say=said.append)
+    alone = denoise(tmp_path, denoiser, "alone", radius=0)
+    assert [x["temporal"]["mean_samples"] for x in told["frames"]] == [1.0] * 5
+    assert [line for line in said if "exr, " not in line] == [
+        "frames 1 and 2 hold the same noise, of which nothing can be reused: render "
+        "each frame with a seed of its own (in Blender the clock beside the seed)"
+    ]
+    for one, two in zip(told["frames"], alone["frames"], strict=True):
+        pair = (picture(Path(x["output"])) for x in (one, two))
+        np.testing.assert_array_equal(*pair)
+
+
 # --- passes and their names -----------------------------------------------------------
 
 FLAT = {"radiance": "RGB", "albedo": "albedo.RGB", "normal": "N.XYZ", "depth": "Z"}
