@@ -28,8 +28,9 @@ from ..atomic import scratch_folder
 from ..children import run_python
 from ..errors import PictureError
 from ..files import check_input
-from .encoding import FLOAT_ZIP, Pixels, fitting
+from .encoding import FLOAT_ZIP, LARGEST_HALF, Pixels, fitting
 from .limits import check_claims, limit_of
+from .raw_header import readable, restore
 
 Window = tuple[tuple[int, int], tuple[int, int]]
 Attributes = dict[str, Any]
@@ -38,6 +39,7 @@ Attributes = dict[str, Any]
 _FAULTS = (RuntimeError, ValueError, TypeError, MemoryError)  # of a damaged file
 # Of a header, what a file with other channels has anew.
 _OF_CHANNELS = {"channels", "name", "type", "tiles", "chunkCount", "version"}
+_LESS = 0.9  # of what DWA may hold, where it is decoded as infinite
 _stderr = threading.Lock()
 
 
@@ -171,7 +173,8 @@ def _part(part: Any, channels: dict[str, Pixels]) -> Part:
 def _headers(path: str | Path, limit: float = math.inf) -> Any:
     import OpenEXR
 
-    headers = OpenEXR.File(str(path), header_only=True).parts
+    with readable(path) as there:
+        headers = OpenEXR.File(str(there), header_only=True).parts
     check_claims(path, [part.header for part in headers], limit)
     return headers
 
@@ -184,12 +187,33 @@ def _opened(path: str | Path, limit: int) -> Any:
         # OpenEXR leaves out a part that it cannot read and says why on stdout
         with _silent_library(), redirect_stdout(StringIO()) as output:
             headers = _headers(path, limit)
-            file = OpenEXR.File(str(path), separate_channels=True)
+            with readable(path) as there:
+                file = OpenEXR.File(str(there), separate_channels=True)
     except _FAULTS as error:
         raise _incomplete(path, error) from error
     if not file.parts or len(file.parts) != len(headers):
         raise _incomplete(path, output.getvalue().strip().rpartition(" - ")[2])
+    for part in file.parts:
+        _bound_ringing(part)
     return file
+
+
+def _bound_ringing(part: Any) -> None:
+    """Bound what DWA decodes as infinite: it rings near the largest half."""
+    import OpenEXR
+
+    if part.header["compression"] in (
+        OpenEXR.DWAA_COMPRESSION,
+        OpenEXR.DWAB_COMPRESSION,
+    ):
+        for channel in part.channels.values():
+            if channel.pixels.dtype == np.float16:
+                np.copyto(channel.pixels, _bounded(channel.pixels, LARGEST_HALF))
+
+
+def _bounded(pixels: Pixels, most: float) -> Pixels:
+    """NaN stays."""
+    return np.clip(pixels, -most, most).astype(pixels.dtype, copy=False)
 
 
 def _incomplete(path: str | Path, reason: object) -> PictureError:
@@ -241,10 +265,46 @@ def _write(path: str | Path, part: Part, codec: str) -> None:
     # the library reads other arrays as if they were contiguous
     planes = {name: np.ascontiguousarray(x) for name, x in part.channels.items()}
     try:
+        if codec.startswith("dwa"):
+            _write_dwa(path, header, planes)
+            return
         with _silent_library():
             OpenEXR.File(header, planes).write(str(path))
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
+
+
+def _write_dwa(
+    path: str | Path, header: dict[str, Any], planes: dict[str, Pixels]
+) -> None:
+    """Write planes so that they are finite again when they are read.
+
+    DWA stores infinity as 0, and light near the largest half may be decoded as
+    infinity: what is, is bounded lower.
+    """
+    import OpenEXR
+
+    halves = [name for name, x in planes.items() if x.dtype == np.float16]
+    most = dict.fromkeys(planes, math.inf) | dict.fromkeys(halves, LARGEST_HALF)
+    while True:
+        bounded = {name: _bounded(x, most[name]) for name, x in planes.items()}
+        with _silent_library():
+            OpenEXR.File(dict(header), dict(bounded)).write(str(path))
+            (read,) = OpenEXR.File(str(path), separate_channels=True).parts
+        over = [
+            name
+            for name, channel in read.channels.items()
+            if _is_lost(bounded[name], channel.pixels)
+        ]
+        if not over:
+            return
+        most |= {name: min(most[name] * _LESS, LARGEST_HALF) for name in over}
+
+
+def _is_lost(pixels: Pixels, read: Pixels) -> bool:
+    """Whether any light was read as infinite, or infinite light as none."""
+    is_finite, black = np.isfinite(pixels), read == 0.0
+    return bool((is_finite & np.isinf(read) | np.isinf(pixels) & black).any())
 
 
 def _copy(
@@ -261,6 +321,7 @@ def _copy(
         ((number, only),) = planes.items()
         whole = _whole_headers(source)[number].header
         header = {k: v for k, v in whole.items() if k not in _OF_CHANNELS}
+        header["compression"] = _lossless(header["compression"])
         header["type"] = OpenEXR.scanlineimage
         if window is not None:
             header["dataWindow"] = _corners(window)
@@ -279,6 +340,7 @@ def _copy(
             _make_writable(file.parts)
         with _silent_library():
             file.write(str(path))
+        restore(source, path)
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
 
@@ -330,6 +392,7 @@ def _make_writable(parts: Any) -> None:
     import OpenEXR
 
     for part in parts:
+        part.header["compression"] = _lossless(part.header["compression"])
         if "tiles" in part.header:
             tiles = part.header["tiles"]
             tiles.mode = OpenEXR.ONE_LEVEL
@@ -340,6 +403,15 @@ def _make_writable(parts: Any) -> None:
                 part.channels[name] = OpenEXR.Channel(
                     name, _repeated(channel.pixels, across, down, part)
                 )
+
+
+def _lossless(compression: Any) -> Any:
+    """ZIP in place of what would lose some of all channels a second time."""
+    import OpenEXR
+
+    lossy = ("B44", "B44A", "DWAA", "DWAB")
+    losses = [getattr(OpenEXR, f"{name}_COMPRESSION") for name in lossy]
+    return OpenEXR.ZIP_COMPRESSION if compression in losses else compression
 
 
 def _repeated(pixels: Pixels, across: int, down: int, part: Any) -> Pixels:
