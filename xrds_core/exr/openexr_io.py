@@ -109,22 +109,26 @@ def copy(
     *,
     alone: bool = False,
     window: Window | None = None,
+    metadata: Mapping[str, str] | None = None,
 ) -> None:
     """Write `source` to `path` with some channels replaced or added, by part.
 
     All others, the windows and attributes stay as they are; a plane that replaces
     another gets its number format. `alone`: only the `planes`, of one part, are
     written, with its windows and attributes. With a `window` all parts are cropped to
-    it, and planes are of it. Raises PictureError.
+    it, and planes are of it. `metadata` is added to the headers of parts with planes.
+    Raises PictureError.
     """
     limit = limit_of(check_input(Path(source)))
+    told = dict(metadata or {})
     if not _is_shadowed():
-        _copy(source, path, planes, alone, window, limit)
+        _copy(source, path, planes, alone, window, told, limit)
         return
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         unread = ((0, 0), (0, 0))  # the source has them
-        options = {"source": os.fspath(source), "alone": alone, "window": window}
+        options: Attributes = {"source": os.fspath(source), "alone": alone}
+        options |= {"window": window, "metadata": told}
         parts = [
             Part("", unread, unread, dict(each), options | {"part": number})
             for number, each in planes.items()
@@ -313,6 +317,7 @@ def _copy(
     planes: Mapping[int, Mapping[str, Pixels]],
     alone: bool,
     window: Window | None,
+    metadata: Mapping[str, str],
     limit: int,
 ) -> None:
     import OpenEXR
@@ -325,6 +330,7 @@ def _copy(
         header["type"] = OpenEXR.scanlineimage
         if window is not None:
             header["dataWindow"] = _corners(window)
+        header |= metadata
         channels: dict[str, Any] = {}
         _put(channels, only)
     else:
@@ -333,6 +339,7 @@ def _copy(
             _crop(file.parts, window)
         for number, each in planes.items():
             _put(file.parts[number].channels, each)
+            file.parts[number].header |= metadata
     try:
         if alone:
             file = OpenEXR.File(header, channels)
@@ -487,7 +494,8 @@ def _main(task: str, path: str, archive: str, how: str) -> int:
             options = parts[0].attributes
             planes = {part.attributes["part"]: part.channels for part in parts}
             window = options["window"] and _window(options["window"])
-            _copy(options["source"], path, planes, options["alone"], window, int(how))
+            told = options["alone"], window, options["metadata"]
+            _copy(options["source"], path, planes, *told, int(how))
     except PictureError as error:
         print(error, file=sys.stderr)
         return 1

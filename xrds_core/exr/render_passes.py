@@ -6,7 +6,7 @@ of the file's display window.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +20,7 @@ from ..errors import PictureError
 from . import openexr_io
 from .channels import Channels
 from .encoding import FLOAT_ZIP, Encoding
-from .openexr_io import Part, Window
+from .openexr_io import Attributes, Part, Window
 
 
 @dataclass(frozen=True)
@@ -110,19 +110,27 @@ def copy_picture(
     *,
     alone: bool = False,
     window: Window | None = None,
+    metadata: Mapping[str, str] | None = None,
+    check: Callable[[], None] = lambda: None,
 ) -> None:
     """Write `source` to `path` with other pixels in some channels, by part.
 
     The (H, W) planes are of the part's data window, or of `window`, to which the file
     is cropped. What is not in `channels` stays as it is, or is left out if they stand
-    `alone`: those of one part can. Raises PictureError as `write_picture`.
+    `alone`: those of one part can. `metadata` goes into the header of these parts.
+    `check` raises PictureError where `source` is another file meanwhile: then nothing
+    is written. Raises PictureError as `write_picture`.
     """
     planes = {
         part: {k: np.ascontiguousarray(v, np.float32) for k, v in each.items()}
         for part, each in channels.items()
     }
     with _whole(path) as unfinished:
-        openexr_io.copy(source, unfinished, planes, alone=alone, window=window)
+        told = dict(metadata or {})
+        openexr_io.copy(
+            source, unfinished, planes, alone=alone, window=window, metadata=told
+        )
+        check()
 
 
 def write_part(path: str | Path, part: Part) -> None:
@@ -140,14 +148,9 @@ def _whole(path: str | Path) -> Iterator[Path]:
         raise PictureError(f"cannot write {path}: {error}") from error
 
 
-def windows(path: str | Path, *, whole: bool = False) -> tuple[Window, set[Window]]:
-    """Return a file's display window and the data windows of its parts.
-
-    Raises PictureError where it cannot be read; for `whole`, also where pixels cannot.
-    """
-    read = openexr_io.read if whole else openexr_io.read_headers
-    parts = read(path)
-    return parts[0].display_window, {part.data_window for part in parts}
+def attributes(path: str | Path) -> list[Attributes]:
+    """Return those of a file's parts; PictureError where it is not complete."""
+    return [part.attributes for part in openexr_io.read(path)]
 
 
 class File:

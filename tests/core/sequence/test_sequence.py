@@ -524,6 +524,104 @@ def test_resume_takes_samples_that_came_late(shot: Path, denoiser: Denoiser) -> 
     assert told["kept"] == [1, 2]
 
 
+def late(shot: Path) -> dict[str, Any]:
+    """A neighbour that comes with a time older than the outputs'."""
+    (shot / "held.exr").rename(shot / "in" / "0004.exr")
+    return {}
+
+
+def replaced(shot: Path) -> dict[str, Any]:
+    """Another file of the same size and time."""
+    path = shot / "in" / "0004.exr"
+    status = path.stat()
+    write(shot / "in", frame(4), header={"xrds/samples": 2})
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    return {}
+
+
+@pytest.mark.parametrize(
+    ("change", "anew"),
+    [
+        (late, [3, 4, 5]),
+        (replaced, [3, 4, 5]),
+        (lambda shot: {"radius": 0}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"reading": Reading(samples=64)}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"reading": Reading(normal_space="world")}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"to": {"picture_only": True}}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"to": {"crop": CROP}}, [1, 2, 3, 4, 5]),
+        (lambda shot: {}, []),
+    ],
+)
+def test_resume_makes_anew_what_would_differ(
+    shot: Path, denoiser: Denoiser, change: Any, anew: list[int]
+) -> None:
+    """And no more; at the end all is as a run from nothing makes it."""
+    if change is late:
+        (shot / "in" / "0004.exr").rename(shot / "held.exr")
+    denoise(shot, denoiser, radius=1)
+    more = {"radius": 1, **change(shot)}
+    said: list[str] = []
+    to = more.get("to", {})
+    told = denoise(shot, denoiser, resume=True, say=said.append, **more)
+    assert [x["frame"] for x in told["frames"]] == anew
+    line = "made anew, as they are damaged or were made with other settings"
+    assert sum(line in x for x in said) == bool(anew)
+    denoise(shot, denoiser, "nothing", **{**more, "to": to})
+    for path in (shot / "nothing").iterdir():
+        assert path.read_bytes() == (shot / "out" / path.name).read_bytes()
+
+
+def test_an_input_that_is_replaced_in_work_spoils_no_frame(
+    shot: Path, denoiser: Denoiser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def finish(own: Any, *rest: Any, **more: Any) -> Any:
+        if own.number == 3:
+            write(shot / "in", frame(3, noise=0.7))
+        return finish_frame(own, *rest, **more)
+
+    monkeypatch.setattr("xrds_core.sequence.denoise.finish_frame", finish)
+    said: list[str] = []
+    told = denoise(shot, denoiser, say=said.append)
+    assert [x["frame"] for x in told["left_out"]] == [3]
+    assert sum("was replaced while it was in work" in x for x in said) == 1
+    assert not (shot / "out" / "0003.exr").exists()
+    monkeypatch.undo()
+    assert not denoise(shot, denoiser, resume=True)["kept"]  # all had its old samples
+
+
+def test_what_made_a_frame_stands_in_it(shot: Path, denoiser: Denoiser) -> None:
+    denoise(shot, denoiser, radius=1)
+    (told,) = exr.attributes(shot / "out" / "0003.exr")
+    told = {k: v for k, v in told.items() if k.startswith("xrds.")}
+    assert told.pop("xrds.version")
+    assert len(told.pop("xrds.made_of")) == 32
+    assert told == {
+        "xrds.mode": "denoised",
+        "xrds.preset": "fast",
+        "xrds.samples": "1",
+        "xrds.frames": "2 to 4",
+    }
+
+
+@pytest.mark.parametrize("option", ["halves", "also"])
+@pytest.mark.parametrize(
+    ("pattern", "message"),
+    [
+        ("in/0001.exr", "is one file for all frames; add ####"),
+        ("in/####.exr", "is the frame itself"),
+        ("link/####.exr", "is the frame itself"),
+    ],
+)
+def test_halves_are_other_files(
+    shot: Path, denoiser: Denoiser, option: str, pattern: str, message: str
+) -> None:
+    (shot / "link").symlink_to(shot / "in")
+    given = str(shot / pattern)
+    to = {option: (given,) if option == "also" else given}
+    with pytest.raises(UsageError, match=message):
+        denoise(shot, denoiser, to=to)
+
+
 def test_a_frame_says_how_long_the_others_will_take(
     shot: Path, denoiser: Denoiser
 ) -> None:
