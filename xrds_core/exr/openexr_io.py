@@ -34,8 +34,10 @@ from .raw_header import readable, restore
 
 Window = tuple[tuple[int, int], tuple[int, int]]
 Attributes = dict[str, Any]
-"""Of a header: texts, numbers, and matrices as lists of rows."""
+"""Of a header: texts, numbers, matrices as lists of rows, and names of views."""
 
+VIEWS = "multiView"
+"""The attribute with the names of a file's views, the one without names first."""
 _FAULTS = (RuntimeError, ValueError, TypeError, MemoryError)  # of a damaged file
 # Of a header, what a file with other channels has anew.
 _OF_CHANNELS = {"channels", "name", "type", "tiles", "chunkCount", "version"}
@@ -231,7 +233,9 @@ def _attributes(header: Mapping[str, Any]) -> Attributes:
         if isinstance(value, np.ndarray) and value.ndim == 2
     }
     plain = {k: v for k, v in header.items() if type(v) in (str, int, float)}
-    return plain | matrices
+    views = header.get(VIEWS)
+    named = {VIEWS: list(map(str, views))} if isinstance(views, list) else {}
+    return plain | named | matrices
 
 
 @contextmanager

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ from . import openexr_io
 from .channels import Channels
 from .encoding import FLOAT_ZIP, Encoding
 from .openexr_io import Attributes, Part, Window
+from .views import by_view, with_view
 
 
 @dataclass(frozen=True)
@@ -173,6 +175,17 @@ class File:
             self._add(name, other)
         self.names = Channels(path, self._places)
         self.window: Window | None = None
+        self.view, self.is_first = "", True
+
+    def views(self) -> list[File]:
+        """Return the same file for each of its views, with its channels alone."""
+        found: list[File] = []
+        for view, places in by_view(self.parts, self._places).items():
+            each = copy(self)
+            each._places, each.names = places, Channels(self.path, places)
+            each.view, each.is_first = view, not found
+            found.append(each)
+        return found
 
     def _add(self, name: str, path: Path) -> None:
         parts = openexr_io.read(path)
@@ -233,10 +246,13 @@ def _places(path: str | Path, parts: list[Part]) -> dict[str, tuple[int, str]]:
     """
     places: dict[str, tuple[int, str]] = {}
     for number, part in enumerate(parts):
-        layer = part.name if len(parts) > 1 else ""
+        # a part with all passes of a view is no layer
+        is_view = "view" in part.attributes and any("." in x for x in part.channels)
+        layer = part.name if len(parts) > 1 and not is_view else ""
         for name in part.channels:
             # Blender repeats the part's name in its channels, others do not
             full = f"{layer}.{name}" if layer and "." not in name else name
+            full = with_view(full, part)
             if full in places:
                 first = parts[places[full][0]].name
                 raise PictureError(

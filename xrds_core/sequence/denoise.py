@@ -17,7 +17,7 @@ from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
 from ..frames import RADIUS, frame_numbers, frame_path, in_words
 from ..light_parts.light import passes_of
-from ..temporal.window import Shot, Window
+from ..temporal.window import Neighbourhood, Shot, Window
 from ..time_left import Clock
 from ..version import package_version
 from .accumulator import Accumulator
@@ -67,19 +67,24 @@ class Files:
     def write(
         self,
         number: int,
-        frame: FrameFile,
-        finished: Finished,
+        views: Mapping[str, tuple[FrameFile, Finished]],
         metadata: Mapping[str, str],
         check: Callable[[], None] = lambda: None,
     ) -> Path:
-        """Write a finished frame, or none of it; raises PictureError, as `check`."""
-        names = list("RGBA") if self.picture_only else frame.channels
-        planes = dict(zip(names, np.moveaxis(finished.picture, 2, 0), strict=False))
-        by_part: dict[int, dict[str, Array]] = {frame.part: planes}
-        if not self.picture_only:
-            for name, plane in _light(frame, finished).items():
-                part, own = frame.places[name]
-                by_part.setdefault(part, {})[own] = plane
+        """Write the finished views of a frame, or none; PictureError, as of `check`."""
+        by_part: dict[int, dict[str, Array]] = {}
+        first, _ = next(iter(views.values()))
+        for view, (frame, finished) in views.items():
+            names, part = frame.channels, frame.part
+            if self.picture_only:
+                ahead = f"{view}." if view else ""
+                names, part = [f"{ahead}{x}" for x in "RGBA"], first.part
+            planes = np.moveaxis(finished.picture, 2, 0)
+            by_part.setdefault(part, {}).update(zip(names, planes, strict=False))
+            if not self.picture_only:
+                for name, plane in _light(frame, finished).items():
+                    part, own = frame.places[name]
+                    by_part.setdefault(part, {})[own] = plane
         path = frame_path(self.output, number)
         exr.copy_picture(
             frame_path(self.source, number),
@@ -223,16 +228,25 @@ def _entries(
         digest = recipe.digest({n: loader.states.get(n, ()) for n in near}, number)
         if resume and files.is_done(number, digest):  # another machine was quicker
             continue
-        others = selection.select(number, own, found.neighbours)
         try:
-            region, within = _regions(own, files.crop)
-            finished = finish_frame(
-                own.stored, others, denoiser, accumulate, region=region, light=own.light
-            )
+            views, others = {}, {}
+            for view, each in {"": own, **own.others}.items():
+                others[view] = selection.select(number, each, _of(found, view))
+                region, within = _regions(each, files.crop)
+                done = finish_frame(
+                    each.stored,
+                    others[view],
+                    denoiser,
+                    accumulate,
+                    region=region,
+                    light=each.light,
+                )
+                views[view] = each, done.within(within)
+            finished = views[""][1]
             started = time.perf_counter()
             metadata = {**_metadata(own, finished, denoiser), MADE_OF: digest}
             check = partial(loader.check, number)
-            path = files.write(number, own, finished.within(within), metadata, check)
+            path = files.write(number, views, metadata, check)
             fails = False
         except PictureError as error:
             if fails:
@@ -240,8 +254,10 @@ def _entries(
             fails = True
             loader.leave_out(number, error)
             continue
-        selection.record(others, finished.accumulated)
-        seconds = {"read": loader.seconds(), **finished.seconds}
+        selection.record(others[""], finished.accumulated)
+        seconds = {"read": loader.seconds()}
+        for stage in finished.seconds:
+            seconds[stage] = sum(each.seconds[stage] for _, each in views.values())
         seconds["write"] = time.perf_counter() - started
         left = sum(n > number and n not in loader.failed for n in shot.frames)
         say(f"frame {number}: {path}, {clock.lap(left)}")
@@ -285,6 +301,14 @@ def _metadata(own: FrameFile, finished: Finished, denoiser: Denoiser) -> dict[st
         "xrds.samples": f"{own.stored.samples:g}",
         "xrds.frames": f"{frames[0]} to {frames[-1]}",
     }
+
+
+def _of(found: Neighbourhood[FrameFile], view: str) -> dict[int, FrameFile]:
+    """The same view of a frame's neighbours, "" for the first one."""
+    if not view:
+        return found.neighbours
+    near = found.neighbours.items()
+    return {n: each.others[view] for n, each in near if view in each.others}
 
 
 def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Rectangle]:

@@ -36,6 +36,7 @@ class Loader:
         self._pattern, self._recipe = pattern, recipe
         self._reusable, self._say = reusable, say
         self._ahead: dict[int, FrameFile | None] = {}
+        self._noisy_views: set[str] = set()
         self._any_is_fit = False
         self._seconds = 0.0
 
@@ -107,6 +108,10 @@ class Loader:
             self._say(f"frame {number} is denoised by itself: {error.reason}")
             frame = read_frame(path, number, reading, reusable=False)
         self.check(number)
+        for view, why in frame.unread.items():
+            if view not in self._noisy_views:
+                self._noisy_views.add(view)
+                self._say(f"the view {view} stays as noisy as it is: {why}")
         return frame
 
     def check(self, number: int) -> None:
