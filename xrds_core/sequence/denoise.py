@@ -15,7 +15,7 @@ import numpy as np
 from .. import exr
 from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
-from ..frames import RADIUS, frame_numbers, frame_path, in_words
+from ..frames import RADIUS, check_pattern, frame_numbers, frame_path, in_words
 from ..light_parts.light import passes_of
 from ..temporal.window import Neighbourhood, Shot, Window
 from ..time_left import Clock
@@ -175,7 +175,7 @@ def denoise_sequence(
         PictureError: no frame can be read, the first lacks passes, or an output cannot
             be written; outputs before it are complete.
     """
-    numbers = sorted(set(frames)) if frames else _all_frames(files.source)
+    numbers = _numbers(files, frames)
     there = _there(files.source, numbers)
     files.check(numbers, there)
     radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
@@ -345,6 +345,13 @@ def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
 def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
     failed = {n: loader.failed[n] for n in todo if n in loader.failed}
     return [{"frame": n, "reason": why} for n, why in failed.items()]
+
+
+def _numbers(files: Files, frames: Iterable[int] | None) -> list[int]:
+    """The frames to denoise, in order."""
+    for pattern in (*files.patterns, files.output):
+        check_pattern(pattern)
+    return sorted(set(frames)) if frames else _all_frames(files.source)
 
 
 def _all_frames(pattern: str) -> list[int]:

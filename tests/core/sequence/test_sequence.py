@@ -401,6 +401,34 @@ def test_a_crop_outside_of_the_picture(shot: Path, denoiser: Denoiser) -> None:
     assert not list((shot / "out").iterdir())
 
 
+@pytest.mark.parametrize("name", ["a.{:04d}.exr", "a.{:05d}.exr"])
+def test_frames_below_zero(tmp_path: Path, denoiser: Denoiser, name: str) -> None:
+    """As C names them and as Blender does; above zero both are the same."""
+    for number in (-1, 0, 1):
+        path = write(tmp_path / "in", frame(number))
+        width = name if number < 0 else "a.{:04d}.exr"
+        path.rename(path.with_name(width.format(number)))
+    told = denoise(tmp_path, denoiser, source="in/a.####.exr")
+    lent = {x["frame"]: x["temporal"]["frames"] for x in told["frames"]}
+    assert lent == dict.fromkeys((-1, 0, 1), (-1, 0, 1))
+    assert not told["left_out"]
+
+
+@pytest.mark.parametrize(
+    "way", ["%04d", "%d", "$F4", "$F", "*", "????", "<frame>", "<f4>", "{frame}", "@@@"]
+)
+@pytest.mark.parametrize("which", ["source", "output", "halves", "also"])
+def test_other_ways_to_write_a_frame_number_are_told(
+    shot: Path, denoiser: Denoiser, way: str, which: str
+) -> None:
+    pattern = str(shot / "in" / f"a.{way}.exr")
+    given = {"source": "in/####.exr", "output": "out/####.exr"}
+    files = Files(**{k: str(shot / v) for k, v in given.items()})
+    files = replace(files, **{which: (pattern,) if which == "also" else pattern})
+    with pytest.raises(UsageError, match=r"is written ####, not .*give a\.####\.exr$"):
+        denoise_sequence(files, denoiser)
+
+
 # --- frames that are not as they should be --------------------------------------------
 
 
