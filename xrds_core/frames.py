@@ -54,15 +54,28 @@ def frame_numbers(pattern: str) -> list[int]:
     [] where there are none, also of a pattern without #. Such a name may belong to a
     folder: reading it reports that.
     """
+    found = _numbered(pattern)
+    names = {name for name, _ in found}
+    return sorted(
+        n for n in {n for _, n in found} if frame_path(pattern, n).name in names
+    )
+
+
+def misnamed(pattern: str) -> list[str]:
+    """Return files of a pattern whose numbers have other digits than it asks for."""
+    return sorted(x for x, n in _numbered(pattern) if frame_path(pattern, n).name != x)
+
+
+def _numbered(pattern: str) -> list[tuple[str, int]]:
+    """Return files with a number, of any digits, where a pattern has it."""
     parts = _split(pattern)
     folder = Path(pattern).parent
     if parts is None or not folder.is_dir():
         return []
     before, _, after = (re.escape(str(part)) for part in parts)
     name = re.compile(f"{before}(-?[0-9]+){after}")
-    names = {path.name for path in folder.iterdir()}
-    numbers = {int(match[1]) for match in map(name.fullmatch, names) if match}
-    return sorted(n for n in numbers if frame_path(pattern, n).name in names)
+    matches = (name.fullmatch(path.name) for path in folder.iterdir())
+    return [(match[0], int(match[1])) for match in matches if match]
 
 
 def in_words(numbers: Sequence[int]) -> str:

@@ -15,7 +15,14 @@ import numpy as np
 from .. import exr
 from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
-from ..frames import RADIUS, check_pattern, frame_numbers, frame_path, in_words
+from ..frames import (
+    RADIUS,
+    check_pattern,
+    frame_numbers,
+    frame_path,
+    in_words,
+    misnamed,
+)
 from ..light_parts.light import passes_of
 from ..temporal.window import Neighbourhood, Shot, Window
 from ..time_left import Clock
@@ -175,7 +182,7 @@ def denoise_sequence(
         PictureError: no frame can be read, the first lacks passes, or an output cannot
             be written; outputs before it are complete.
     """
-    numbers = _numbers(files, frames)
+    numbers = _numbers(files, frames, say)
     there = _there(files.source, numbers)
     files.check(numbers, there)
     radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
@@ -347,10 +354,15 @@ def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
     return [{"frame": n, "reason": why} for n, why in failed.items()]
 
 
-def _numbers(files: Files, frames: Iterable[int] | None) -> list[int]:
+def _numbers(files: Files, frames: Iterable[int] | None, say: Say) -> list[int]:
     """The frames to denoise, in order."""
     for pattern in (*files.patterns, files.output):
         check_pattern(pattern)
+    if others := misnamed(files.source):
+        say(
+            f"{len(others)} files have another number of digits than # in "
+            f"{files.source} and are left out, such as {others[0]}"
+        )
     return sorted(set(frames)) if frames else _all_frames(files.source)
 
 

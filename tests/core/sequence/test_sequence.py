@@ -414,6 +414,15 @@ def test_frames_below_zero(tmp_path: Path, denoiser: Denoiser, name: str) -> Non
     assert not told["left_out"]
 
 
+def test_files_with_other_digits_are_told(shot: Path, denoiser: Denoiser) -> None:
+    (shot / "in" / "0005.exr").rename(shot / "in" / "00005.exr")
+    said: list[str] = []
+    told = denoise(shot, denoiser, say=said.append)
+    assert [x["frame"] for x in told["frames"]] == [1, 2, 3, 4]
+    assert "1 files have another number of digits" in said[0]
+    assert "00005.exr" in said[0]
+
+
 @pytest.mark.parametrize(
     "way", ["%04d", "%d", "$F4", "$F", "*", "????", "<frame>", "<f4>", "{frame}", "@@@"]
 )
