@@ -6,24 +6,46 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from .errors import UsageError
+
 RADIUS = 4
 """The default temporal radius: frames before and after; more add little."""
 MOST_RADIUS = 32
 """The largest that a file may recommend: all these frames are in memory."""
+# Those of C, Houdini, shells, RenderMan and Maya, and Python.
+_OTHER_WAYS = re.compile(
+    r"%0?\d*d|\$\{?F\d*\}?|\*|\?+|<(frame|f)\d*>|\{(frame|f)\b[^}]*\}|@+",
+    re.IGNORECASE,
+)
 _MOST_RUNS = 50  # of frame numbers that a line has room for
 
 
 def frame_path(pattern: str, frame: int) -> Path:
     """Put the frame number in place of the last run of #, as Blender does.
 
-    Three # are three digits at least; without # the pattern is the path.
+    Three # are three digits at least; without # the pattern is the path. A file of a
+    frame below zero may also be called as C does, whose digits count the sign.
     """
     parts = _split(pattern)
     if parts is None:
         return Path(pattern)
     before, digits, after = parts
-    width = digits + (frame < 0)
-    return Path(pattern).with_name(f"{before}{frame:0{width}d}{after}")
+    path, short = (
+        Path(pattern).with_name(f"{before}{frame:0{width}d}{after}")
+        for width in (digits + (frame < 0), digits)
+    )
+    return short if frame < 0 and not path.exists() and short.exists() else path
+
+
+def check_pattern(pattern: str) -> None:
+    """Raise UsageError for other programs' ways to write a frame number."""
+    name = Path(pattern).name
+    other = None if "#" in name else _OTHER_WAYS.search(name)
+    if other and not Path(pattern).exists():
+        raise UsageError(
+            f"{pattern!r}: the frame number is written ####, not {other[0]}; give "
+            f"{name[: other.start()]}####{name[other.end() :]}"
+        )
 
 
 def frame_numbers(pattern: str) -> list[int]:
@@ -32,15 +54,28 @@ def frame_numbers(pattern: str) -> list[int]:
     [] where there are none, also of a pattern without #. Such a name may belong to a
     folder: reading it reports that.
     """
+    found = _numbered(pattern)
+    names = {name for name, _ in found}
+    return sorted(
+        n for n in {n for _, n in found} if frame_path(pattern, n).name in names
+    )
+
+
+def misnamed(pattern: str) -> list[str]:
+    """Return files of a pattern whose numbers have other digits than it asks for."""
+    return sorted(x for x, n in _numbered(pattern) if frame_path(pattern, n).name != x)
+
+
+def _numbered(pattern: str) -> list[tuple[str, int]]:
+    """Return files with a number, of any digits, where a pattern has it."""
     parts = _split(pattern)
     folder = Path(pattern).parent
     if parts is None or not folder.is_dir():
         return []
     before, _, after = (re.escape(str(part)) for part in parts)
     name = re.compile(f"{before}(-?[0-9]+){after}")
-    names = {path.name for path in folder.iterdir()}
-    numbers = {int(match[1]) for match in map(name.fullmatch, names) if match}
-    return sorted(n for n in numbers if frame_path(pattern, n).name in names)
+    matches = (name.fullmatch(path.name) for path in folder.iterdir())
+    return [(match[0], int(match[1])) for match in matches if match]
 
 
 def in_words(numbers: Sequence[int]) -> str:

@@ -7,6 +7,7 @@ holds the JSON alone, of the result or of the error.
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import entry_points
@@ -65,7 +66,14 @@ def _refusal(error: UsageError) -> Callable[[argparse.Namespace], NoReturn]:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Raises wrong usage, so that it is reported like every other error."""
+    """Raises wrong usage, so that it is reported like every other error.
+
+    No option begins with a digit: -3--1 and -1,1 are values, as -1 is.
+    """
+
+    def __init__(self, *args: Any, **more: Any) -> None:
+        super().__init__(*args, **more)
+        self._negative_number_matcher = re.compile(r"-[\d.]")
 
     def error(self, message: str) -> NoReturn:
         raise UsageError(f"{message}; see {self.prog} --help")

@@ -11,9 +11,11 @@ from xrds_core.arrays import Array
 from xrds_core.light_parts.find import LightPart
 from xrds_core.light_parts.light import passes_by_name
 from xrds_core.light_parts.sums import added_up, light_in
+from xrds_core.notices import warn
 from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.temporal.accumulate import Accumulated
+from xrds_core.temporal.equal_noise import IndependentFrames
 
 from ..cycles.samples import Samples
 from ..frame.denoisers import load_denoiser
@@ -47,6 +49,7 @@ class FullSize(Method):
         self._quality = self.settings.quality
         self._denoiser = load_denoiser(self._quality, request.machine)
         self._accumulate = Accumulator(request.machine.accumulate_on)
+        self._independent = IndependentFrames(warn)
         if self.settings.temporal_radius:
             self._accumulate.prepare()
 
@@ -85,7 +88,7 @@ class FullSize(Method):
         if isinstance(frame, Samples):
             picture = self._alone(frame, report, own.light)
         else:
-            neighbours = own.neighbours(view, others)
+            neighbours = self._neighbours(own, others, view)
             gathered = own.gathered.get(view)
             picture = self.finish_stored(frame, neighbours, report, gathered, own.light)
         settings = picture.settings
@@ -99,7 +102,7 @@ class FullSize(Method):
         self, own: Sampled, others: Sequence[Sampled], view: str
     ) -> Accumulated:
         """One view with the samples of its neighbours."""
-        neighbours = own.neighbours(view, others)
+        neighbours = self._neighbours(own, others, view)
         return self._accumulate(own.views[view], neighbours)
 
     def radiance(
@@ -112,13 +115,19 @@ class FullSize(Method):
         """Rows and columns of the picture of one view, (H, W, 3), denoised alone."""
         finished = finish_frame(
             own.views[view],
-            own.neighbours(view, others),
+            self._neighbours(own, others, view),
             self._denoiser,
             self._accumulate,
             region=region,
             accumulated=own.gathered.get(view),
         )
         return finished.picture[..., :3]
+
+    def _neighbours(
+        self, own: Sampled, others: Sequence[Sampled], view: str
+    ) -> list[Stored]:
+        """The neighbours of one view; cached ones may have the same samples."""
+        return self._independent.of(own.views[view], own.neighbours(view, others))
 
     def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
         """Samples by themselves, denoised."""

@@ -13,10 +13,10 @@ from .render_passes import (
     File,
     Guides,
     Names,
+    attributes,
     copy_picture,
     read_beauty,
     read_guides,
-    windows,
     write_part,
     write_picture,
 )
@@ -29,10 +29,10 @@ __all__ = [
     "Names",
     "Part",
     "Window",
+    "attributes",
     "copy_picture",
     "read_beauty",
     "read_guides",
-    "windows",
     "write_part",
     "write_picture",
 ]

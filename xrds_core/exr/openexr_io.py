@@ -28,16 +28,20 @@ from ..atomic import scratch_folder
 from ..children import run_python
 from ..errors import PictureError
 from ..files import check_input
-from .encoding import FLOAT_ZIP, Pixels, fitting
+from .encoding import FLOAT_ZIP, LARGEST_HALF, Pixels, fitting
 from .limits import check_claims, limit_of
+from .raw_header import readable, restore
 
 Window = tuple[tuple[int, int], tuple[int, int]]
 Attributes = dict[str, Any]
-"""Of a header: texts, numbers, and matrices as lists of rows."""
+"""Of a header: texts, numbers, matrices as lists of rows, and names of views."""
 
+VIEWS = "multiView"
+"""The attribute with the names of a file's views, the one without names first."""
 _FAULTS = (RuntimeError, ValueError, TypeError, MemoryError)  # of a damaged file
 # Of a header, what a file with other channels has anew.
 _OF_CHANNELS = {"channels", "name", "type", "tiles", "chunkCount", "version"}
+_LESS = 0.9  # of what DWA may hold, where it is decoded as infinite
 _stderr = threading.Lock()
 
 
@@ -107,22 +111,26 @@ def copy(
     *,
     alone: bool = False,
     window: Window | None = None,
+    metadata: Mapping[str, str] | None = None,
 ) -> None:
     """Write `source` to `path` with some channels replaced or added, by part.
 
     All others, the windows and attributes stay as they are; a plane that replaces
     another gets its number format. `alone`: only the `planes`, of one part, are
     written, with its windows and attributes. With a `window` all parts are cropped to
-    it, and planes are of it. Raises PictureError.
+    it, and planes are of it. `metadata` is added to the headers of parts with planes.
+    Raises PictureError.
     """
     limit = limit_of(check_input(Path(source)))
+    told = dict(metadata or {})
     if not _is_shadowed():
-        _copy(source, path, planes, alone, window, limit)
+        _copy(source, path, planes, alone, window, told, limit)
         return
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         unread = ((0, 0), (0, 0))  # the source has them
-        options = {"source": os.fspath(source), "alone": alone, "window": window}
+        options: Attributes = {"source": os.fspath(source), "alone": alone}
+        options |= {"window": window, "metadata": told}
         parts = [
             Part("", unread, unread, dict(each), options | {"part": number})
             for number, each in planes.items()
@@ -171,7 +179,8 @@ def _part(part: Any, channels: dict[str, Pixels]) -> Part:
 def _headers(path: str | Path, limit: float = math.inf) -> Any:
     import OpenEXR
 
-    headers = OpenEXR.File(str(path), header_only=True).parts
+    with readable(path) as there:
+        headers = OpenEXR.File(str(there), header_only=True).parts
     check_claims(path, [part.header for part in headers], limit)
     return headers
 
@@ -184,12 +193,33 @@ def _opened(path: str | Path, limit: int) -> Any:
         # OpenEXR leaves out a part that it cannot read and says why on stdout
         with _silent_library(), redirect_stdout(StringIO()) as output:
             headers = _headers(path, limit)
-            file = OpenEXR.File(str(path), separate_channels=True)
+            with readable(path) as there:
+                file = OpenEXR.File(str(there), separate_channels=True)
     except _FAULTS as error:
         raise _incomplete(path, error) from error
     if not file.parts or len(file.parts) != len(headers):
         raise _incomplete(path, output.getvalue().strip().rpartition(" - ")[2])
+    for part in file.parts:
+        _bound_ringing(part)
     return file
+
+
+def _bound_ringing(part: Any) -> None:
+    """Bound what DWA decodes as infinite: it rings near the largest half."""
+    import OpenEXR
+
+    if part.header["compression"] in (
+        OpenEXR.DWAA_COMPRESSION,
+        OpenEXR.DWAB_COMPRESSION,
+    ):
+        for channel in part.channels.values():
+            if channel.pixels.dtype == np.float16:
+                np.copyto(channel.pixels, _bounded(channel.pixels, LARGEST_HALF))
+
+
+def _bounded(pixels: Pixels, most: float) -> Pixels:
+    """NaN stays."""
+    return np.clip(pixels, -most, most).astype(pixels.dtype, copy=False)
 
 
 def _incomplete(path: str | Path, reason: object) -> PictureError:
@@ -203,7 +233,9 @@ def _attributes(header: Mapping[str, Any]) -> Attributes:
         if isinstance(value, np.ndarray) and value.ndim == 2
     }
     plain = {k: v for k, v in header.items() if type(v) in (str, int, float)}
-    return plain | matrices
+    views = header.get(VIEWS)
+    named = {VIEWS: list(map(str, views))} if isinstance(views, list) else {}
+    return plain | named | matrices
 
 
 @contextmanager
@@ -241,10 +273,46 @@ def _write(path: str | Path, part: Part, codec: str) -> None:
     # the library reads other arrays as if they were contiguous
     planes = {name: np.ascontiguousarray(x) for name, x in part.channels.items()}
     try:
+        if codec.startswith("dwa"):
+            _write_dwa(path, header, planes)
+            return
         with _silent_library():
             OpenEXR.File(header, planes).write(str(path))
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
+
+
+def _write_dwa(
+    path: str | Path, header: dict[str, Any], planes: dict[str, Pixels]
+) -> None:
+    """Write planes so that they are finite again when they are read.
+
+    DWA stores infinity as 0, and light near the largest half may be decoded as
+    infinity: what is, is bounded lower.
+    """
+    import OpenEXR
+
+    halves = [name for name, x in planes.items() if x.dtype == np.float16]
+    most = dict.fromkeys(planes, math.inf) | dict.fromkeys(halves, LARGEST_HALF)
+    while True:
+        bounded = {name: _bounded(x, most[name]) for name, x in planes.items()}
+        with _silent_library():
+            OpenEXR.File(dict(header), dict(bounded)).write(str(path))
+            (read,) = OpenEXR.File(str(path), separate_channels=True).parts
+        over = [
+            name
+            for name, channel in read.channels.items()
+            if _is_lost(bounded[name], channel.pixels)
+        ]
+        if not over:
+            return
+        most |= {name: min(most[name] * _LESS, LARGEST_HALF) for name in over}
+
+
+def _is_lost(pixels: Pixels, read: Pixels) -> bool:
+    """Whether any light was read as infinite, or infinite light as none."""
+    is_finite, black = np.isfinite(pixels), read == 0.0
+    return bool((is_finite & np.isinf(read) | np.isinf(pixels) & black).any())
 
 
 def _copy(
@@ -253,6 +321,7 @@ def _copy(
     planes: Mapping[int, Mapping[str, Pixels]],
     alone: bool,
     window: Window | None,
+    metadata: Mapping[str, str],
     limit: int,
 ) -> None:
     import OpenEXR
@@ -261,9 +330,11 @@ def _copy(
         ((number, only),) = planes.items()
         whole = _whole_headers(source)[number].header
         header = {k: v for k, v in whole.items() if k not in _OF_CHANNELS}
+        header["compression"] = _lossless(header["compression"])
         header["type"] = OpenEXR.scanlineimage
         if window is not None:
             header["dataWindow"] = _corners(window)
+        header |= metadata
         channels: dict[str, Any] = {}
         _put(channels, only)
     else:
@@ -272,6 +343,7 @@ def _copy(
             _crop(file.parts, window)
         for number, each in planes.items():
             _put(file.parts[number].channels, each)
+            file.parts[number].header |= metadata
     try:
         if alone:
             file = OpenEXR.File(header, channels)
@@ -279,6 +351,7 @@ def _copy(
             _make_writable(file.parts)
         with _silent_library():
             file.write(str(path))
+        restore(source, path)
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
 
@@ -330,6 +403,7 @@ def _make_writable(parts: Any) -> None:
     import OpenEXR
 
     for part in parts:
+        part.header["compression"] = _lossless(part.header["compression"])
         if "tiles" in part.header:
             tiles = part.header["tiles"]
             tiles.mode = OpenEXR.ONE_LEVEL
@@ -340,6 +414,15 @@ def _make_writable(parts: Any) -> None:
                 part.channels[name] = OpenEXR.Channel(
                     name, _repeated(channel.pixels, across, down, part)
                 )
+
+
+def _lossless(compression: Any) -> Any:
+    """ZIP in place of what would lose some of all channels a second time."""
+    import OpenEXR
+
+    lossy = ("B44", "B44A", "DWAA", "DWAB")
+    losses = [getattr(OpenEXR, f"{name}_COMPRESSION") for name in lossy]
+    return OpenEXR.ZIP_COMPRESSION if compression in losses else compression
 
 
 def _repeated(pixels: Pixels, across: int, down: int, part: Any) -> Pixels:
@@ -415,7 +498,8 @@ def _main(task: str, path: str, archive: str, how: str) -> int:
             options = parts[0].attributes
             planes = {part.attributes["part"]: part.channels for part in parts}
             window = options["window"] and _window(options["window"])
-            _copy(options["source"], path, planes, options["alone"], window, int(how))
+            told = options["alone"], window, options["metadata"]
+            _copy(options["source"], path, planes, *told, int(how))
     except PictureError as error:
         print(error, file=sys.stderr)
         return 1

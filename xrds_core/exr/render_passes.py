@@ -6,8 +6,9 @@ of the file's display window.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,8 @@ from ..errors import PictureError
 from . import openexr_io
 from .channels import Channels
 from .encoding import FLOAT_ZIP, Encoding
-from .openexr_io import Part, Window
+from .openexr_io import Attributes, Part, Window
+from .views import by_view, with_view
 
 
 @dataclass(frozen=True)
@@ -110,19 +112,27 @@ def copy_picture(
     *,
     alone: bool = False,
     window: Window | None = None,
+    metadata: Mapping[str, str] | None = None,
+    check: Callable[[], None] = lambda: None,
 ) -> None:
     """Write `source` to `path` with other pixels in some channels, by part.
 
     The (H, W) planes are of the part's data window, or of `window`, to which the file
     is cropped. What is not in `channels` stays as it is, or is left out if they stand
-    `alone`: those of one part can. Raises PictureError as `write_picture`.
+    `alone`: those of one part can. `metadata` goes into the header of these parts.
+    `check` raises PictureError where `source` is another file meanwhile: then nothing
+    is written. Raises PictureError as `write_picture`.
     """
     planes = {
         part: {k: np.ascontiguousarray(v, np.float32) for k, v in each.items()}
         for part, each in channels.items()
     }
     with _whole(path) as unfinished:
-        openexr_io.copy(source, unfinished, planes, alone=alone, window=window)
+        told = dict(metadata or {})
+        openexr_io.copy(
+            source, unfinished, planes, alone=alone, window=window, metadata=told
+        )
+        check()
 
 
 def write_part(path: str | Path, part: Part) -> None:
@@ -140,14 +150,9 @@ def _whole(path: str | Path) -> Iterator[Path]:
         raise PictureError(f"cannot write {path}: {error}") from error
 
 
-def windows(path: str | Path, *, whole: bool = False) -> tuple[Window, set[Window]]:
-    """Return a file's display window and the data windows of its parts.
-
-    Raises PictureError where it cannot be read; for `whole`, also where pixels cannot.
-    """
-    read = openexr_io.read if whole else openexr_io.read_headers
-    parts = read(path)
-    return parts[0].display_window, {part.data_window for part in parts}
+def attributes(path: str | Path) -> list[Attributes]:
+    """Return those of a file's parts; PictureError where it is not complete."""
+    return [part.attributes for part in openexr_io.read(path)]
 
 
 class File:
@@ -170,6 +175,17 @@ class File:
             self._add(name, other)
         self.names = Channels(path, self._places)
         self.window: Window | None = None
+        self.view, self.is_first = "", True
+
+    def views(self) -> list[File]:
+        """Return the same file for each of its views, with its channels alone."""
+        found: list[File] = []
+        for view, places in by_view(self.parts, self._places).items():
+            each = copy(self)
+            each._places, each.names = places, Channels(self.path, places)
+            each.view, each.is_first = view, not found
+            found.append(each)
+        return found
 
     def _add(self, name: str, path: Path) -> None:
         parts = openexr_io.read(path)
@@ -230,10 +246,13 @@ def _places(path: str | Path, parts: list[Part]) -> dict[str, tuple[int, str]]:
     """
     places: dict[str, tuple[int, str]] = {}
     for number, part in enumerate(parts):
-        layer = part.name if len(parts) > 1 else ""
+        # a part with all passes of a view is no layer
+        is_view = "view" in part.attributes and any("." in x for x in part.channels)
+        layer = part.name if len(parts) > 1 and not is_view else ""
         for name in part.channels:
             # Blender repeats the part's name in its channels, others do not
             full = f"{layer}.{name}" if layer and "." not in name else name
+            full = with_view(full, part)
             if full in places:
                 first = parts[places[full][0]].name
                 raise PictureError(

@@ -50,13 +50,18 @@ def to_header(camera: Camera) -> dict[str, list[list[float]] | str]:
     }
 
 
+def has_camera(header: Mapping[str, Any]) -> bool:
+    """Whether a header says anything of a camera."""
+    return VIEW in header and bool({NDC, PROJECT, SPHERE} & set(header))
+
+
 def from_header(header: Mapping[str, Any], size: tuple[int, int]) -> Camera | None:
     """Return the camera that a header describes; None without the attributes.
 
     `size` is (width, height) of the display window. Raises ValueError for values that
     describe no camera.
     """
-    if VIEW not in header or not {NDC, PROJECT, SPHERE} & set(header):
+    if not has_camera(header):
         return None
     view = attributes.placement(_transposed(header[VIEW]))
     if SPHERE in header:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,13 +15,22 @@ import numpy as np
 from .. import exr
 from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
-from ..frames import RADIUS, frame_numbers, frame_path
+from ..frames import (
+    RADIUS,
+    check_pattern,
+    frame_numbers,
+    frame_path,
+    in_words,
+    misnamed,
+)
 from ..light_parts.light import passes_of
-from ..temporal.window import Shot, Window
+from ..temporal.window import Neighbourhood, Shot, Window
 from ..time_left import Clock
+from ..version import package_version
 from .accumulator import Accumulator
 from .finishing import AROUND, Finished, finish_frame
 from .loading import Loader
+from .made_of import MADE_OF, Recipe, is_complete, is_made_of, states_of
 from .neighbour_frames import NeighbourSelection
 from .reading import FrameFile, Reading
 
@@ -52,45 +62,59 @@ class Files:
     also: tuple[str, ...] = ()
     crop: PixelWindow | None = None
 
-    def write(self, number: int, frame: FrameFile, finished: Finished) -> Path:
-        """Write a finished frame, or none of it; raises PictureError."""
-        names = list("RGBA") if self.picture_only else frame.channels
-        planes = dict(zip(names, np.moveaxis(finished.picture, 2, 0), strict=False))
-        by_part: dict[int, dict[str, Array]] = {frame.part: planes}
-        if not self.picture_only:
-            for name, plane in _light(frame, finished).items():
-                part, own = frame.places[name]
-                by_part.setdefault(part, {})[own] = plane
+    @property
+    def patterns(self) -> tuple[str, ...]:
+        """Those of all files of a frame."""
+        return (
+            self.source,
+            *self.also,
+            *([] if self.halves is None else [self.halves]),
+        )
+
+    def write(
+        self,
+        number: int,
+        views: Mapping[str, tuple[FrameFile, Finished]],
+        metadata: Mapping[str, str],
+        check: Callable[[], None] = lambda: None,
+    ) -> Path:
+        """Write the finished views of a frame, or none; PictureError, as of `check`."""
+        by_part: dict[int, dict[str, Array]] = {}
+        first, _ = next(iter(views.values()))
+        for view, (frame, finished) in views.items():
+            names, part = frame.channels, frame.part
+            if self.picture_only:
+                ahead = f"{view}." if view else ""
+                names, part = [f"{ahead}{x}" for x in "RGBA"], first.part
+            planes = np.moveaxis(finished.picture, 2, 0)
+            by_part.setdefault(part, {}).update(zip(names, planes, strict=False))
+            if not self.picture_only:
+                for name, plane in _light(frame, finished).items():
+                    part, own = frame.places[name]
+                    by_part.setdefault(part, {})[own] = plane
         path = frame_path(self.output, number)
-        source = frame_path(self.source, number)
         exr.copy_picture(
-            source, path, by_part, alone=self.picture_only, window=self.crop
+            frame_path(self.source, number),
+            path,
+            by_part,
+            alone=self.picture_only,
+            window=self.crop,
+            metadata=metadata,
+            check=check,
         )
         return path
 
-    def is_done(self, number: int, neighbours: Iterable[int] = ()) -> bool:
-        """Whether a complete output of the input's size exists, newer than all inputs.
+    def is_done(self, number: int, digest: str) -> bool:
+        """Whether a complete output of these inputs and settings exists.
 
-        So a frame counts as missing if the samples of one of its `neighbours` came
-        later.
+        One whose input is gone cannot be made again, and stays.
         """
-        source, output = (frame_path(x, number) for x in (self.source, self.output))
-        inputs = [
-            frame_path(pattern, n)
-            for pattern in (self.source, *self.also)
-            for n in (number, *neighbours)
-        ]
-        times = [path.stat().st_mtime_ns for path in inputs if path.is_file()]
-        if not output.is_file() or output.stat().st_mtime_ns < max(times, default=0):
+        output = frame_path(self.output, number)
+        if not output.is_file():
             return False
-        try:
-            display, areas = exr.windows(output, whole=True)
-            if not source.is_file():
-                return True
-            whole, there = exr.windows(source)
-            return display == whole and areas <= ({self.crop} if self.crop else there)
-        except PictureError:
-            return False
+        if frame_path(self.source, number).is_file():
+            return is_made_of(output, digest)
+        return is_complete(output)
 
     def check(self, numbers: Sequence[int], there: Sequence[int]) -> None:
         """Reject impossible outputs; make their folder.
@@ -104,13 +128,26 @@ class Files:
                 f"all {len(numbers)} frames would be written to {self.output!r}; add "
                 "#### for the frame number"
             )
-        patterns = [self.source, *self.also]
-        patterns += [] if self.halves is None else [self.halves]
-        inputs = [frame_path(pattern, n) for pattern in patterns for n in there]
+        for pattern in self.patterns[1:]:
+            self._check_beside(pattern, there)
+        inputs = [frame_path(pattern, n) for pattern in self.patterns for n in there]
         known = set(there)
         outputs = (frame_path(self.output, n) for n in numbers if n in known)
         check_places(outputs, [*inputs, *self.others])
         check_folder(Path(self.output).parent)
+
+    def _check_beside(self, pattern: str, there: Sequence[int]) -> None:
+        """Reject one file beside many frames, and the frames themselves."""
+        if "#" in Path(self.source).name and "#" not in Path(pattern).name:
+            raise UsageError(
+                f"{pattern!r} is one file for all frames; add #### for the frame number"
+            )
+        for number in there:
+            source, path = (frame_path(x, number) for x in (self.source, pattern))
+            if path.exists() and source.samefile(path):
+                raise UsageError(
+                    f"{path} is the frame itself, no further file of it; give another"
+                )
 
 
 def denoise_sequence(
@@ -133,8 +170,8 @@ def denoise_sequence(
         radius: how many frames before and after are neighbours; by default what the
             files recommend, or 4.
         accumulate: by default on a graphics card where there is one.
-        resume: skip outputs that are complete, of the right size, and newer than all
-            inputs whose samples they reuse.
+        resume: skip outputs that are complete and made of these settings and of the
+            inputs as they are now.
         say: takes a line about a frame that is finished, left out, or not reusable.
 
     Returns:
@@ -145,11 +182,12 @@ def denoise_sequence(
         PictureError: no frame can be read, the first lacks passes, or an output cannot
             be written; outputs before it are complete.
     """
-    numbers = sorted(set(frames)) if frames else _all_frames(files.source)
+    numbers = _numbers(files, frames, say)
     there = _there(files.source, numbers)
     files.check(numbers, there)
     radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
-    loader = Loader(files.source, reading or Reading(), reusable=radius != 0, say=say)
+    recipe = _recipe(files, reading or Reading(), denoiser)
+    loader = Loader(files.source, recipe, reusable=radius != 0, say=say)
     loader.look(numbers, set(there))
     readable = [n for n in numbers if n not in loader.failed]
     first = loader.first(readable)
@@ -157,18 +195,17 @@ def denoise_sequence(
         radius = RADIUS if first is None or first.radius is None else first.radius
     beside = (*numbers, *there)
     shot = Shot((), radius, others=beside)
-    written = set(_there(files.output, numbers) if resume else ())
-    done = {n for n in numbers if n in written and files.is_done(n, shot.neighbours(n))}
+    done = _done(files, recipe, shot, numbers, say) if resume else set()
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
-    accumulate = accumulate or Accumulator()
-    entries = list(_entries(files, denoiser, accumulate, shot, loader, resume, say))
-    devices = {"device": denoiser.device, "accumulated_on": accumulate.device}
+    work = files, denoiser, (accumulate := accumulate or Accumulator()), shot, loader
+    entries = list(_entries(*work, recipe, resume, say))
     return {
         "output": files.output,
         "temporal_radius": radius,
-        **devices,
+        "device": denoiser.device,
+        "accumulated_on": accumulate.device,
         "frames": entries,
         "kept": sorted(done),
         "left_out": _left_out(loader, [n for n in numbers if n not in done]),
@@ -181,6 +218,7 @@ def _entries(
     accumulate: Accumulator,
     shot: Shot,
     loader: Loader,
+    recipe: Recipe,
     resume: bool,
     say: Say,
 ) -> Iterator[dict[str, Any]]:
@@ -193,17 +231,29 @@ def _entries(
     clock = Clock()
     for found in Window(shot, loader.load):
         number, own = found.number, found.own
-        # another machine may have finished it
-        if resume and files.is_done(number, shot.neighbours(number)):
+        near = sorted((number, *shot.neighbours(number)))
+        digest = recipe.digest({n: loader.states.get(n, ()) for n in near}, number)
+        if resume and files.is_done(number, digest):  # another machine was quicker
             continue
-        others = selection.select(number, own, found.neighbours)
         try:
-            region, within = _regions(own, files.crop)
-            finished = finish_frame(
-                own.stored, others, denoiser, accumulate, region=region, light=own.light
-            )
+            views, others = {}, {}
+            for view, each in {"": own, **own.others}.items():
+                others[view] = selection.select(number, each, _of(found, view))
+                region, within = _regions(each, files.crop)
+                done = finish_frame(
+                    each.stored,
+                    others[view],
+                    denoiser,
+                    accumulate,
+                    region=region,
+                    light=each.light,
+                )
+                views[view] = each, done.within(within)
+            finished = views[""][1]
             started = time.perf_counter()
-            path = files.write(number, own, finished.within(within))
+            metadata = {**_metadata(own, finished, denoiser), MADE_OF: digest}
+            check = partial(loader.check, number)
+            path = files.write(number, views, metadata, check)
             fails = False
         except PictureError as error:
             if fails:
@@ -211,13 +261,61 @@ def _entries(
             fails = True
             loader.leave_out(number, error)
             continue
-        selection.record(others, finished.accumulated)
-        seconds = {"read": loader.seconds(), **finished.seconds}
+        selection.record(others[""], finished.accumulated)
+        seconds = {"read": loader.seconds()}
+        for stage in finished.seconds:
+            seconds[stage] = sum(each.seconds[stage] for _, each in views.values())
         seconds["write"] = time.perf_counter() - started
         left = sum(n > number and n not in loader.failed for n in shot.frames)
         say(f"frame {number}: {path}, {clock.lap(left)}")
         yield _entry(number, path, shot.radius, finished, seconds)
     selection.report()
+
+
+def _recipe(files: Files, reading: Reading, denoiser: Denoiser) -> Recipe:
+    settings = denoiser.quality, files.picture_only, files.crop
+    return Recipe(files.patterns, reading, settings)
+
+
+def _done(
+    files: Files, recipe: Recipe, shot: Shot, numbers: Sequence[int], say: Say
+) -> set[int]:
+    """The frames that are complete; a line tells those that are made anew."""
+    written = set(_there(files.output, numbers))
+    written.intersection_update(numbers)
+    near = {n: sorted((n, *shot.neighbours(n))) for n in sorted(written)}
+    states = states_of(recipe, {x for numbers in near.values() for x in numbers})
+    done = {
+        n
+        for n, others in near.items()
+        if files.is_done(n, recipe.digest({x: states[x] for x in others}, n))
+    }
+    if anew := sorted(written - done):
+        say(
+            f"made anew, as they are damaged or were made with other settings or of "
+            f"other inputs: frames {in_words(anew)}"
+        )
+    return done
+
+
+def _metadata(own: FrameFile, finished: Finished, denoiser: Denoiser) -> dict[str, str]:
+    """What made a frame, as files of `xrds render` have it."""
+    frames = finished.accumulated.frames
+    return {
+        "xrds.version": package_version(),
+        "xrds.mode": "denoised",
+        "xrds.preset": denoiser.quality,
+        "xrds.samples": f"{own.stored.samples:g}",
+        "xrds.frames": f"{frames[0]} to {frames[-1]}",
+    }
+
+
+def _of(found: Neighbourhood[FrameFile], view: str) -> dict[int, FrameFile]:
+    """The same view of a frame's neighbours, "" for the first one."""
+    if not view:
+        return found.neighbours
+    near = found.neighbours.items()
+    return {n: each.others[view] for n, each in near if view in each.others}
 
 
 def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Rectangle]:
@@ -254,6 +352,18 @@ def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
 def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
     failed = {n: loader.failed[n] for n in todo if n in loader.failed}
     return [{"frame": n, "reason": why} for n, why in failed.items()]
+
+
+def _numbers(files: Files, frames: Iterable[int] | None, say: Say) -> list[int]:
+    """The frames to denoise, in order."""
+    for pattern in (*files.patterns, files.output):
+        check_pattern(pattern)
+    if others := misnamed(files.source):
+        say(
+            f"{len(others)} files have another number of digits than # in "
+            f"{files.source} and are left out, such as {others[0]}"
+        )
+    return sorted(set(frames)) if frames else _all_frames(files.source)
 
 
 def _all_frames(pattern: str) -> list[int]:

@@ -12,7 +12,8 @@ from .file_errors import NotReusable, Unfit
 from .reading import read_frame
 
 if TYPE_CHECKING:
-    from .reading import FrameFile, Reading
+    from .made_of import Recipe, State
+    from .reading import FrameFile
 
 
 class Loader:
@@ -25,14 +26,17 @@ class Loader:
     def __init__(
         self,
         pattern: str,
-        reading: Reading,
+        recipe: Recipe,
         reusable: bool,
         say: Callable[[str], object],
     ) -> None:
         self.failed: dict[int, str] = {}
-        self._pattern, self._reading = pattern, reading
+        self.states: dict[int, State] = {}
+        """Of the files of each frame, as they were when it was read."""
+        self._pattern, self._recipe = pattern, recipe
         self._reusable, self._say = reusable, say
         self._ahead: dict[int, FrameFile | None] = {}
+        self._noisy_views: set[str] = set()
         self._any_is_fit = False
         self._seconds = 0.0
 
@@ -93,13 +97,27 @@ class Loader:
         return seconds
 
     def _read(self, number: int) -> FrameFile:
-        path = frame_path(self._pattern, number)
+        self.states[number] = self._recipe.state(number)
+        path, reading = frame_path(self._pattern, number), self._recipe.reading
         try:
-            frame = read_frame(path, number, self._reading, reusable=self._reusable)
+            frame = read_frame(path, number, reading, reusable=self._reusable)
+            self._any_is_fit = True
         except NotReusable as error:
             if not self._any_is_fit:
                 raise
             self._say(f"frame {number} is denoised by itself: {error.reason}")
-            return read_frame(path, number, self._reading, reusable=False)
-        self._any_is_fit = True
+            frame = read_frame(path, number, reading, reusable=False)
+        self.check(number)
+        for view, why in frame.unread.items():
+            if view not in self._noisy_views:
+                self._noisy_views.add(view)
+                self._say(f"the view {view} stays as noisy as it is: {why}")
         return frame
+
+    def check(self, number: int) -> None:
+        """Raise PictureError where a frame's files are others than those read."""
+        if self.states[number] != self._recipe.state(number):
+            path = frame_path(self._pattern, number)
+            raise PictureError(
+                f"{path} was replaced while it was in work; denoise with --resume"
+            )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from ..temporal.equal_noise import IndependentFrames
+
 if TYPE_CHECKING:
     from ..temporal.accumulate import Accumulated
     from ..temporal.frame import Stored
@@ -14,12 +16,14 @@ if TYPE_CHECKING:
 class NeighbourSelection:
     """Leaves out neighbours of another size, with other passes, or of another render.
 
+    And those that have the same noise.
     `say` takes a line about each frame that does not fit its neighbours, once.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
         self._say = say
         self._odd: set[int] = set()
+        self._independent = IndependentFrames(say)
         self._had_neighbours = self._reused = False
 
     def select(
@@ -28,11 +32,12 @@ class NeighbourSelection:
         """Return the neighbours whose samples frame `number` reuses, in their order."""
         if not own.reusable:
             return []
-        return [
+        fitting = [
             other.stored
             for n, other in beside.items()
             if other.reusable and self._fits(number, own, n, other)
         ]
+        return self._independent.of(own.stored, fitting)
 
     def record(self, others: Sequence[Stored], accumulated: Accumulated) -> None:
         """Note whether any samples are reused in this shot."""

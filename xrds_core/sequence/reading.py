@@ -19,7 +19,7 @@ from ..temporal.halves import Halves
 from ..temporal.motion import centres, pixels_of
 from ..temporal.noise import Noise
 from . import attributes
-from .cameras import camera_of_frame, from_header
+from .cameras import camera_of_frame, from_header, has_camera
 from .file_errors import NotReusable, Unfit
 from .names import Found, PassNames, find
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from ..arrays import Array
-    from ..exr.openexr_io import Part, Window
+    from ..exr.openexr_io import Attributes, Part, Window
     from ..light_parts.find import LightPart
 
 SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
@@ -78,6 +78,7 @@ class FrameFile:
     `radius` is the one that the file recommends, or None. `reusable` is False where the
     frame cannot be reprojected. `light` are the parts of its light that were read;
     `places` says in which part of the file a channel lies, and what it is called there.
+    `others` are the other views of a stereo file, `unread` says why some are not read.
     """
 
     stored: Stored
@@ -90,6 +91,8 @@ class FrameFile:
     reusable: bool
     light: tuple[LightPart, ...] = ()
     places: Mapping[str, tuple[int, str]] = field(default_factory=dict)
+    others: Mapping[str, FrameFile] = field(default_factory=dict)
+    unread: Mapping[str, str] = field(default_factory=dict)
 
 
 def read_frame(
@@ -97,14 +100,25 @@ def read_frame(
 ) -> FrameFile:
     """Read a frame; one that need not be `reusable` needs no camera and no depth.
 
-    Raises Unfit, also NotReusable, with the path and the remedy, and PictureError for
-    an incomplete file.
+    Of a stereo file it is the first view, with the `others`. Raises Unfit, also
+    NotReusable, with the path and the remedy, and PictureError for an incomplete file.
     """
-    file = File(path, _also(path, number, reading))
+    first, *rest = File(path, _also(path, number, reading)).views()
+    frame = _read_view(first, number, reading, reusable)
+    others, unread = {}, {}
+    for file in rest:
+        try:
+            others[file.view] = _read_view(file, number, reading, frame.reusable)
+        except Unfit as error:
+            unread[file.view] = str(error)
+    return replace(frame, others=others, unread=unread)
+
+
+def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> FrameFile:
     found = find(file.names, reading.names)
     number_of_part, channels = _target(file, found)
     part = file.parts[number_of_part]
-    file.window = _window(path, part) if reusable else part.data_window
+    file.window = _window(file.path, part) if reusable else part.data_window
     camera, depth = _geometry(file, part, found, number, reading, reusable)
     beauty = _stack(file, found.beauty)
     light = find_parts(file.names, _layer(found), reading.light)
@@ -115,7 +129,7 @@ def read_frame(
         albedo=_guide(_stack(file, found.albedo)),
         normal=_guide(_normal(file, found, camera, reading)),
         depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
-        samples=_samples(part, reading),
+        samples=_samples(file, part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
         vector=_vector(file, found, reading) if reusable else None,
         path_length=_path_length(file, found) if reusable else None,
@@ -179,7 +193,10 @@ def _with_other_half(
     path = frame_path(reading.halves, frame.number)
     if not path.is_file():
         raise PictureError(f"there is no file {path}, the frame's other half")
-    other = File(path)
+    views = {each.view: each for each in File(path).views()}
+    other = views.get(file.view)
+    if other is None:
+        raise Unfit(f"{path} is no half of {file.path}: it lacks the view {file.view}")
     found = find(other.names, reading.names)
     part = other.parts[_target(other, found)[0]]
     same_size = part.display_window == file.parts[0].display_window
@@ -239,7 +256,7 @@ def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | N
     """The camera from the options, or else from the header."""
     (left, top), (right, bottom) = part.display_window
     size = (right - left + 1, bottom - top + 1)
-    header = part.attributes
+    header = _header_with_camera(file, part)
     try:
         if reading.cameras is not None:
             aspect = attributes.number(header.get("pixelAspectRatio", 1.0), 1e-3, 1e3)
@@ -258,6 +275,12 @@ def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | N
     return replace(camera, window=(x - left, y - top), name=name)
 
 
+def _header_with_camera(file: File, part: Part) -> Attributes:
+    """The part's header, or else that of the first part that holds a camera."""
+    headers = [part.attributes, *(each.attributes for each in file.parts)]
+    return next((x for x in headers if has_camera(x)), part.attributes)
+
+
 def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array | None:
     """Depth (H, W) along the camera's axis, infinite without a hit."""
     position, depth = found.position, found.depth
@@ -272,7 +295,7 @@ def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array 
     with np.errstate(over="ignore", invalid="ignore"):  # huge positions
         result = camera.depth(points)
     result[np.abs(result) < _NEAREST] = 0.0
-    if camera.sphere is None:
+    if camera.sphere is None and file.is_first:  # the header has one view's camera
         _check_fit(file, camera, points, result)
     return result
 
@@ -340,12 +363,14 @@ def _noise(file: File, found: Found) -> Noise:
     return Noise(*(plane.astype(np.float16) for plane in cut))
 
 
-def _samples(part: Part, reading: Reading) -> int:
+def _samples(file: File, part: Part, reading: Reading) -> int:
     """Samples per pixel: from the options, or as XRDS or Blender wrote them."""
     if reading.samples:
         return reading.samples
-    values = [part.attributes.get(SAMPLES)]
-    values += [v for k, v in part.attributes.items() if _is_cycles_samples(k)]
+    values = []
+    for each in (part, *file.parts):  # renderers may tell the first part alone
+        values.append(each.attributes.get(SAMPLES))
+        values += [v for k, v in each.attributes.items() if _is_cycles_samples(k)]
     counts = [attributes.whole_or_none(x, 1) for x in values]
     return next((x for x in counts if x is not None), _DEFAULT_SAMPLES)
 
@@ -366,7 +391,8 @@ def _target(file: File, found: Found) -> tuple[int, list[str]]:
             f"{file.path} holds {', '.join(there)} in several parts; save them in one"
         )
     if not parts:
-        return file.place(found.beauty[0])[0], [x.rpartition(".")[2] for x in wanted]
+        names = [_in_layer(file.view, x.rpartition(".")[2]) for x in wanted]
+        return file.place(found.beauty[0])[0], names
     ahead = file.place(there[0])[1].rpartition(".")[0]
     return parts.pop(), [_in_layer(ahead, x.rpartition(".")[2]) for x in wanted]
 
@@ -389,7 +415,7 @@ def _is_half(file: File, names: list[str]) -> bool:
     return any(file.pixels(name).dtype == np.float16 for name in names)
 
 
-def _window(path: Path, part: Part) -> Window:
+def _window(path: str | Path, part: Part) -> Window:
     """The window that the arrays of a frame cover.
 
     Renderers may crop each frame to its content, so that the display window is what

@@ -97,7 +97,7 @@ def _load() -> None:
     from xrds_core.sequence import denoise  # noqa: F401
 
     with contextlib.suppress(PictureError):
-        exr.windows(os.devnull)
+        exr.attributes(os.devnull)
 
 
 def _denoise(case: Case) -> None:

@@ -174,6 +174,20 @@ def test_frames_are_ranges_steps_and_lists(text: str, frames: list[int]) -> None
 LONG = "x" * 300
 
 
+@pytest.mark.parametrize("command", ["render", "denoise"])
+@pytest.mark.parametrize(
+    ("text", "frames"),
+    [("-1-1", [-1, 0, 1]), ("-3--1", [-3, -2, -1]), ("-2", [-2]), ("-3,-1", [-3, -1])],
+)
+@pytest.mark.parametrize("joined", [True, False])
+def test_frames_below_zero_are_a_value(
+    command: str, text: str, frames: list[int], joined: bool
+) -> None:
+    words = [command, "in", "-o", "out"]
+    words += [f"--frames={text}"] if joined else ["--frames", text]
+    assert main._parser(words).parse_args(words).frames == frames
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -7,11 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import hostile
 import numpy as np
 import OpenEXR
 import pytest
 from channels import read_channels
 
+from xrds_core import exr
 from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
 from xrds_core.exr import (
@@ -22,7 +24,7 @@ from xrds_core.exr import (
     read_guides,
     write_picture,
 )
-from xrds_core.exr.encoding import CODECS, Encoding
+from xrds_core.exr.encoding import CODECS, LARGEST_HALF, Encoding
 
 LAYOUTS = ("flat", "layered", "parts", "named parts")
 
@@ -469,3 +471,73 @@ def test_one_name_in_two_parts_is_refused(tmp_path: Path) -> None:
     named = "'View.Combined.[RGB]' twice, in its parts 'first' and 'second'"
     with pytest.raises(PictureError, match=named):
         read_beauty(path)
+
+
+@pytest.mark.parametrize("codec", ["dwaa", "dwab"])
+@pytest.mark.parametrize(
+    ("half", "light"),
+    [(True, 65504.0), (True, 1e6), (True, np.inf), (False, 65504.0), (False, 1e6)],
+)
+def test_dwa_holds_no_more_than_it_decodes(
+    path: Path, half: bool, codec: str, light: float
+) -> None:
+    """It rings around light near the largest half, and stores infinity as black."""
+    picture = np.random.default_rng(0).random((36, 64), np.float32)
+    sun = np.hypot(*np.mgrid[-10:26, -30:34]) < 6.0
+    picture[sun] = light
+    depth = np.where(sun, np.float32(1e10), picture)
+    planes = {"R": picture, "G": picture * np.float32(0.9), "B": picture, "Z": depth}
+    write_picture(path, planes, Encoding(half, codec))
+    read = exr.File(path)
+    for name in "RGB":
+        assert np.isfinite(read.pixels(name)).all()
+        assert read.pixels(name)[sun].min() > 40_000.0
+    assert half or (read.pixels("Z") == depth).all()
+
+
+@pytest.mark.parametrize("alone", [True, False])
+def test_what_dwa_overflowed_is_read_as_light_and_lost_no_further(
+    path: Path, tmp_path: Path, alone: bool
+) -> None:
+    pixels = np.random.default_rng(0).random((36, 64)).astype(np.float16)
+    pixels[4:12, 20:32] = LARGEST_HALF
+    header = {"compression": OpenEXR.DWAA_COMPRESSION, "type": OpenEXR.scanlineimage}
+    planes = {name: pixels.copy() for name in ("R", "G", "B", "x.R", "x.G", "x.B")}
+    OpenEXR.File(header, planes).write(str(path))
+    before = exr.File(path).pixels("x.R")
+    assert np.isfinite(before).all()
+    copied = tmp_path / "copy.exr"
+    exr.copy_picture(path, copied, {0: dict.fromkeys("RGB", pixels)}, alone=alone)
+    after = exr.File(copied)
+    np.testing.assert_array_equal(after.pixels("R"), pixels)
+    assert alone or (after.pixels("x.R") == before).all()
+
+
+LATIN_1 = "D:\\projets\\été.ma".encode("latin-1")
+
+
+@pytest.mark.parametrize(
+    "attribute",
+    [
+        hostile.attribute("scene", "string", LATIN_1),
+        hostile.attribute("a", "string", bytes([255] * 8)),
+        hostile.attribute("names", "stringvector", b"\2\0\0\0\xff\xfe"),
+        hostile.attribute("deepImageState", "deepImageState", b"\0"),
+        hostile.attribute("ours", "ofMyOwn", LATIN_1),
+        hostile.attribute("owner", "string", "été".encode()),
+    ],
+)
+@pytest.mark.parametrize("alone", [True, False])
+def test_any_attribute_is_carried_on_byte_for_byte(
+    path: Path, tmp_path: Path, attribute: bytes, alone: bool
+) -> None:
+    plane = np.ones((4, 5), np.float32)
+    name, rest = attribute.split(b"\0", 1)
+    for told in (attribute, b"\xe9" + name + b"\0" + rest):  # names are bytes, too
+        hostile.write_odd_exr(path, dict.fromkeys("RGB", plane), attributes=told)
+        given = path.read_bytes()
+        copied = tmp_path / "copy.exr"
+        exr.copy_picture(path, copied, {0: dict.fromkeys("RGB", plane)}, alone=alone)
+        assert told in copied.read_bytes()
+        assert path.read_bytes() == given
+        np.testing.assert_array_equal(exr.File(copied).pixels("R"), plane)

@@ -170,6 +170,28 @@ def test_pixels_without_samples_are_no_holes_in_the_frame_alone(
     assert all(np.isfinite(x[:20, :40]).all() for x in counting.pictures)
 
 
+def test_frames_of_one_seed_are_denoised_alone(
+    tmp_path: Path, denoiser: Denoiser
+) -> None:
+    """A renderer that repeats its noise gains nothing, loses nothing, and is told."""
+    noise = np.random.default_rng(7).gamma(4, 1 / 4, (*frame(1).shape, 1))
+    for number in NUMBERS:
+        clean = frame(number, noise=0.0)
+        light = (clean.radiance * noise).astype(np.float32)
+        write(tmp_path / "in", replace(clean, radiance=light))
+    said: list[str] = []
+    told = denoise(tmp_path, denoiser, say=said.append)
+    alone = denoise(tmp_path, denoiser, "alone", radius=0)
+    assert [x["temporal"]["mean_samples"] for x in told["frames"]] == [1.0] * 5
+    assert [line for line in said if "exr, " not in line] == [
+        "frames 1 and 2 hold the same noise, of which nothing can be reused: render "
+        "each frame with a seed of its own (in Blender the clock beside the seed)"
+    ]
+    for one, two in zip(told["frames"], alone["frames"], strict=True):
+        pair = (picture(Path(x["output"])) for x in (one, two))
+        np.testing.assert_array_equal(*pair)
+
+
 # --- passes and their names -----------------------------------------------------------
 
 FLAT = {"radiance": "RGB", "albedo": "albedo.RGB", "normal": "N.XYZ", "depth": "Z"}
@@ -379,6 +401,43 @@ def test_a_crop_outside_of_the_picture(shot: Path, denoiser: Denoiser) -> None:
     assert not list((shot / "out").iterdir())
 
 
+@pytest.mark.parametrize("name", ["a.{:04d}.exr", "a.{:05d}.exr"])
+def test_frames_below_zero(tmp_path: Path, denoiser: Denoiser, name: str) -> None:
+    """As C names them and as Blender does; above zero both are the same."""
+    for number in (-1, 0, 1):
+        path = write(tmp_path / "in", frame(number))
+        width = name if number < 0 else "a.{:04d}.exr"
+        path.rename(path.with_name(width.format(number)))
+    told = denoise(tmp_path, denoiser, source="in/a.####.exr")
+    lent = {x["frame"]: x["temporal"]["frames"] for x in told["frames"]}
+    assert lent == dict.fromkeys((-1, 0, 1), (-1, 0, 1))
+    assert not told["left_out"]
+
+
+def test_files_with_other_digits_are_told(shot: Path, denoiser: Denoiser) -> None:
+    (shot / "in" / "0005.exr").rename(shot / "in" / "00005.exr")
+    said: list[str] = []
+    told = denoise(shot, denoiser, say=said.append)
+    assert [x["frame"] for x in told["frames"]] == [1, 2, 3, 4]
+    assert "1 files have another number of digits" in said[0]
+    assert "00005.exr" in said[0]
+
+
+@pytest.mark.parametrize(
+    "way", ["%04d", "%d", "$F4", "$F", "*", "????", "<frame>", "<f4>", "{frame}", "@@@"]
+)
+@pytest.mark.parametrize("which", ["source", "output", "halves", "also"])
+def test_other_ways_to_write_a_frame_number_are_told(
+    shot: Path, denoiser: Denoiser, way: str, which: str
+) -> None:
+    pattern = str(shot / "in" / f"a.{way}.exr")
+    given = {"source": "in/####.exr", "output": "out/####.exr"}
+    files = Files(**{k: str(shot / v) for k, v in given.items()})
+    files = replace(files, **{which: (pattern,) if which == "also" else pattern})
+    with pytest.raises(UsageError, match=r"is written ####, not .*give a\.####\.exr$"):
+        denoise_sequence(files, denoiser)
+
+
 # --- frames that are not as they should be --------------------------------------------
 
 
@@ -500,6 +559,104 @@ def test_resume_takes_samples_that_came_late(shot: Path, denoiser: Denoiser) -> 
     told = denoise(shot, denoiser, radius=1, resume=True)
     assert [entry["frame"] for entry in told["frames"]] == [3, 4, 5]
     assert told["kept"] == [1, 2]
+
+
+def late(shot: Path) -> dict[str, Any]:
+    """A neighbour that comes with a time older than the outputs'."""
+    (shot / "held.exr").rename(shot / "in" / "0004.exr")
+    return {}
+
+
+def replaced(shot: Path) -> dict[str, Any]:
+    """Another file of the same size and time."""
+    path = shot / "in" / "0004.exr"
+    status = path.stat()
+    write(shot / "in", frame(4), header={"xrds/samples": 2})
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    return {}
+
+
+@pytest.mark.parametrize(
+    ("change", "anew"),
+    [
+        (late, [3, 4, 5]),
+        (replaced, [3, 4, 5]),
+        (lambda shot: {"radius": 0}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"reading": Reading(samples=64)}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"reading": Reading(normal_space="world")}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"to": {"picture_only": True}}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"to": {"crop": CROP}}, [1, 2, 3, 4, 5]),
+        (lambda shot: {}, []),
+    ],
+)
+def test_resume_makes_anew_what_would_differ(
+    shot: Path, denoiser: Denoiser, change: Any, anew: list[int]
+) -> None:
+    """And no more; at the end all is as a run from nothing makes it."""
+    if change is late:
+        (shot / "in" / "0004.exr").rename(shot / "held.exr")
+    denoise(shot, denoiser, radius=1)
+    more = {"radius": 1, **change(shot)}
+    said: list[str] = []
+    to = more.get("to", {})
+    told = denoise(shot, denoiser, resume=True, say=said.append, **more)
+    assert [x["frame"] for x in told["frames"]] == anew
+    line = "made anew, as they are damaged or were made with other settings"
+    assert sum(line in x for x in said) == bool(anew)
+    denoise(shot, denoiser, "nothing", **{**more, "to": to})
+    for path in (shot / "nothing").iterdir():
+        assert path.read_bytes() == (shot / "out" / path.name).read_bytes()
+
+
+def test_an_input_that_is_replaced_in_work_spoils_no_frame(
+    shot: Path, denoiser: Denoiser, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def finish(own: Any, *rest: Any, **more: Any) -> Any:
+        if own.number == 3:
+            write(shot / "in", frame(3, noise=0.7))
+        return finish_frame(own, *rest, **more)
+
+    monkeypatch.setattr("xrds_core.sequence.denoise.finish_frame", finish)
+    said: list[str] = []
+    told = denoise(shot, denoiser, say=said.append)
+    assert [x["frame"] for x in told["left_out"]] == [3]
+    assert sum("was replaced while it was in work" in x for x in said) == 1
+    assert not (shot / "out" / "0003.exr").exists()
+    monkeypatch.undo()
+    assert not denoise(shot, denoiser, resume=True)["kept"]  # all had its old samples
+
+
+def test_what_made_a_frame_stands_in_it(shot: Path, denoiser: Denoiser) -> None:
+    denoise(shot, denoiser, radius=1)
+    (told,) = exr.attributes(shot / "out" / "0003.exr")
+    told = {k: v for k, v in told.items() if k.startswith("xrds.")}
+    assert told.pop("xrds.version")
+    assert len(told.pop("xrds.made_of")) == 32
+    assert told == {
+        "xrds.mode": "denoised",
+        "xrds.preset": "fast",
+        "xrds.samples": "1",
+        "xrds.frames": "2 to 4",
+    }
+
+
+@pytest.mark.parametrize("option", ["halves", "also"])
+@pytest.mark.parametrize(
+    ("pattern", "message"),
+    [
+        ("in/0001.exr", "is one file for all frames; add ####"),
+        ("in/####.exr", "is the frame itself"),
+        ("link/####.exr", "is the frame itself"),
+    ],
+)
+def test_halves_are_other_files(
+    shot: Path, denoiser: Denoiser, option: str, pattern: str, message: str
+) -> None:
+    (shot / "link").symlink_to(shot / "in")
+    given = str(shot / pattern)
+    to = {option: (given,) if option == "also" else given}
+    with pytest.raises(UsageError, match=message):
+        denoise(shot, denoiser, to=to)
 
 
 def test_a_frame_says_how_long_the_others_will_take(

@@ -1,0 +1,155 @@
+"""The headers of an OpenEXR file, byte by byte.
+
+The library reads texts as UTF-8, and some kinds of attributes not at all, but renderers
+and grading tools write what they like. What is of a kind that it does not know it
+carries on as it is. So attributes that it refuses get another kind, of a name as long,
+in a copy that it reads, and their own again in what it has written.
+"""
+
+from __future__ import annotations
+
+import shutil
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..atomic import scratch_folder
+
+_MAGIC = 20000630
+_SEVERAL_PARTS = 0x1000
+_MOST = 64 << 20  # bytes of headers
+_TEXTS = (b"string", b"stringvector")
+_UNREAD = (b"deepImageState",)
+
+
+@dataclass(frozen=True)
+class _Attribute:
+    """An attribute, and where its name begins in the file."""
+
+    place: int
+    name: bytes
+    kind: bytes
+    value: bytes
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the library cannot read it."""
+        texts = (self.name, self.value if self.kind in _TEXTS else b"")
+        return self.kind in _UNREAD or not all(map(_is_text, texts))
+
+    @property
+    def head(self) -> bytes:
+        """Name and kind as they lie in the file."""
+        return self.name + b"\0" + self.kind + b"\0"
+
+    @property
+    def veiled(self) -> bytes:
+        """The same in as many bytes that the library reads, of a kind that it ignores.
+
+        The `place` keeps apart names that are none.
+        """
+        mark = f"{self.place:x}".encode()
+        name = self.name
+        if not _is_text(name):
+            name = mark[-len(name) :].rjust(len(name), b"_")
+        return name + b"\0" + self.kind[:-1] + self.kind[-1:].swapcase() + b"\0"
+
+
+def header_bytes(path: str | Path) -> bytes:
+    """Return the headers of a file, or its first bytes where it is damaged."""
+    data = _beginning(path)
+    try:
+        *_, last = _attributes(data)
+    except ValueError:
+        return data[:4096]
+    return data[: last.place + len(last.head) + 4 + len(last.value)]
+
+
+@contextmanager
+def readable(path: str | Path) -> Iterator[Path]:
+    """Yield a file that the library reads: the file itself but for one it refuses."""
+    refused = _refused(path)
+    if not refused:
+        yield Path(path)
+        return
+    with scratch_folder() as folder:
+        copy = folder / "readable.exr"
+        shutil.copyfile(path, copy)
+        _patch(copy, {x.place: x.veiled for x in refused})
+        yield copy
+
+
+def restore(source: str | Path, path: str | Path) -> None:
+    """Give a file that was made of a `source` its names and kinds of attributes."""
+    heads = {x.veiled: x.head for x in _refused(source)}
+    if heads:
+        found = _attributes(_beginning(path))
+        _patch(path, {x.place: heads[x.head] for x in found if x.head in heads})
+
+
+def _refused(path: str | Path) -> list[_Attribute]:
+    try:
+        return [x for x in _attributes(_beginning(path)) if x.is_refused]
+    except ValueError:  # damaged: the library says how
+        return []
+
+
+def _is_text(value: bytes) -> bool:
+    try:
+        value.decode()
+    except UnicodeDecodeError:
+        return False
+    return True
+
+
+def _patch(path: str | Path, changes: dict[int, bytes]) -> None:
+    with Path(path).open("r+b") as file:
+        for place, value in changes.items():
+            file.seek(place)
+            file.write(value)
+
+
+def _beginning(path: str | Path) -> bytes:
+    """Return so much of a file that all its headers are in it."""
+    with Path(path).open("rb") as file:
+        data = file.read(1 << 16)
+        while len(data) < _MOST and not _is_complete(data):
+            more = file.read(len(data))
+            if not more:
+                break
+            data += more
+    return data
+
+
+def _is_complete(data: bytes) -> bool:
+    try:
+        return all(True for _ in _attributes(data))
+    except ValueError:
+        return False
+
+
+def _attributes(data: bytes) -> Iterator[_Attribute]:
+    """Yield the attributes of all parts; raises ValueError where headers do not end."""
+    if len(data) < 8 or struct.unpack_from("<i", data)[0] != _MAGIC:
+        raise ValueError("no OpenEXR file")
+    has_parts = bool(struct.unpack_from("<I", data, 4)[0] & _SEVERAL_PARTS)
+    place, is_first = 8, True
+    while True:
+        if data[place : place + 1] == b"\0":  # the end of a header, or of all
+            if is_first or not has_parts:
+                return
+            place, is_first = place + 1, True
+            continue
+        end = data.index(b"\0", place)
+        kind_end = data.index(b"\0", end + 1)
+        begin = kind_end + 5
+        if begin > len(data):
+            raise ValueError("no size")
+        (size,) = struct.unpack_from("<i", data, kind_end + 1)
+        if size < 0 or begin + size > len(data):
+            raise ValueError("no value")
+        name, kind = data[place:end], data[end + 1 : kind_end]
+        yield _Attribute(place, name, kind, data[begin : begin + size])
+        place, is_first = begin + size, False
