@@ -72,7 +72,7 @@ def render_file(
     _check_libraries(request)
     numbers = _numbers(scene, frames, animation, output)
     size = picture_size(scene.render)
-    cache = sample_cache and _cache(scene, request, sample_cache)
+    cache = sample_cache and _cache(scene, request, sample_cache, numbers, choice)
 
     def is_done(number: int) -> bool:
         # checked anew for each: another render may be writing the same frames
@@ -180,14 +180,22 @@ def _check_cache(request: Request) -> None:
         )
 
 
-def _cache(scene: Any, request: Request, folder: Path) -> SampleCache:
+def _cache(
+    scene: Any,
+    request: Request,
+    folder: Path,
+    numbers: Sequence[int],
+    choice: SceneChoice,
+) -> SampleCache:
     """The cache of samples; raises UsageError where no frame could use them."""
     if not has_neighbours(scene, request):
         raise UsageError(
             "frames of such a panoramic camera cannot reuse samples: leave out "
             "--sample-cache"
         )
-    return cache_of(scene, request, folder, warn)
+    # neither changes a sample; what scripts did not run is known otherwise
+    decides = dataclasses.replace(choice, threads=None, trusted=False)
+    return cache_of(scene, request, folder, numbers, decides, warn)
 
 
 def _cache_others(

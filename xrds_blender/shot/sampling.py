@@ -126,6 +126,11 @@ class Sampling:
             self.place, self.count, self.radius, self.seed, self.most
         )
 
+    @property
+    def shared(self) -> int | None:
+        """The number of the frame's part of a sequence that others continue."""
+        return None if self.place is None else subset_at(self.place, self.radius)
+
     def other_subset(self, count: int) -> SampleSubset | None:
         """As `subset`, of `count` samples of a sequence with another seed."""
         if self.place is None:
@@ -166,6 +171,11 @@ class Sampling:
     def own_seed(self) -> int:
         """One that no other frame has."""
         return (self.seed + self.number * SEED_STEP) % _LARGEST_SEED
+
+
+def subset_at(place: int, radius: int) -> int:
+    """The number of a frame's subset, of as many as a frame has in its window."""
+    return place % (2 * radius + 1)
 
 
 def has_neighbours(scene: Any, request: Request) -> bool:
@@ -410,6 +420,7 @@ def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
         counts=counts,
         path_length=samples.path_length,
         parts=samples.parts,
+        subset=how.shared,
     )
 
 

@@ -31,10 +31,11 @@ if TYPE_CHECKING:
     from ..light_parts.find import LightPart
 
 SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
+SUBSET = "xrds/subset"
 NAME = "cameraLabel"
 """Attributes: samples per pixel; a key of what the frame was rendered from; the
 temporal radius that its sample subsets are for; 1 where nothing at all moves in the
-shot; the camera's name."""
+shot; `Frame.subset`, none of a sequence of its own; the camera's name."""
 _DEFAULT_SAMPLES = 16
 _FITS = 2.0  # pixels by which a reprojected Position pass may be off
 _NEAREST = 1e-30  # depth of a hit, in any unit: dividing by it stays within float32
@@ -75,7 +76,8 @@ class FrameFile:
     crops its arrays to the latter, `data_window`. `part` is the file's part with the
     picture and `channels` are those of the picture, R, G, B and, where the file has
     alpha, A. Frames with the same `key` have the same render settings; "" if unknown.
-    `radius` is the one that the file recommends, or None. `reusable` is False where the
+    `radius` is the one that the file recommends, or None, and `subset` that of
+    `Frame`. `reusable` is False where the
     frame cannot be reprojected. `light` are the parts of its light that were read;
     `places` says in which part of the file a channel lies, and what it is called there.
     """
@@ -88,6 +90,7 @@ class FrameFile:
     key: str
     radius: int | None
     reusable: bool
+    subset: int | None = None
     light: tuple[LightPart, ...] = ()
     places: Mapping[str, tuple[int, str]] = field(default_factory=dict)
 
@@ -117,6 +120,7 @@ def read_frame(
         depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
         samples=_samples(part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
+        counts=file.plane(found.counts[0]) if found.counts else None,
         vector=_vector(file, found, reading) if reusable else None,
         path_length=_path_length(file, found) if reusable else None,
         still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
@@ -136,6 +140,7 @@ def read_frame(
         key=str(part.attributes.get(KEY, "")),
         radius=attributes.whole_or_none(part.attributes.get(RADIUS), 0, MOST_RADIUS),
         reusable=camera is not None and depth is not None,
+        subset=attributes.whole_or_none(part.attributes.get(SUBSET)),
         light=light,
         places={
             name: _place(file, number_of_part, name)
@@ -340,10 +345,13 @@ def _noise(file: File, found: Found) -> Noise:
     return Noise(*(plane.astype(np.float16) for plane in cut))
 
 
-def _samples(part: Part, reading: Reading) -> int:
+def _samples(part: Part, reading: Reading) -> float:
     """Samples per pixel: from the options, or as XRDS or Blender wrote them."""
     if reading.samples:
         return reading.samples
+    mean = part.attributes.get(SAMPLES)
+    if isinstance(mean, float) and 1.0 <= mean <= attributes.MOST:
+        return mean
     values = [part.attributes.get(SAMPLES)]
     values += [v for k, v in part.attributes.items() if _is_cycles_samples(k)]
     counts = [attributes.whole_or_none(x, 1) for x in values]
