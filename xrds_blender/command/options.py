@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from xrds_core.light_parts.find import NONE
 from xrds_core.superres.weights_header import PRESETS
 
 from ..planning.plan import SAVINGS
-from ..planning.request import Request, render_request
+from ..planning.request import CHOICES, Request, render_request
 from ..planning.settings import QUALITIES, SCALES
 from . import arguments
 from .scene_file import SceneChoice
@@ -55,7 +56,12 @@ def add_request(command: argparse.ArgumentParser) -> None:
         help="samples up to which repeated renders improve the cached guides",
     )
     add(
-        "--skip-nothing", action="store_true", help="skip nothing that could be skipped"
+        "--skip-nothing",
+        action="store_const",
+        dest="savings",
+        const=(),
+        default=SAVINGS,
+        help="skip nothing that could be skipped",
     )
     add(
         "--seed",
@@ -64,6 +70,7 @@ def add_request(command: argparse.ArgumentParser) -> None:
     )
     add_light(command)
     add_network(command)
+    add_accumulate_on(command)
 
 
 def add_light(command: argparse.ArgumentParser) -> None:
@@ -159,6 +166,7 @@ def add_scene(command: argparse.ArgumentParser) -> None:
         "-y",
         "--enable-autoexec",
         action="store_true",
+        dest="trusted",
         help="trust the file: run its drivers and scripts",
     )
 
@@ -173,7 +181,6 @@ def add_network(command: argparse.ArgumentParser) -> None:
         help="fixed exposure factor, for animations and border renders",
     )
     add("--device", default="auto", help=DEVICE_HELP)
-    add_accumulate_on(command)
     add(
         "--threads",
         type=arguments.positive,
@@ -235,46 +242,25 @@ def encoding_of(options: argparse.Namespace) -> Encoding:
 
 def choice_of(options: argparse.Namespace) -> SceneChoice:
     """What of the file is rendered."""
-    return SceneChoice(
-        options.scene_name,
-        options.view_layer,
-        options.camera,
-        options.resolution,
-        getattr(options, "threads", None),
-        noise_threshold=getattr(options, "noise_threshold", None),
-        samples=getattr(options, "samples", None),
-        trusted=options.enable_autoexec,
-    )
+    # `scene` is the file there
+    given = _named(options, {each.name for each in fields(SceneChoice)} - {"scene"})
+    return SceneChoice(options.scene_name, **given)
 
 
 def request_of(options: argparse.Namespace) -> Request:
     """What the options of `add_request` ask for; raises UsageError."""
     _check_pace(options)
     _check_light(options)
-    return render_request(
-        scale=options.scale,
-        samples=options.samples if options.noise_threshold is None else None,
-        guide_samples=options.guide_samples,
-        preset=options.preset,
-        device=options.device,
-        exposure=options.exposure,
-        seed=options.seed,
-        plain=options.plain,
-        time_budget=options.time_budget,
-        quality=options.quality,
-        memory_limit=options.memory_limit,
-        weights=options.weights,
-        threads=options.threads,
-        denoise=options.denoise,
-        temporal_radius=_temporal_radius(options),
-        same_picture=options.same_picture,
-        deadline=options.deadline,
-        savings=() if options.skip_nothing else SAVINGS,
-        guide_cache=options.guide_cache,
-        guide_limit=options.guide_limit,
-        passes=options.passes,
-        light_aovs=options.light_aovs,
-    )
+    given = _named(options, CHOICES)
+    given["temporal_radius"] = _temporal_radius(options)
+    if options.noise_threshold is not None:  # the most, as `SceneChoice` has it
+        del given["samples"]
+    return render_request(**given)
+
+
+def _named(options: argparse.Namespace, names: Collection[str]) -> dict[str, Any]:
+    """Those options that have one of these names."""
+    return {name: value for name, value in vars(options).items() if name in names}
 
 
 def _temporal_radius(options: argparse.Namespace) -> int:
