@@ -240,6 +240,18 @@ def encoding_of(options: argparse.Namespace) -> Encoding:
     return Encoding(options.exr_depth == "half", options.exr_codec)
 
 
+_PATHS = ("out", "sample_cache", "guide_cache", "weights")
+
+
+def resolve_paths(options: argparse.Namespace) -> None:
+    """Let paths that begin with // lie beside the .blend file, as Blender has it."""
+    folder = options.scene.resolve().parent
+    for name in _PATHS:
+        value = getattr(options, name, None)
+        if value is not None and str(value).startswith("//"):
+            setattr(options, name, type(value)(folder / str(value).lstrip("/")))
+
+
 def choice_of(options: argparse.Namespace) -> SceneChoice:
     """What of the file is rendered."""
     # `scene` is the file there

@@ -11,7 +11,14 @@ from xrds_core.errors import UsageError
 from ..planning.plan import DEADLINE, GUIDE_CACHE, SAME_PICTURE
 from . import arguments
 from .deferred import need_blender
-from .options import add_output, add_request, choice_of, encoding_of, request_of
+from .options import (
+    add_output,
+    add_request,
+    choice_of,
+    encoding_of,
+    request_of,
+    resolve_paths,
+)
 
 
 def add_render(commands: Any) -> argparse.ArgumentParser:
@@ -72,6 +79,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
         raise UsageError("name the output with -o, or ask for the plan with --explain")
     from .render_file import render_file
 
+    resolve_paths(options)
     return render_file(
         options.scene,
         options.out,
@@ -91,6 +99,7 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
     from ..shot.explain import explain
     from .scene_file import open_scene
 
+    resolve_paths(options)
     request, frames = request_of(options), options.frames
     scene = open_scene(options.scene, choice_of(options))
     return explain(scene, request, frame_range(scene) if options.animation else frames)

@@ -15,6 +15,7 @@ from xrds_core.frames import frame_path, in_words
 from xrds_core.notices import warn
 from xrds_core.time_left import Clock
 
+from ..cycles.settings import subset_of_file
 from ..cycles.size import picture_size
 from ..frame import record
 from ..frame.denoisers import load_denoiser
@@ -237,7 +238,8 @@ def _write(
     """Write one frame; returns its entry for the JSON."""
     target = frame_path(output, number)
     settings = picture.settings or request.settings
-    metadata = record.metadata(record.fields(picture, settings, scene.cycles.samples))
+    _, of_file = subset_of_file(scene.cycles, scene.cycles.samples)
+    metadata = record.metadata(record.fields(picture, settings, of_file))
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated
@@ -263,7 +265,7 @@ def _write(
         "output": str(target),
         "seconds": seconds,
         "temporal": picture.temporal and dataclasses.asdict(picture.temporal),
-        "samples": settings.count(scene.cycles.samples),
+        "samples": settings.count(of_file),
         "share": settings.share,
         "peak_memory": picture.peak_memory,
     }

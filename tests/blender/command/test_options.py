@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -156,3 +157,25 @@ def test_it_changes_what_is_done(
         base = base.removesuffix(" --frames 1-3")
     more = option if is_flag else f"{option} {VALUES[option]}"
     assert outcome(f"{base} {more}", said) != outcome(base, said)
+
+
+PATHS = [
+    ("render", "--out"),
+    ("render", "--sample-cache"),
+    ("render", "--guide-cache"),
+    ("render", "--weights"),
+    ("plan", "--guide-cache"),
+    ("cameras", "--out"),
+]
+
+
+@pytest.mark.parametrize(("command", "option"), PATHS)
+def test_two_slashes_lie_beside_the_blend(
+    command: str, option: str, said: list[Any]
+) -> None:
+    """As in Blender: not in the root folder of the disk."""
+    line = f"{BASE[command]} {option} //here/x.exr".replace("a.blend", "shots/a.blend")
+    found = outcome(line, said)
+    beside = Path("shots").resolve() / "here" / "x.exr"
+    assert str(beside) in found
+    assert "//here" not in found
