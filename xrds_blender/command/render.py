@@ -106,7 +106,8 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:
-    return [f"{_decision(each)}: {each['reason']}" for each in result["decisions"]]
+    lines = [f"{_decision(each)}: {each['reason']}" for each in result["decisions"]]
+    return lines + [f"note: {line}" for line in result["remarks"]]
 
 
 def _decision(decision: dict[str, Any]) -> str:

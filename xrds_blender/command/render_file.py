@@ -24,6 +24,7 @@ from ..frame.picture import NetworkFailed, Picture
 from ..planning.request import Request
 from ..planning.settings import Mode
 from ..scene.contents import frame_range, moves_in_time
+from ..scene.remarks import missing, remarks
 from ..shot.cache import SampleCache, cache_of
 from ..shot.render import render_scene
 from ..shot.sampling import has_neighbours
@@ -72,6 +73,9 @@ def render_file(
     scene = open_scene(path, choice)
     _check_libraries(request)
     numbers = _numbers(scene, frames, animation, output)
+    notes = [*missing()] if output is None else remarks(scene, request)
+    for line in notes:
+        warn(line)
     size = picture_size(scene.render)
     cache = sample_cache and _cache(scene, request, sample_cache, numbers, choice)
 
@@ -92,6 +96,7 @@ def render_file(
         "frames": written,
         "kept": _kept(numbers, written) if output else [],
         "samples": cache and cache.report(numbers),
+        "remarks": notes,
     }
 
 

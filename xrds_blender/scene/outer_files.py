@@ -23,17 +23,19 @@ _SEQUENCES = {"SEQUENCE", "MOVIE"}  # sources of images
 _IN_MEMORY = {"GENERATED", "VIEWER"}
 _SETTINGS = ("modifiers", "particle_systems", "soft_body", "rigid_body")  # of objects
 # Particles by the thousand, and the caches of a system, which lead to each other.
+_SHIPPED = "datafiles/assets/"
 _LEFT_OUT = {"particles", "child_particles", "seed", "vertex_groups"}
 
 
 @dataclass(frozen=True)
 class OuterFile:
-    """What a data-block reads: its `owner` in words, a `path`, and the `files` of it.
+    """What a data-block reads: its `kind` and `owner` in words, a `path`, its `files`.
 
     Those of a sequence, of tiles and of a folder are many; one that is not there is
     among them where the path names it.
     """
 
+    kind: str
     owner: str
     path: Path
     files: tuple[Path, ...]
@@ -57,12 +59,12 @@ def outer_files() -> list[OuterFile]:
     ]
     known = {each.path for each in found}
     found += [
-        OuterFile("the file", path, _files(path))
+        OuterFile("", "the file", path, _files(path))
         for path in map(Path, bpy.utils.blend_paths(absolute=True))
         if path not in known and path.exists()
     ]
-    shipped = Path(bpy.utils.resource_path("LOCAL"))  # assets, of Blender's version
-    found = [each for each in found if not each.path.is_relative_to(shipped)]
+    # Blender's own assets, of its version
+    found = [each for each in found if _SHIPPED not in each.path.as_posix()]
     return sorted(found, key=lambda each: (str(each.path), each.owner))
 
 
@@ -78,14 +80,12 @@ def _is_inside(item: Any) -> bool:
 
 
 def _of(item: Any) -> Iterator[OuterFile]:
-    import bpy
-
     kind = item.bl_rna.name.lower()
     owner = f"{kind} {item.name!r}"
     for text in dict.fromkeys(_paths_in(item)):
-        path = Path(bpy.path.abspath(text, library=item.library))
+        path = _place(item, text)
         if not text.startswith("<") and not _is_around(path):
-            yield OuterFile(owner, path, _files(path, item))
+            yield OuterFile(kind, owner, path, _files(path, item))
 
 
 def _files(path: Path, item: Any = None) -> tuple[Path, ...]:
@@ -150,8 +150,11 @@ def _inner(struct: Any, seen: set[tuple[type, int]]) -> Iterator[str]:
 
 
 def _is_in_flux(struct: Any) -> bool:
-    """Whether a simulation writes its files as it goes: it was not baked."""
-    return getattr(struct, "cache_type", "") == "REPLAY"
+    """Whether a path is one to write to, as of a simulation that was not baked."""
+    if getattr(struct, "type", "") == "OCEAN" and not struct.is_cached:
+        return True
+    is_output = type(struct).__name__ == "DynamicPaintSurface"
+    return is_output or getattr(struct, "cache_type", "") == "REPLAY"
 
 
 def _texts(struct: Any) -> Iterator[str]:
@@ -160,7 +163,11 @@ def _texts(struct: Any) -> Iterator[str]:
 
     for each in struct.bl_rna.properties:
         if each.type == "STRING" and each.subtype in _PATHS:
-            yield from filter(None, [getattr(struct, each.identifier)])
+            text = getattr(struct, each.identifier)
+            # one that is not there was not baked
+            is_folder = each.subtype == "DIR_PATH"
+            if text and not (is_folder and not _place(struct, text).is_dir()):
+                yield text
     if _is_disk_cache(struct):
         blend = Path(bpy.data.filepath)
         yield str(blend.with_name(f"blendcache_{blend.stem}"))
@@ -173,9 +180,15 @@ def _texts(struct: Any) -> Iterator[str]:
     yield from (
         text
         for text in texts
-        if {"/", "\\"} & {*text}
-        and Path(bpy.path.abspath(text, library=struct.id_data.library)).is_file()
+        if {"/", "\\"} & {*text} and _place(struct, text).is_file()
     )
+
+
+def _place(struct: Any, text: str) -> Path:
+    import bpy
+
+    library = getattr(struct.id_data, "library", None)
+    return Path(bpy.path.abspath(text, library=library))
 
 
 def _is_disk_cache(struct: Any) -> bool:

@@ -14,6 +14,7 @@ from ..planning.plan import deadline, neighbours, same_picture
 from ..planning.request import Request
 from ..scene.contents import frame_range
 from ..scene.cuts import cuts
+from ..scene.remarks import remarks
 from .pace.same_picture import can_save
 from .sampling import has_neighbours
 
@@ -53,4 +54,8 @@ def _described(
     if request.deadline is not None:
         decisions += (deadline(request.deadline, len(shot)),)
     decisions = choice.all_decisions(decisions)
-    return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}
+    return {
+        "facts": asdict(facts),
+        "decisions": [asdict(each) for each in decisions],
+        "remarks": remarks(scene, request),
+    }
