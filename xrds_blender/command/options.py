@@ -21,6 +21,10 @@ from . import arguments
 from .scene_file import SceneChoice
 
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, metal"
+_RENDER_DEVICE_HELP = (
+    "where the picture is denoised, and above scale 1 the network runs: auto, cpu, "
+    "cuda, cuda:1, metal; Cycles renders where the file says"
+)
 
 
 def add_request(command: argparse.ArgumentParser) -> None:
@@ -69,7 +73,7 @@ def add_request(command: argparse.ArgumentParser) -> None:
         help="seed of Cycles' noise, in place of the file's",
     )
     add_light(command)
-    add_network(command)
+    add_network(command, _RENDER_DEVICE_HELP)
     add_accumulate_on(command)
 
 
@@ -124,8 +128,8 @@ def _add_samples(command: argparse.ArgumentParser) -> None:
     add(
         "--samples",
         type=arguments.positive,
-        help="samples per pixel of the low-resolution render, or at scale 1, in place "
-        "of the file's; without its noise threshold and its time limit",
+        help="samples per pixel, in place of the file's, without its noise threshold "
+        "and its time limit; above scale 1, of the low-resolution render",
     )
     add(
         "--noise-threshold",
@@ -171,7 +175,9 @@ def add_scene(command: argparse.ArgumentParser) -> None:
     )
 
 
-def add_network(command: argparse.ArgumentParser) -> None:
+def add_network(
+    command: argparse.ArgumentParser, device_help: str = DEVICE_HELP
+) -> None:
     """Add what chooses a network and how it runs."""
     add = command.add_argument
     add("--preset", choices=PRESETS, default="fast", help="the network (default: fast)")
@@ -180,7 +186,7 @@ def add_network(command: argparse.ArgumentParser) -> None:
         type=arguments.factor,
         help="fixed exposure factor, for animations and border renders",
     )
-    add("--device", default="auto", help=DEVICE_HELP)
+    add("--device", default="auto", help=device_help)
     add(
         "--threads",
         type=arguments.positive,

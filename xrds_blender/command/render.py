@@ -66,7 +66,7 @@ def _add_frames(command: argparse.ArgumentParser) -> None:
         help="such as 1-24, 1-100x4 (every fourth) or 1-24,30",
         metavar="A-B",
     )
-    which.add_argument(
+    command.add_argument(
         "-a", "--animation", action="store_true", help="the frame range of the file"
     )
 
@@ -95,14 +95,13 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("plan")
-    from ..scene.contents import frame_range
     from ..shot.explain import explain
-    from .scene_file import open_scene
+    from .scene_file import frames_of, open_scene
 
     resolve_paths(options)
     request, frames = request_of(options), options.frames
     scene = open_scene(options.scene, choice_of(options))
-    return explain(scene, request, frame_range(scene) if options.animation else frames)
+    return explain(scene, request, frames_of(scene, frames, options.animation))
 
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:

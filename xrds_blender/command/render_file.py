@@ -11,8 +11,9 @@ from typing import Any
 
 from xrds_core.errors import PictureError, UsageError, XRDSError
 from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
+from xrds_core.files import check_folder
 from xrds_core.frames import frame_path, in_words
-from xrds_core.notices import warn
+from xrds_core.notices import finished, warn
 from xrds_core.time_left import Clock
 
 from ..cycles.settings import subset_of_file
@@ -30,7 +31,7 @@ from ..shot.render import render_scene
 from ..shot.sampling import has_neighbours
 from ..shot.shot import cache_samples, render_shot
 from . import picture_file
-from .scene_file import AS_SAVED, SceneChoice, open_scene
+from .scene_file import AS_SAVED, SceneChoice, frames_of, open_scene
 from .whole_file import is_whole
 
 
@@ -71,11 +72,9 @@ def render_file(
     if output is not None:
         picture_file.check_output(output, frames or [0], has_passes=bool(request.light))
     scene = open_scene(path, choice)
-    _check_libraries(request)
+    _check_parts(request)
     numbers = _numbers(scene, frames, animation, output)
-    notes = [*missing()] if output is None else remarks(scene, request)
-    for line in notes:
-        warn(line)
+    notes = _notes(scene, request, output)
     size = picture_size(scene.render)
     cache = sample_cache and _cache(scene, request, sample_cache, numbers, choice)
 
@@ -87,6 +86,7 @@ def render_file(
     if output is not None:
         for number, last in _pictures(scene, request, output, numbers, is_done, cache):
             written.append(_write(scene, output, number, last, request, encoding))
+            finished.append(written[-1])
     if cache:
         _cache_others(scene, request, numbers, cache)
     return {
@@ -100,6 +100,14 @@ def render_file(
     }
 
 
+def _notes(scene: Any, request: Request, output: str | None) -> list[str]:
+    """Print and return what the pictures, or the samples alone, will lack."""
+    notes = [*missing()] if output is None else remarks(scene, request)
+    for line in notes:
+        warn(line)
+    return notes
+
+
 def _kept(numbers: Sequence[int], written: Sequence[dict[str, Any]]) -> list[int]:
     """Numbers of the frames that were there already."""
     rendered = {entry["frame"] for entry in written}
@@ -111,12 +119,10 @@ def _numbers(
 ) -> list[int]:
     """Numbers of the frames to render; says so where the file holds more."""
     there = frame_range(scene)
-    if frames:
-        return list(frames)
-    if animation:
-        if output is not None:
+    if chosen := frames_of(scene, frames, animation):
+        if animation and output is not None:
             picture_file.check_output(output, there)
-        return there
+        return chosen
     current = scene.frame_current
     if len(there) > 1 and moves_in_time(scene):
         warn(
@@ -137,9 +143,11 @@ def _described(last: Picture | None, request: Request) -> dict[str, Any]:
     }
 
 
-def _check_libraries(request: Request) -> None:
+def _check_parts(request: Request) -> None:
     """Raise XRDSError now rather than after the Cycles renders."""
     settings, machine = request.settings, request.machine
+    if request.guide_cache is not None:
+        check_folder(Path(request.guide_cache))
     if request.goal is not None:
         is_ready()  # PyTorch is loaded before the budget begins
     elif settings.is_enlarged:
