@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import UsageError
+from xrds_core.time_left import duration
 
 from ..planning.plan import DEADLINE, GUIDE_CACHE, SAME_PICTURE
+from ..planning.settings import counted
 from . import arguments
 from .deferred import need_blender
 from .options import (
@@ -106,7 +108,17 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:
     lines = [f"{_decision(each)}: {each['reason']}" for each in result["decisions"]]
-    return lines + [f"note: {line}" for line in result["remarks"]]
+    return [_expected(result), *lines, *(f"note: {x}" for x in result["remarks"])]
+
+
+def _expected(plan: dict[str, Any]) -> str:
+    """Frames, memory and seconds in a line."""
+    memory, seconds = plan["memory"], plan["seconds"]
+    window = f", {memory / 1e6:.0f} MB for neighbours beside Cycles" if memory else ""
+    time = "seconds are known after a first render, or give --time-budget or --deadline"
+    if seconds is not None:
+        time = f"about {duration(seconds)} each"
+    return f"{counted(plan['frames'], 'frame')}{window}; {time}"
 
 
 def _decision(decision: dict[str, Any]) -> str:

@@ -64,8 +64,7 @@ def render_file(
     Raises:
         UsageError, SceneError, PictureError, WeightsError: before anything is
             rendered, if it could not succeed. Later: PictureError for a frame that
-            cannot be written, NetworkFailed; both name the file that holds what was
-            rendered, and the frames before are complete.
+            cannot be written, NetworkFailed; both name the file with what there is.
     """
     if sample_cache is not None:
         _check_cache(request)
@@ -78,15 +77,13 @@ def render_file(
     size = picture_size(scene.render)
     cache = sample_cache and _cache(scene, request, sample_cache, numbers, choice)
 
-    def is_done(number: int) -> bool:
-        # checked anew for each: another render may be writing the same frames
+    def is_done(number: int) -> bool:  # anew: others may be writing the same frames
         return resume and is_whole(frame_path(str(output), number), size)
 
     written, last = [], None
     if output is not None:
         for number, last in _pictures(scene, request, output, numbers, is_done, cache):
             written.append(_write(scene, output, number, last, request, encoding))
-            finished.append(written[-1])
     if cache:
         _cache_others(scene, request, numbers, cache)
     return {
@@ -273,7 +270,7 @@ def _write(
     seconds = dict(picture.seconds)
     seconds["write"] += written
     seconds["total"] += written
-    return {
+    entry = {
         "frame": number,
         "output": str(target),
         "seconds": seconds,
@@ -282,6 +279,8 @@ def _write(
         "share": settings.share,
         "peak_memory": picture.peak_memory,
     }
+    finished.append(entry)
+    return entry
 
 
 def _suffix(scene: Any, view: str) -> str:

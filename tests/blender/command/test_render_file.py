@@ -186,6 +186,19 @@ def test_refusals_come_before_rendering(
     assert not (folder / "a.exr").exists()
 
 
+@pytest.mark.parametrize(("more", "seconds"), [("", None), (" --deadline 30s", 10.0)])
+def test_a_plan_tells_frames_memory_and_seconds(
+    folder: Path, more: str, seconds: float | None, capfd: pytest.CaptureFixture[str]
+) -> None:
+    words = f"plan {folder}/scene.blend --frames 1-3{more}"
+    assert main.main([*words.split(), "--json"]) == 0
+    told = json.loads(capfd.readouterr().out)
+    assert (told["frames"], told["seconds"]) == (3, seconds)
+    assert told["memory"] > 9 * 62 * 40 * 30
+    assert main.main(words.split()) == 0
+    assert "3 frames, 2 MB for neighbours" in capfd.readouterr().out
+
+
 def test_a_marker_may_bind_the_only_camera(
     folder: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
