@@ -10,7 +10,9 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import pytest
 from flamenco import compile_job
@@ -54,6 +56,37 @@ def test_the_check_asks_xrds_for_what_there_is() -> None:
     assert asked
     for each in asked:
         assert callable(getattr(module, each))
+
+
+def test_progress_counts_frames_ahead(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Frames are sampled before their turn; it never falls, and ends at 100."""
+    yaml = pytest.importorskip("yaml")
+    bpy = MagicMock()
+    scene, handlers = bpy.context.scene, bpy.app.handlers
+    scene.render.engine, handlers.render_write, handlers.render_stats = "XRDS", [], []
+    now = ""
+    stages = SimpleNamespace(stages=SimpleNamespace(current=lambda: now))
+    monkeypatch.setitem(sys.modules, "bpy", bpy)
+    monkeypatch.setitem(sys.modules, "xrds_blender.frame", stages)
+    files = yaml.safe_load(TEMPLATE.read_text("utf-8"))["steps"][0]["script"]
+    code = files["embeddedFiles"][0]["data"].replace("{{Task.Param.Frame}}", "11-14")
+    exec(code, {})  # noqa: S102  # the template is ours
+    sampled = [(11, 12, 13), (14,), (), ()]
+    for frames in sampled:
+        for frame in frames:
+            now = f"XRDS 1/2: Samples of frame {frame}"
+            for sample in (1, 2, 1, 2):  # two halves
+                handlers.render_stats[0](f"Sample {sample}/2")
+        now = "XRDS 2/2: Denoising"
+        handlers.render_stats[0]("")
+        handlers.render_write[0]()
+    out = capsys.readouterr().out
+    told = [float(x) for x in re.findall(r"openjd_progress: ([\d.]+)", out)]
+    assert told == sorted(told)
+    assert told[5] == 60.0  # three of four are sampled, none is finished
+    assert told[-1] == 100.0
 
 
 RENDER_JOB = {

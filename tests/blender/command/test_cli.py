@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -101,6 +102,35 @@ def test_wrong_usage_is_2(words: list[str], capfd: pytest.CaptureFixture[str]) -
 def test_help_is_0(capfd: pytest.CaptureFixture[str]) -> None:
     assert main.main(["render", "--help"]) == 0
     assert "--guide-samples" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("command", main.EXAMPLES)
+def test_help_has_examples_and_statuses(
+    command: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert main.main([command, "--help"]) == 0
+    out = capfd.readouterr().out
+    assert "exit status: 0 done, 1 failed, 2 wrong usage, 130 interrupted" in out
+    assert "docs/farms.md" in out
+    first, second = main.EXAMPLES[command]
+    for line in (first, second):
+        assert line in out
+        words = shlex.split(line)[1:]
+        assert main._parser(words).parse_args(words).command == command
+
+
+def test_a_failed_command_lists_what_is_finished(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(console, "finished_frames", [{"frame": 1, "output": "1.exr"}])
+
+    def stop() -> None:
+        raise KeyboardInterrupt
+
+    assert console.status_with_json(stop) == console.INTERRUPTED
+    told = json.loads(capfd.readouterr().out)
+    frames = [{"frame": 1, "output": "1.exr"}]
+    assert told == {"error": "interrupted", "status": 130, "frames": frames}
 
 
 def test_the_version_is_told(capfd: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,7 @@ from xrds_blender.command import main
 from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
+from xrds_blender.shot import sampling
 from xrds_blender.shot.pace import deadline as deadline_module
 from xrds_blender.shot.pace.deadline import Deadline
 from xrds_blender.shot.sampling import Sampled
@@ -170,6 +171,25 @@ def test_the_command_and_the_engine_keep_it(blend: Path) -> None:
     bpy.ops.render.render(animation=True)
     assert scene.cycles.samples == own
     assert len(list((blend.parent / "engine").iterdir())) == len(numbers)
+
+
+@pytest.mark.parametrize(("frames", "radius"), [([1], RADIUS), ([1, 2], 0)])
+def test_it_is_kept_without_neighbours(
+    blend: Path, frames: list[int], radius: int
+) -> None:
+    request = render_request(1, temporal_radius=radius, deadline=1.0)
+    done = render_file(blend, str(blend.parent / "#.exr"), request, frames=frames)
+    assert [each["frame"] for each in done["frames"]] == frames
+
+
+def test_it_is_kept_without_halves(
+    blend: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a Blender before 4.4: each try is one render of a shot's frame."""
+    monkeypatch.setattr(sampling, "has_subsets", lambda _: False)
+    request = render_request(1, temporal_radius=RADIUS, deadline=1.0)
+    done = render_file(blend, str(blend.parent / "#.exr"), request, frames=[1, 2])
+    assert [each["frame"] for each in done["frames"]] == [1, 2]
 
 
 @pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--time-budget 3"])
