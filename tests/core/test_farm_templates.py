@@ -72,6 +72,7 @@ def test_progress_counts_frames_ahead(
     monkeypatch.setitem(sys.modules, "xrds_blender.frame", stages)
     files = yaml.safe_load(TEMPLATE.read_text("utf-8"))["steps"][0]["script"]
     code = files["embeddedFiles"][0]["data"].replace("{{Task.Param.Frame}}", "11-14")
+    bpy.ops.render.render = lambda animation: {"FINISHED"}
     exec(code, {})  # noqa: S102  # the template is ours
     sampled = [(11, 12, 13), (14,), (), ()]
     for frames in sampled:
@@ -241,15 +242,26 @@ def test_an_open_job_shot_runs_in_chunks(tmp_path: Path) -> None:
     assert asked[2].source == f"{tmp_path}/samples/####.exr"
 
 
-def test_an_open_job_renders_chunks_as_animations(tmp_path: Path) -> None:
-    """Its check, run with a stand-in for bpy, sets the frames that `-a` renders."""
+@pytest.mark.parametrize(
+    ("frames", "chunk", "animations"),
+    [
+        ("8-12", 3, ["8 10 1", "11 12 1"]),
+        ("1-10:2", 24, ["1 9 2"]),
+        ("1-10:2", 3, ["1 5 2", "7 9 2"]),
+        ("1-3,7-9", 24, ["1 3 1", "7 9 1"]),
+        ("-2-1", 24, ["-2 1 1"]),
+    ],
+)
+def test_an_open_job_renders_chunks_as_animations(
+    frames: str, chunk: int, animations: list[str], tmp_path: Path
+) -> None:
+    """Its script, run with a stand-in for bpy that notes each animation."""
     pytest.importorskip("openjd.cli")
     worker = tmp_path / "blender.sh"
     worker.write_text(
         "#!/bin/bash\n"
         f'while [ "$1" != --python ]; do shift; done\n'
-        f"{sys.executable} {tmp_path}/stand_in.py $2 >> {tmp_path}/frames\n"
-        '[[ "$*" == *--render-anim ]]\n'
+        f"{sys.executable} {tmp_path}/stand_in.py $2 >> {tmp_path}/animations\n"
     )
     worker.chmod(0o755)
     (tmp_path / "stand_in.py").write_text(
@@ -258,13 +270,16 @@ def test_an_open_job_renders_chunks_as_animations(tmp_path: Path) -> None:
         "bpy = sys.modules['bpy'] = MagicMock()\n"
         "scene = bpy.context.scene\n"
         "scene.render.engine = 'XRDS'\n"
+        "def render(animation):\n"
+        "    print(scene.frame_start, scene.frame_end, scene.frame_step)\n"
+        "    return {'FINISHED'}\n"
+        "bpy.ops.render.render = render\n"
         "runpy.run_path(sys.argv[1])\n"
-        "print(scene.frame_start, scene.frame_end, scene.frame_step)\n"
     )
     told = {
         "BlendFile": tmp_path / "a.blend",
-        "Frames": "8-12",
-        "ChunkSize": 3,
+        "Frames": frames,
+        "ChunkSize": chunk,
         "OutputFolder": tmp_path / "out",
         "Blender": worker,
     }
@@ -276,7 +291,7 @@ def test_an_open_job_renders_chunks_as_animations(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    assert (tmp_path / "frames").read_text().splitlines() == ["8 10 1", "11 12 1"]
+    assert (tmp_path / "animations").read_text().splitlines() == animations
 
 
 # --- Deadline -------------------------------------------------------------------------

@@ -35,6 +35,8 @@ from xrds_lab.bench.stages import PLAIN_FRAME, STAGES
 from xrds_lab.bench.sweep import Sweep
 from xrds_lab.bench.windows import find_shots
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SWEEP = Sweep(
     (Network("fast", 4),),
     plain_samples=(1, 2),

@@ -38,6 +38,8 @@ from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
 from xrds_lab.shots.frames import MIDDLE, ShotFrames, requests
 from xrds_lab.shots.seeds import over_seeds
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SIZE = (48, 36)
 WINDOW = Window(*SIZE, 0, 0, *SIZE)
 

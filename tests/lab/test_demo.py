@@ -19,6 +19,8 @@ from xrds_lab.demo.countdown import Countdown
 from xrds_lab.demo.scene import MIDDLE, PIVOT, SHOT, TURN, build, orbit
 from xrds_lab.shots import film
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 TOP = comparison.HEADING + comparison.LABEL
 
 

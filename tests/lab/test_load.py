@@ -20,6 +20,8 @@ from xrds_core.superres.network import XRDS, preset_config
 from xrds_lab.stability import load
 from xrds_lab.stability.load import FrameLoad, drive, growth, settled
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 FRAMES = 24
 
 

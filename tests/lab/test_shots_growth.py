@@ -18,6 +18,8 @@ from xrds_lab.shots import growth
 from xrds_lab.shots.growth import COUNTS, RADII, Run, bench_growth
 from xrds_lab.shots.synthetic import SAMPLES, frame
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SIZES = ((32, 18), (64, 36))
 
 

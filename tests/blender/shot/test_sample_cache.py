@@ -88,6 +88,7 @@ def same(one: Path, two: Path) -> bool:
     )
 
 
+@pytest.mark.nightly
 def test_parts_of_a_shot_make_the_whole(
     blend: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
