@@ -25,7 +25,7 @@ _UNREAD = (b"deepImageState",)
 
 
 @dataclass(frozen=True)
-class _Attribute:
+class Attribute:
     """An attribute, and where its name begins in the file."""
 
     place: int
@@ -61,7 +61,7 @@ def header_bytes(path: str | Path) -> bytes:
     """Return the headers of a file, or its first bytes where it is damaged."""
     data = _beginning(path)
     try:
-        *_, last = _attributes(data)
+        *_, last = attributes_in(data)
     except ValueError:
         return data[:4096]
     return data[: last.place + len(last.head) + 4 + len(last.value)]
@@ -85,13 +85,13 @@ def restore(source: str | Path, path: str | Path) -> None:
     """Give a file that was made of a `source` its names and kinds of attributes."""
     heads = {x.veiled: x.head for x in _refused(source)}
     if heads:
-        found = _attributes(_beginning(path))
+        found = attributes_in(_beginning(path))
         _patch(path, {x.place: heads[x.head] for x in found if x.head in heads})
 
 
-def _refused(path: str | Path) -> list[_Attribute]:
+def _refused(path: str | Path) -> list[Attribute]:
     try:
-        return [x for x in _attributes(_beginning(path)) if x.is_refused]
+        return [x for x in attributes_in(_beginning(path)) if x.is_refused]
     except ValueError:  # damaged: the library says how
         return []
 
@@ -125,12 +125,12 @@ def _beginning(path: str | Path) -> bytes:
 
 def _is_complete(data: bytes) -> bool:
     try:
-        return all(True for _ in _attributes(data))
+        return all(True for _ in attributes_in(data))
     except ValueError:
         return False
 
 
-def _attributes(data: bytes) -> Iterator[_Attribute]:
+def attributes_in(data: bytes) -> Iterator[Attribute]:
     """Yield the attributes of all parts; raises ValueError where headers do not end."""
     if len(data) < 8 or struct.unpack_from("<i", data)[0] != _MAGIC:
         raise ValueError("no OpenEXR file")
@@ -151,5 +151,5 @@ def _attributes(data: bytes) -> Iterator[_Attribute]:
         if size < 0 or begin + size > len(data):
             raise ValueError("no value")
         name, kind = data[place:end], data[end + 1 : kind_end]
-        yield _Attribute(place, name, kind, data[begin : begin + size])
+        yield Attribute(place, name, kind, data[begin : begin + size])
         place, is_first = begin + size, False
