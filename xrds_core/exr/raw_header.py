@@ -1,13 +1,14 @@
 """The headers of an OpenEXR file, byte by byte.
 
-The library reads texts as UTF-8, and some kinds of attributes not at all, but renderers
-and grading tools write what they like. What is of a kind that it does not know it
-carries on as it is. So attributes that it refuses get another kind, of a name as long,
-in a copy that it reads, and their own again in what it has written.
+The library reads texts as UTF-8, and refuses, drops or changes what it finds wrong, but
+renderers and grading tools write what they like. What is of a kind that it does not
+know it carries on as it is. So attributes that it would not give back get another kind,
+of a name as long, in a copy that it reads, and their own again in what it has written.
 """
 
 from __future__ import annotations
 
+import math
 import shutil
 import struct
 from collections.abc import Iterator
@@ -15,13 +16,36 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from ..atomic import scratch_folder
 
 _MAGIC = 20000630
 _SEVERAL_PARTS = 0x1000
 _MOST = 64 << 20  # bytes of headers
-_TEXTS = (b"string", b"stringvector")
-_UNREAD = (b"deepImageState",)
+_NEEDED = frozenset(
+    b"channels chunkCount compression dataWindow displayWindow lineOrder name "
+    b"pixelAspectRatio screenWindowCenter screenWindowWidth tiles type version".split()
+)
+"""Attributes without which the library reads no file."""
+_UNSAFE = frozenset(
+    b"bytes chlist compression deepImageState envmap idmanifest keycode lineOrder "
+    b"preview tiledesc".split()
+)
+"""Kinds that it refuses or changes wherever it finds a value impossible."""
+_SIZES = {
+    **dict.fromkeys((b"float", b"int"), 4),
+    **dict.fromkeys((b"double", b"timecode", b"v2f", b"v2i"), 8),
+    **dict.fromkeys((b"v3f", b"v3i"), 12),
+    **dict.fromkeys((b"box2f", b"box2i", b"v2d"), 16),
+    b"v3d": 24,
+    b"chromaticities": 32,
+    b"m33f": 36,
+    b"m44f": 64,
+    b"m33d": 72,
+    b"m44d": 128,
+}
+_OF_FLOATS = (b"chromaticities", b"float", b"floatvector", b"m33f", b"m44f")
 
 
 @dataclass(frozen=True)
@@ -35,9 +59,12 @@ class Attribute:
 
     @property
     def is_refused(self) -> bool:
-        """Whether the library cannot read it."""
-        texts = (self.name, self.value if self.kind in _TEXTS else b"")
-        return self.kind in _UNREAD or not all(map(_is_text, texts))
+        """Whether the library cannot read it, or would give back another."""
+        if not _is_text(self.name) or not _is_text(self.kind):
+            return True
+        if self.name in _NEEDED:
+            return self.kind == b"string" and not _is_text(self.value)
+        return not _is_carried(self.kind, self.value)
 
     @property
     def head(self) -> bytes:
@@ -51,10 +78,12 @@ class Attribute:
         The `place` keeps apart names that are none.
         """
         mark = f"{self.place:x}".encode()
-        name = self.name
+        name, kind = self.name, self.kind[:-1] + self.kind[-1:].swapcase()
         if not _is_text(name):
             name = mark[-len(name) :].rjust(len(name), b"_")
-        return name + b"\0" + self.kind[:-1] + self.kind[-1:].swapcase() + b"\0"
+        if not _is_text(kind):
+            kind = b"_" * len(kind)
+        return name + b"\0" + kind + b"\0"
 
 
 def header_bytes(path: str | Path) -> bytes:
@@ -94,6 +123,45 @@ def _refused(path: str | Path) -> list[Attribute]:
         return [x for x in attributes_in(_beginning(path)) if x.is_refused]
     except ValueError:  # damaged: the library says how
         return []
+
+
+def _is_carried(kind: bytes, value: bytes) -> bool:
+    """Whether the library gives back a value of a kind bit by bit."""
+    if kind in _UNSAFE or len(value) != _SIZES.get(kind, len(value)):
+        return False
+    if kind in _OF_FLOATS and not _are_floats(value):
+        return False
+    check = {b"string": _is_text, b"stringvector": _are_texts, b"rational": _is_reduced}
+    return kind not in check or check[kind](value)
+
+
+def _are_floats(value: bytes) -> bool:
+    """Whether they are some, and none is a NaN that another number format changes."""
+    if not value or len(value) % 4:
+        return False
+    bits = np.frombuffer(value, "<u4")
+    is_signal = (bits & 0x7FC00000 == 0x7F800000) & (bits & 0x3FFFFF != 0)
+    return not is_signal.any()
+
+
+def _are_texts(value: bytes) -> bool:
+    """Whether they are texts, each behind its length, and at least one."""
+    place = 0
+    while place + 4 <= len(value):
+        (size,) = struct.unpack_from("<i", value, place)
+        text = value[place + 4 : place + 4 + max(size, 0)]
+        if len(text) != size or not _is_text(text):
+            return False
+        place += 4 + size
+    return place == len(value) > 0
+
+
+def _is_reduced(value: bytes) -> bool:
+    """Whether a fraction is in lowest terms, as the library writes it."""
+    if len(value) != 8:
+        return False
+    above, below = struct.unpack("<iI", value)
+    return math.gcd(above, below) == 1 and 0 < below < 1 << 31
 
 
 def _is_text(value: bytes) -> bool:

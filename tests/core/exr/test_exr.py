@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import subprocess
 import sys
 from dataclasses import replace
@@ -525,6 +526,20 @@ LATIN_1 = "D:\\projets\\été.ma".encode("latin-1")
         hostile.attribute("deepImageState", "deepImageState", b"\0"),
         hostile.attribute("ours", "ofMyOwn", LATIN_1),
         hostile.attribute("owner", "string", "été".encode()),
+        hostile.attribute("framesPerSecond", "rational", struct.pack("<iI", 48, 2)),
+        hostile.attribute("framesPerSecond", "rational", bytes(8)),
+        hostile.attribute("keyCode", "keycode", b"\xff" * 28),
+        hostile.attribute("envmap", "envmap", b"\x09"),
+        hostile.attribute("multiView", "stringvector", b""),
+        hostile.attribute("a", "stringvector", b"\4\0\0\0ab"),
+        hostile.attribute("a", "floatvector", b""),
+        hostile.attribute("a", "int", b"\1\2\3"),
+        hostile.attribute("a", "m33f", b"\1\0\xa0\x7f" * 9),  # a signalling NaN
+        hostile.attribute("a", "preview", b"\2\0\0\0\2\0\0\0ab"),
+        hostile.attribute("a", "tiledesc", b"\0" * 9),
+        hostile.attribute("a", "chlist", b"ab"),
+        hostile.attribute("a", "bytes", b"ab"),
+        b"a\0k\xe9\0\2\0\0\0ab",
     ],
 )
 @pytest.mark.parametrize("alone", [True, False])
