@@ -50,17 +50,21 @@ _OF_FLOATS = (b"chromaticities", b"float", b"floatvector", b"m33f", b"m44f")
 
 @dataclass(frozen=True)
 class Attribute:
-    """An attribute, and where its name begins in the file."""
+    """An attribute, and where its name begins in the file.
+
+    `is_repeated`: an earlier one of the part has its name, which the library mixes up.
+    """
 
     place: int
     name: bytes
     kind: bytes
     value: bytes
+    is_repeated: bool = False
 
     @property
     def is_refused(self) -> bool:
         """Whether the library cannot read it, or would give back another."""
-        if not _is_text(self.name) or not _is_text(self.kind):
+        if self.is_repeated or not _is_text(self.name + self.kind):
             return True
         if self.name in _NEEDED:
             return self.kind == b"string" and not _is_text(self.value)
@@ -79,7 +83,7 @@ class Attribute:
         """
         mark = f"{self.place:x}".encode()
         name, kind = self.name, self.kind[:-1] + self.kind[-1:].swapcase()
-        if not _is_text(name):
+        if self.is_repeated or not _is_text(name):
             name = mark[-len(name) :].rjust(len(name), b"_")
         if not _is_text(kind):
             kind = b"_" * len(kind)
@@ -203,12 +207,12 @@ def attributes_in(data: bytes) -> Iterator[Attribute]:
     if len(data) < 8 or struct.unpack_from("<i", data)[0] != _MAGIC:
         raise ValueError("no OpenEXR file")
     has_parts = bool(struct.unpack_from("<I", data, 4)[0] & _SEVERAL_PARTS)
-    place, is_first = 8, True
+    place, names = 8, set[bytes]()
     while True:
         if data[place : place + 1] == b"\0":  # the end of a header, or of all
-            if is_first or not has_parts:
+            if not names or not has_parts:
                 return
-            place, is_first = place + 1, True
+            place, names = place + 1, set()
             continue
         end = data.index(b"\0", place)
         kind_end = data.index(b"\0", end + 1)
@@ -219,5 +223,7 @@ def attributes_in(data: bytes) -> Iterator[Attribute]:
         if size < 0 or begin + size > len(data):
             raise ValueError("no value")
         name, kind = data[place:end], data[end + 1 : kind_end]
-        yield Attribute(place, name, kind, data[begin : begin + size])
-        place, is_first = begin + size, False
+        value = data[begin : begin + size]
+        yield Attribute(place, name, kind, value, name in names)
+        place = begin + size
+        names.add(name)

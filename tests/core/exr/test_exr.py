@@ -540,6 +540,8 @@ LATIN_1 = "D:\\projets\\été.ma".encode("latin-1")
         hostile.attribute("a", "chlist", b"ab"),
         hostile.attribute("a", "bytes", b"ab"),
         b"a\0k\xe9\0\2\0\0\0ab",
+        hostile.attribute("a", "v3d", bytes(24))
+        + hostile.attribute("a", "int", b"abcd"),
     ],
 )
 @pytest.mark.parametrize("alone", [True, False])
