@@ -540,8 +540,6 @@ LATIN_1 = "D:\\projets\\été.ma".encode("latin-1")
         hostile.attribute("a", "chlist", b"ab"),
         hostile.attribute("a", "bytes", b"ab"),
         b"a\0k\xe9\0\2\0\0\0ab",
-        hostile.attribute("a", "v3d", bytes(24))
-        + hostile.attribute("a", "int", b"abcd"),
     ],
 )
 @pytest.mark.parametrize("alone", [True, False])
@@ -558,3 +556,18 @@ def test_any_attribute_is_carried_on_byte_for_byte(
         assert told in copied.read_bytes()
         assert path.read_bytes() == given
         np.testing.assert_array_equal(exr.File(copied).pixels("R"), plane)
+
+
+def test_attributes_of_one_name_leave_each_other_and_the_next_alone(
+    path: Path, tmp_path: Path
+) -> None:
+    told = [
+        hostile.attribute("a", "v3d", bytes(24)),
+        hostile.attribute("a", "string", b"abc"),
+        hostile.attribute("b", "int", b"abcd"),
+    ]
+    plane = np.ones((4, 5), np.float32)
+    hostile.write_odd_exr(path, dict.fromkeys("RGB", plane), attributes=b"".join(told))
+    copied = tmp_path / "copy.exr"
+    exr.copy_picture(path, copied, {0: dict.fromkeys("RGB", plane)})
+    assert all(attribute in copied.read_bytes() for attribute in told)
