@@ -79,12 +79,13 @@ class Attribute:
     def veiled(self) -> bytes:
         """The same in as many bytes that the library reads, of a kind that it ignores.
 
-        The `place` keeps apart names that are none.
+        The `place` keeps apart names that are none. Written in order of names, they
+        come last: of two of one name readers take the first.
         """
-        mark = f"{self.place:x}".encode()
         name, kind = self.name, self.kind[:-1] + self.kind[-1:].swapcase()
         if self.is_repeated or not _is_text(name):
-            name = mark[-len(name) :].rjust(len(name), b"_")
+            mark = f"{self.place:x}".encode().rjust(len(name), b"\x7f")
+            name = b"\x7f" + mark[len(mark) - len(name) + 1 :]
         if not _is_text(kind):
             kind = b"_" * len(kind)
         return name + b"\0" + kind + b"\0"
