@@ -1,4 +1,4 @@
-# make install | test | test-other | test-app | demo | extension | release | clean.  BPY=5.0.1 picks another Blender.
+# make install | test | test-all | test-other | test-app | demo | extension | release | clean.  BPY=5.0.1 picks another Blender.
 PYTHON ?= python3.11
 VENV   ?= .venv
 BPY    ?= 4.5.15
@@ -17,7 +17,10 @@ OTHER_BPY  ?= 5.0.1
 OTHER_VENV := $(VENV)-bpy-$(OTHER_BPY)
 OTHER_RUN  := $(OTHER_VENV)/bin/python
 
-.PHONY: install test test-other test-app demo extension release clean
+# Tests of what differs between Blenders: `make test` runs them on the second one, too.
+VERSIONS := interface/test_engine cycles/test_passes shot/test_features shot/test_full_size
+
+.PHONY: install test test-all test-other test-app demo extension release clean
 
 install: $(STAMP)
 
@@ -28,16 +31,21 @@ $(STAMP): pyproject.toml xrds_lab/pyproject.toml
 	rm -f $(VENV)/.installed-*
 	touch $@
 
-test: install
+test: install $(OTHER_VENV)/.installed
 	$(RUN) -m ruff check .
 	$(RUN) -m ruff format --check .
 	$(RUN) -m mypy
 	$(RUN) tests/run.py
+	$(OTHER_RUN) tests/run.py $(VERSIONS)
+
+# All of it, as for a night: what takes minutes, and every test on a second Blender.
+test-all: install test-other
+	$(RUN) tests/run.py --all
 
 test-other: install $(OTHER_VENV)/.installed
-	$(OTHER_RUN) tests/run.py blender/
+	$(OTHER_RUN) tests/run.py --all blender/
 
-$(OTHER_VENV)/.installed:
+$(OTHER_VENV)/.installed: $(STAMP)
 	$(PYTHON) -m venv --without-pip $(OTHER_VENV)
 	$(RUN) -m pip --python $(OTHER_RUN) install --quiet --no-deps "bpy==$(OTHER_BPY)"
 	echo "import site; site.addsitedir('$$($(RUN) -c '$(PACKAGES)')')" \

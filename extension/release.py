@@ -43,16 +43,51 @@ SYSTEMS = {
 def release(zips: Path, out: Path, website: str | None = None) -> Path:
     """Lay out the release of the version that the manifest has; returns its folder.
 
-    Takes the zips of this version out of a folder. What `out` held is gone then. Ends
-    the program where there is no such zip, or the changelog tells nothing of it.
+    Takes the zips of this version out of a folder. An earlier release in `out` is
+    replaced once the new one is whole. Ends the program where `out` holds anything
+    else, where there is no such zip, or the changelog tells nothing of the version.
     """
+    zips, out = zips.resolve(), out.resolve()
+    check_replaceable(out, zips)
     version = tomllib.loads((ROOT / MANIFEST).read_text("utf-8"))["version"]
     notes = notes_of(version, (ROOT / "CHANGELOG.md").read_text("utf-8"))
     found = sorted(zips.glob(f"xrds-{version}-*.zip"))
     if not found:
         sys.exit(f"no zip of {version} in {zips}: make extension builds them")
-    shutil.rmtree(out, ignore_errors=True)
-    files = [_in_its_folder(path, out) for path in found]
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=out.parent) as folder:
+        new = Path(folder) / out.name
+        _lay_out(found, new, version, notes, website)
+        if out.exists():
+            shutil.rmtree(out)
+        new.rename(out)
+    return out
+
+
+def check_replaceable(out: Path, zips: Path) -> None:
+    """End the program unless `out` is missing, empty, or as an earlier release left it.
+
+    A release lists all of its files, so that what somebody else put there is found.
+    """
+    if zips.is_relative_to(out):
+        sys.exit(f"{out} holds the zips: give another --out, as {zips / 'release'}")
+    if not out.exists():
+        return
+    if not out.is_dir():
+        sys.exit(f"{out} is no folder: give another --out")
+    sums = out / "SHA256SUMS"
+    lines = sums.read_text("utf-8").splitlines() if sums.is_file() else []
+    listed = {out / line.partition("  ")[2] for line in lines} | {sums}
+    for path in sorted(out.rglob("*")):
+        if not path.is_dir() and path not in listed:
+            sys.exit(f"{path} is not of a release: remove it, or give another --out")
+
+
+def _lay_out(
+    zips: list[Path], out: Path, version: str, notes: str, website: str | None
+) -> None:
+    """Write all files of a release into a new folder."""
+    files = [_in_its_folder(path, out) for path in zips]
     for folder in sorted({path.parent for path in files}):
         repository(folder)
     with tempfile.TemporaryDirectory() as folder:
@@ -64,7 +99,6 @@ def release(zips: Path, out: Path, website: str | None = None) -> Path:
     (out / "notes.md").write_text(notes + "\n", "utf-8")
     (out / "index.html").write_text(page(version, notes, out, website), "utf-8")
     (out / "SHA256SUMS").write_text(checksums(out), "utf-8")
-    return out
 
 
 def notes_of(version: str, changelog: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 import shlex
 from pathlib import Path
@@ -85,6 +86,38 @@ def test_commands_are_understood(page: Path) -> None:
     for line in commands(page.read_text("utf-8")):
         words = shlex.split(line)
         main._parser(words).parse_args(words)
+
+
+# Of Blender, pip and other programs that the project speaks of.
+OTHERS = """
+--any-blender --command --crossframe
+--albedo --alpha --diffuse --specular --tiles --enable
+--extra-index-url --factory-startup --index-url --kind --online-mode
+--only-binary --platform --python --python-exit-code --python-expr --python-version
+--render-anim --render-frame --run-dependencies --step --sync --target --url --check
+--draw --help --version
+"""
+
+
+def options_of_all_commands() -> set[str]:
+    parser = main._parser([])
+    found = [x for x in parser._actions if isinstance(x, argparse._SubParsersAction)]
+    each = [x for parsers in found for x in parsers.choices.values()]
+    return {name for x in each for y in x._actions for name in y.option_strings}
+
+
+@pytest.mark.parametrize("folder", ["xrds_core", "xrds_blender", "docs"])
+def test_options_that_are_named_are_there(folder: str) -> None:
+    known = {*options_of_all_commands(), *OTHERS.split()}
+    files = [x for x in (ROOT / folder).rglob("*") if x.suffix in {".py", ".md"}]
+    lost = {
+        (named(file), option)
+        for file in files
+        if not {"lab", "results", "pipeline"} & {*file.parts}
+        for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", file.read_text("utf-8"))
+        if option not in known
+    }
+    assert not lost
 
 
 def commands(text: str) -> list[str]:

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import sys
 from contextlib import suppress
+from typing import Any
 
 from .errors import printable
+
+finished: list[Any] = []
+"""What `--json` prints of each frame that a command has finished, should it fail."""
 
 
 def warn(text: str) -> None:

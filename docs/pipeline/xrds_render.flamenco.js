@@ -12,7 +12,7 @@ const JOB_TYPE = {
             description: "Frames to render, as 47, 1-30 or 1, 3, 5-10",
         },
         {
-            key: "chunk_size", type: "int32", default: 8,
+            key: "chunk_size", type: "int32", default: 24,
             description: "Frames of one task, which lend each other samples",
         },
         {
@@ -46,11 +46,11 @@ const CHECK = [
 function compileJob(job) {
     const settings = job.settings;
     for (const chunk of frameChunker(settings.frames, settings.chunk_size)) {
-        // An animation lends samples from frame to frame; single frames do not.
-        const [first, last] = chunk.split("-");
-        const which = last && !chunk.includes(",")
-            ? ["--frame-start", first, "--frame-end", last, "--frame-jump", "1", "--render-anim"]
-            : ["--render-frame", chunk.replace(/-/g, "..")];
+        // Frames of an animation lend each other samples; those of --render-frame do not.
+        const which = evenRuns(chunk).flatMap(({ first, last, step }) => [
+            "--frame-start", `${first}`, "--frame-end", `${last}`,
+            "--frame-jump", `${step}`, "--render-anim",
+        ]);
         const task = author.Task(`render-${chunk}`, "blender");
         task.addCommand(author.Command("blender-render", {
             exe: "{blender}",
@@ -67,4 +67,26 @@ function compileJob(job) {
         }));
         job.addTask(task);
     }
+}
+
+// The frames of a chunk, as 1-3,8,10,12, as few animations: first, last and step.
+function evenRuns(chunk) {
+    const runs = [];
+    for (const part of chunk.split(",")) {
+        const [, first, last] = part.match(/^\s*(-?\d+)(?:-(-?\d+))?\s*$/);
+        for (let frame = +first; frame <= +(last ?? first); frame++) {
+            const run = runs.at(-1);
+            const step = frame - run?.last;
+            if (run && (run.first === run.last || step === run.step)) {
+                Object.assign(run, { last: frame, step });
+            } else if (run && step < run.step && run.last - run.first === run.step) {
+                // 3, 8, 9: the 8 belongs to the 9
+                runs.push({ first: run.last, last: frame, step });
+                Object.assign(run, { last: run.first, step: 1 });
+            } else {
+                runs.push({ first: frame, last: frame, step: 1 });
+            }
+        }
+    }
+    return runs;
 }

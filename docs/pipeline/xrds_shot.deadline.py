@@ -19,6 +19,26 @@ import sys
 import tempfile
 from pathlib import Path
 
+# A word that every parser of command lines takes as it is.
+PLAIN = re.compile(r"[\w@%+=:,./\\<>~-]+")
+
+
+def checked(words: argparse.Namespace) -> None:
+    """End the program for what Deadline's files cannot hold.
+
+    They have one key=value a line, and Deadline fills in what stands in <>.
+    """
+    for name, value in vars(words).items():
+        text = str(value)
+        if not text.isprintable() or re.search(r'["<>]', text):
+            what = f"--{name.replace('_', '-')} {text!r}"
+            sys.exit(f'{what} holds a line break, ", < or >: rename it')
+    if not re.fullmatch(r"-?\d+(--?\d+)?(,-?\d+(--?\d+)?)*", words.frames):
+        # Deadline makes a task of each frame of a range with steps: none has neighbours
+        sys.exit(f"--frames {words.frames}: give consecutive frames, as 1-48 or 1-9,20")
+    if words.folder and not words.folder.is_dir():
+        sys.exit(f"--folder {words.folder}: there is no such folder")
+
 
 def job(
     name: str, frames: str, chunk: int, arguments: list[str], blender: str
@@ -31,7 +51,7 @@ def job(
         "Frames": frames,
         "ChunkSize": str(chunk),
     }
-    quoted = (f"<QUOTE>{x}<QUOTE>" if re.search(r"[\s#]", x) else x for x in words)
+    quoted = (x if PLAIN.fullmatch(x) else f"<QUOTE>{x}<QUOTE>" for x in words)
     return about, {
         "Executable": blender,
         "Arguments": " ".join(quoted),
@@ -69,11 +89,14 @@ def main() -> None:
     add("--samples", required=True, help="folder of the frames' samples")
     add("--out", required=True, help="pattern of the frames, as /out/####.exr")
     add("--temporal-radius", type=int, default=4)
-    add("--chunk", type=int, default=8, help="frames of one task")
+    add("--chunk", type=int, default=24, help="frames of one task")
     add("--blender", default="blender")
     add("--folder", type=Path, help="where the jobs' files are written")
     add("--dry-run", action="store_true")
     options = parser.parse_args()
+    checked(options)
+    # before a closing quote a backslash would quote that
+    options.samples = options.samples.rstrip("/\\") or options.samples
     folder = options.folder or Path(tempfile.mkdtemp())
     name, radius = Path(options.blend).stem, options.temporal_radius
     both = ["--frames", "<STARTFRAME>-<ENDFRAME>", "--temporal-radius", str(radius)]

@@ -13,7 +13,7 @@ const JOB_TYPE = {
             description: "Frames to render, as 47, 1-30 or 1, 3, 5-10",
         },
         {
-            key: "chunk_size", type: "int32", default: 8,
+            key: "chunk_size", type: "int32", default: 24,
             description: "Frames of one task: a worker loads the scene once for all",
         },
         {

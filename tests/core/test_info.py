@@ -38,6 +38,7 @@ def test_paper_table_is_the_papers() -> None:
     assert told == PRINTED
 
 
+@pytest.mark.nightly
 def test_attention_products_are_counted_beside() -> None:
     cost = operations.count(NetworkConfig())
     # 66 layers, each 2 products of 64 tokens x 64 channels for 256 x 256 tokens
@@ -52,6 +53,7 @@ def test_counts_grow_with_the_picture_alone() -> None:
     assert large.macs == 4 * small.macs
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("scale", operations.SCALES)
 def test_presets_cost_what_their_names_say(scale: int) -> None:
     costs = {
@@ -61,7 +63,7 @@ def test_presets_cost_what_their_names_say(scale: int) -> None:
     assert order == ["fast", "balanced", "paper"]
 
 
-@pytest.mark.timeout(600)
+@pytest.mark.nightly
 def test_what_is_shipped_is_what_is_counted() -> None:
     assert info.shipped_costs() == operations.costs(), "call write_costs()"
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -156,3 +157,48 @@ def test_without_zips_there_is_no_release(tmp_path: Path) -> None:
     assert done.returncode == 1
     assert f"no zip of {VERSION}" in done.stderr
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("zips", "out", "said"),
+    [
+        ("dist", "dist", "holds the zips"),
+        ("dist", ".", "holds the zips"),
+        ("dist", "dist/../dist", "holds the zips"),
+        ("dist", "link", "holds the zips"),
+        ("dist", "mine", "mine/notes.txt is not of a release"),
+        ("dist", "mixed", "mixed/sub/picture.png is not of a release"),
+        ("dist", "file", "is no folder"),
+    ],
+)
+def test_only_a_release_is_replaced(
+    zips: str, out: str, said: str, tmp_path: Path
+) -> None:
+    """Nothing is touched but a folder that a release made."""
+    for name in ("dist/xrds-0.1.0-bare.zip", "mine/notes.txt", "mixed/sub/picture.png"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("kept")
+    (tmp_path / "file").write_text("kept")
+    (tmp_path / "mixed" / "SHA256SUMS").write_text("0  index.html\n")
+    (tmp_path / "link").symlink_to("dist")
+    before = names(tmp_path)
+    with pytest.raises(SystemExit, match=said):
+        release.release(tmp_path / zips, tmp_path / out)
+    assert names(tmp_path) == before
+
+
+def test_an_earlier_release_is_replaced(laid_out: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(laid_out, out)
+    stale = out / "light" / "xrds-0.0.9-light.zip"
+    stale.write_bytes(b"earlier")
+    (out / "SHA256SUMS").write_text(release.checksums(out))
+    release.release(laid_out.parent / "zips", out, SITE)
+    assert names(out) == names(laid_out)
+
+
+def test_the_page_of_sizes_tells_that_of_the_bare_zip(laid_out: Path) -> None:
+    text = (ROOT / "docs" / "compatibility.md").read_text("utf-8")
+    (told,) = re.findall(r"\| `bare`.*?\| ([\d.]+) MB \|", text)
+    (path,) = (laid_out / "bare").glob("*.zip")
+    assert path.stat().st_size / 1e6 == pytest.approx(float(told), rel=0.05)

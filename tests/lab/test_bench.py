@@ -35,6 +35,8 @@ from xrds_lab.bench.stages import PLAIN_FRAME, STAGES
 from xrds_lab.bench.sweep import Sweep
 from xrds_lab.bench.windows import find_shots
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SWEEP = Sweep(
     (Network("fast", 4),),
     plain_samples=(1, 2),
@@ -81,7 +83,6 @@ def world(tmp_path: Path, still_life: Callable[..., Any]) -> World:
     return made
 
 
-@pytest.mark.timeout(600)
 def test_report_is_whole_and_a_second_run_measures_nothing(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -141,7 +142,6 @@ def _check_points(report: dict[str, Any]) -> None:
     assert scene["reference_psnr_floor"] > 10
 
 
-@pytest.mark.timeout(300)
 def test_adaptive_sampling_stops_early_where_it_may(world: World) -> None:
     (shot,) = find_shots([world.scene], None, None, SIZE)
     counted = {}
@@ -186,7 +186,6 @@ def _check_page(page: str, report: dict[str, Any]) -> None:
     assert labels == {best[name]["label"] for name in SHOWN if best.get(name)}
 
 
-@pytest.mark.timeout(300)
 def test_one_bad_configuration_is_left_out_and_told(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -204,7 +203,6 @@ def test_one_bad_configuration_is_left_out_and_told(
     assert (world.folder / "out" / "report.html").is_file()
 
 
-@pytest.mark.timeout(300)
 def test_another_denoiser_is_measured_anew(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -222,7 +220,6 @@ def test_another_denoiser_is_measured_anew(
     assert len(judged) == len(ours) > 0
 
 
-@pytest.mark.timeout(300)
 def test_budgets_below_a_sample_per_pixel(
     world: World, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -239,7 +236,6 @@ def test_budgets_below_a_sample_per_pixel(
     assert len(lines) == 2 + len(result["rows"])
 
 
-@pytest.mark.timeout(300)
 def test_the_pickers_model_is_written_and_can_be_read(world: World) -> None:
     file = world.folder / "budget.json"
     world.run(timing=False, model=file)

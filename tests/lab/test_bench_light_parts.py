@@ -11,6 +11,8 @@ import pytest
 from xrds_lab.shots import light
 from xrds_lab.shots.light import ONE_BY_ONE, RAW, SHOT, STILL
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 
 def run(blend: Path) -> dict[str, Any]:
     return light.bench_light_parts(

@@ -17,6 +17,8 @@ from xrds_lab.commands import measuring
 from xrds_lab.shots import motions, sooner
 from xrds_lab.shots.sooner import CYCLES, SAME_PICTURE, SAME_SAMPLES, Case
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SIZE = (64, 48)
 
 

@@ -38,6 +38,8 @@ from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
 from xrds_lab.shots.frames import MIDDLE, ShotFrames, requests
 from xrds_lab.shots.seeds import over_seeds
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SIZE = (48, 36)
 WINDOW = Window(*SIZE, 0, 0, *SIZE)
 
@@ -61,7 +63,6 @@ def gain(points: list[dict[str, Any]], motion: str, radius: int) -> float:
     return float(found[XRDS, radius] - found[DEFAULT, 0])
 
 
-@pytest.mark.timeout(300)
 def test_a_second_run_renders_nothing_and_gives_the_same_files(
     blend: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -19,6 +19,8 @@ from xrds_lab.demo.countdown import Countdown
 from xrds_lab.demo.scene import MIDDLE, PIVOT, SHOT, TURN, build, orbit
 from xrds_lab.shots import film
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 TOP = comparison.HEADING + comparison.LABEL
 
 
@@ -161,7 +163,6 @@ def test_countdown_tells_task_and_time(capsys: pytest.CaptureFixture[str]) -> No
     assert told == ["demo: 1:00 left: first", "demo: 2:05 left: second"]
 
 
-@pytest.mark.timeout(600)
 def test_demo_leaves_figures_pictures_and_the_scene(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

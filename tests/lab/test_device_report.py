@@ -8,6 +8,8 @@ import pytest
 
 from xrds_lab.cards.report import bench_devices
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SIZE = (160, 90)
 
 

@@ -26,6 +26,8 @@ from xrds_lab.bench.samples import samples_table
 from xrds_lab.bench.windows import find_shots
 from xrds_lab.weights import save_network
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 FRAME, WINDOW = [128, 96], [32, 16, 64, 48]
 
 

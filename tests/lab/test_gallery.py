@@ -182,6 +182,7 @@ def test_the_gallery_is_large_and_its_halves_are_alike() -> None:
         chosen(("chair",))
 
 
+@pytest.mark.nightly
 def test_every_shot_can_be_built(tmp_path: Path) -> None:
     ensure_registered()
     for shot in (x for x in TABLE if not x.blur and x.name not in {"cloth"}):
@@ -191,7 +192,7 @@ def test_every_shot_can_be_built(tmp_path: Path) -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)  # takes handlers away as well
 
 
-@pytest.mark.timeout(300)
+@pytest.mark.nightly
 def test_three_shots_are_rendered_judged_and_resumed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

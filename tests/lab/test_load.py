@@ -20,6 +20,8 @@ from xrds_core.superres.network import XRDS, preset_config
 from xrds_lab.stability import load
 from xrds_lab.stability.load import FrameLoad, drive, growth, settled
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 FRAMES = 24
 
 
@@ -41,7 +43,6 @@ def untrained(tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.timeout(600)
 def test_frames_leave_neither_memory_nor_data_blocks(
     moving: Any, untrained: Path
 ) -> None:

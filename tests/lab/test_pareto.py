@@ -356,3 +356,11 @@ def test_break_even_sets_saved_against_paid() -> None:
     assert found[2]["saved"] == pytest.approx(4)
     assert found[2]["paid"] == pytest.approx(0.75)
     assert found[1]["saved_quick"] == pytest.approx((40 - 30 + 2 - 8) / 2)
+
+
+@pytest.mark.parametrize("scene", ["plain", "cost $5 and $6", "a$^$b", r"a\$b$", "$"])
+def test_a_scene_may_have_any_name_in_a_plot(scene: str) -> None:
+    from xrds_lab.bench.plots import scene_plot
+
+    points = [point(1.0, 30.0, "xrds", scale=1), point(2.0, 31.0, "xrds", scale=1)]
+    assert b"<svg" in scene_plot(scene, points, 1.0, 40.0)

@@ -18,6 +18,8 @@ from xrds_lab.shots import growth
 from xrds_lab.shots.growth import COUNTS, RADII, Run, bench_growth
 from xrds_lab.shots.synthetic import SAMPLES, frame
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SIZES = ((32, 18), (64, 36))
 
 
@@ -30,7 +32,6 @@ def test_synthetic_frames_lend_to_each_other() -> None:
     assert shot[1].noise is not None  # of halves, as rendered frames have them
 
 
-@pytest.mark.timeout(300)
 def test_a_run_has_a_process_of_its_own(blend: Path) -> None:
     stages = growth.apart(Run(growth.PIXELS, SIZES[0], radius=1))
     assert [row["stage"] for row in stages] == ["accumulate", "denoise"]

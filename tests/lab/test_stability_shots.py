@@ -13,6 +13,8 @@ from xrds_lab.stability import accumulation, broken_shots, moving_scenes, suite
 from xrds_lab.stability.bounds import bound
 from xrds_lab.stability.measured import Measured
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from ..planning import budget
@@ -44,26 +43,17 @@ def frame_seconds(scene: Any, resolved: Settings, radius: int) -> float | None:
     return costs.in_shot(radius).seconds(resolved)
 
 
-def best_mode(scene: Any, request: Request) -> Mode:
-    """The mode with the least error expected at the scene's present samples.
-
-    Whatever the denoising that is requested at full size: it is chosen too.
-    """
-    settings = replace(request.settings, denoising=BEST)
-    here = capabilities(request.machine.weights)
-    return estimating.best(estimates(scene, settings, here))
-
-
-def in_mode(request: Request, mode: Mode, scene: Any) -> Request:
-    """The request in a mode; automatic is the best there is for the scene.
+def in_mode(request: Request, mode: Mode) -> Request:
+    """The request in a mode; automatic is full size wherever it can work.
 
     What a goal will choose stays open.
     """
     if request.goal is not None:
         return request
     if mode is Mode.AUTOMATIC:
-        paced = request.deadline is not None
-        mode = Mode.FULL_SIZE if paced else best_mode(scene, request)
+        paced = request.deadline is not None  # which Cycles alone cannot keep
+        here = capabilities(request.machine.weights)
+        mode = Mode.FULL_SIZE if paced else estimating.automatic(here)
         request = request.with_settings(denoising=BEST)
     if mode is Mode.CYCLES_ONLY:
         return request.with_settings(mode=mode, temporal_radius=0)

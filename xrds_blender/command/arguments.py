@@ -109,10 +109,13 @@ def frame(text: str) -> list[int]:
 
 
 def frames(text: str) -> list[int]:
-    """Frame numbers, such as 1-24, 1-100x4 (every fourth) or 1-24,30; each once."""
+    """Frame numbers, such as 1-24, 1-100x4 (every fourth) or 1-24,30; each once.
+
+    1-100:4, as farms write it, is 1-100x4.
+    """
     numbers: dict[int, None] = {}
     for part in text.split(","):
-        match = re.fullmatch(r"(-?\d+)(?:-(-?\d+)(?:x(\d+))?)?", part)
+        match = re.fullmatch(r"(-?\d+)(?:-(-?\d+)(?:[x:](\d+))?)?", part)
         if not match:
             raise argparse.ArgumentTypeError(
                 f"{text!r} is not frames such as 1-24, 1-100x4 or 1-24,30"

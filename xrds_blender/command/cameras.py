@@ -11,7 +11,7 @@ from xrds_core.files import check_output
 
 from . import arguments
 from .deferred import need_blender
-from .options import add_scene, choice_of
+from .options import add_scene, choice_of, resolve_paths
 
 
 def add_cameras(commands: Any) -> argparse.ArgumentParser:
@@ -39,6 +39,7 @@ def _cameras(options: argparse.Namespace) -> dict[str, Any]:
     from ..shot.cameras import shot_cameras
     from .scene_file import open_scene
 
+    resolve_paths(options)
     check_output(options.out, [options.scene])
     scene = open_scene(options.scene, choice_of(options))
     whole = range(scene.frame_start, scene.frame_end + 1, scene.frame_step)

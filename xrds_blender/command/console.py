@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
+import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NoReturn
 
 from xrds_core import atomic
 from xrds_core.errors import Cancelled, UsageError, XRDSError, printable
+from xrds_core.notices import finished as finished_frames
 from xrds_core.notices import warn
 
 from . import streams
@@ -69,7 +73,9 @@ def _checked(end: _End, check: Check | None) -> int:
 
 
 def _error(line: str, status: int) -> dict[str, Any]:
-    return {"error": line, "status": status}
+    """What `--json` prints of a failure, with the frames that are finished."""
+    frames = {"frames": list(finished_frames)} if finished_frames else {}
+    return {"error": line, "status": status, **frames}
 
 
 def _ended(work: Callable[[], Any]) -> _End:
@@ -135,6 +141,7 @@ def end_at_once_by_signals() -> None:
         while (number := os.read(woken, 1)[0]) not in heeded:
             pass
         atomic.abandon()
+        _remove_blenders_folder()
         line, status = heeded[number], 128 + number
         result = json.dumps(_error(line, status), indent=1) + "\n"
         streams.write_at_once(f"xrds: {line}\n", result)
@@ -156,5 +163,14 @@ def finished(status: int) -> int:
 def leave(status: int) -> NoReturn:
     """End the process; the bpy module can hang when the interpreter ends."""
     status = finished(status)
+    _remove_blenders_folder()
     streams.flush_all()
     os._exit(status)
+
+
+def _remove_blenders_folder() -> None:
+    """Remove the temporary folder of the bpy module, which it would at its own end."""
+    bpy = sys.modules.get("bpy")
+    folder = getattr(getattr(bpy, "app", None), "tempdir", "")
+    if folder and Path(folder).name.startswith("blender_"):  # not the user's own
+        shutil.rmtree(folder, ignore_errors=True)

@@ -14,11 +14,34 @@ from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
 from xrds_core.errors import UsageError
+from xrds_core.notices import finished
 from xrds_core.version import package_version
 
 from . import cameras, console, denoise, info, render, upscale
 from .deferred import no_lines
 
+EXAMPLES = {
+    "render": (
+        "xrds render shot.blend -a -o 'frames/####.exr'",
+        "xrds render shot.blend --frame 7 --samples 64 -o still.png",
+    ),
+    "plan": ("xrds plan shot.blend -a", "xrds plan shot.blend --frame 7 --scale 2"),
+    "denoise": (
+        "xrds denoise 'noisy/####.exr' -o 'frames/####.exr'",
+        "xrds denoise 'noisy/####.exr' -o 'frames/####.exr' --frames 1-48 --passes all",
+    ),
+    "cameras": (
+        "xrds cameras shot.blend -o cameras.json",
+        "xrds cameras shot.blend -o cameras.json --frames 1-48",
+    ),
+    "upscale": (
+        "xrds upscale beauty.exr guides.exr -o large.exr",
+        "xrds upscale beauty.exr guides.exr -o large.exr --scale 4 --preset balanced",
+    ),
+    "info": ("xrds info", "xrds info --json"),
+}
+_STATUS = """exit status: 0 done, 1 failed, 2 wrong usage, 130 interrupted (Ctrl-C)
+--json: docs/farms.md says what it prints"""
 AddCommand = Callable[[Any], argparse.ArgumentParser]
 
 # The laboratory's commands join by entry points of this group, each a function that
@@ -39,6 +62,7 @@ LABORATORY = (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit status."""
     words = sys.argv[1:] if argv is None else list(argv)
+    finished.clear()  # of a command before, in one process
     try:
         options = _parser(words).parse_args(words)
     except SystemExit as end:  # --help and --version have been printed
@@ -128,6 +152,10 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
             action="store_true",
             help="print JSON on stdout and everything else on stderr",
         )
+        name = command.prog.rpartition(" ")[2]
+        examples = "".join(f"  {line}\n" for line in EXAMPLES.get(name, ()))
+        command.formatter_class = argparse.RawDescriptionHelpFormatter
+        command.epilog = (f"examples:\n{examples}\n" if examples else "") + _STATUS
     parser.epilog = apart.listing()
     command = words[0] if words else ""
     if command in LABORATORY and command not in commands.choices:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +15,16 @@ from xrds_core.light_parts.find import NONE
 from xrds_core.superres.weights_header import PRESETS
 
 from ..planning.plan import SAVINGS
-from ..planning.request import Request, render_request
+from ..planning.request import CHOICES, Request, render_request
 from ..planning.settings import QUALITIES, SCALES
 from . import arguments
 from .scene_file import SceneChoice
 
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, metal"
+_RENDER_DEVICE_HELP = (
+    "where the picture is denoised, and above scale 1 the network runs: auto, cpu, "
+    "cuda, cuda:1, metal; Cycles renders where the file says"
+)
 
 
 def add_request(command: argparse.ArgumentParser) -> None:
@@ -55,7 +60,12 @@ def add_request(command: argparse.ArgumentParser) -> None:
         help="samples up to which repeated renders improve the cached guides",
     )
     add(
-        "--skip-nothing", action="store_true", help="skip nothing that could be skipped"
+        "--skip-nothing",
+        action="store_const",
+        dest="savings",
+        const=(),
+        default=SAVINGS,
+        help="skip nothing that could be skipped",
     )
     add(
         "--seed",
@@ -63,7 +73,8 @@ def add_request(command: argparse.ArgumentParser) -> None:
         help="seed of Cycles' noise, in place of the file's",
     )
     add_light(command)
-    add_network(command)
+    add_network(command, _RENDER_DEVICE_HELP)
+    add_accumulate_on(command)
 
 
 def add_light(command: argparse.ArgumentParser) -> None:
@@ -117,8 +128,8 @@ def _add_samples(command: argparse.ArgumentParser) -> None:
     add(
         "--samples",
         type=arguments.positive,
-        help="samples per pixel of the low-resolution render, or at scale 1, in place "
-        "of the file's; without its noise threshold and its time limit",
+        help="samples per pixel, in place of the file's, without its noise threshold "
+        "and its time limit; above scale 1, of the low-resolution render",
     )
     add(
         "--noise-threshold",
@@ -159,11 +170,14 @@ def add_scene(command: argparse.ArgumentParser) -> None:
         "-y",
         "--enable-autoexec",
         action="store_true",
+        dest="trusted",
         help="trust the file: run its drivers and scripts",
     )
 
 
-def add_network(command: argparse.ArgumentParser) -> None:
+def add_network(
+    command: argparse.ArgumentParser, device_help: str = DEVICE_HELP
+) -> None:
     """Add what chooses a network and how it runs."""
     add = command.add_argument
     add("--preset", choices=PRESETS, default="fast", help="the network (default: fast)")
@@ -172,8 +186,7 @@ def add_network(command: argparse.ArgumentParser) -> None:
         type=arguments.factor,
         help="fixed exposure factor, for animations and border renders",
     )
-    add("--device", default="auto", help=DEVICE_HELP)
-    add_accumulate_on(command)
+    add("--device", default="auto", help=device_help)
     add(
         "--threads",
         type=arguments.positive,
@@ -233,48 +246,39 @@ def encoding_of(options: argparse.Namespace) -> Encoding:
     return Encoding(options.exr_depth == "half", options.exr_codec)
 
 
+_PATHS = ("out", "sample_cache", "guide_cache", "weights")
+
+
+def resolve_paths(options: argparse.Namespace) -> None:
+    """Let paths that begin with // lie beside the .blend file, as Blender has it."""
+    folder = options.scene.resolve().parent
+    for name in _PATHS:
+        value = getattr(options, name, None)
+        if value is not None and str(value).startswith("//"):
+            setattr(options, name, type(value)(folder / str(value).lstrip("/")))
+
+
 def choice_of(options: argparse.Namespace) -> SceneChoice:
     """What of the file is rendered."""
-    return SceneChoice(
-        options.scene_name,
-        options.view_layer,
-        options.camera,
-        options.resolution,
-        getattr(options, "threads", None),
-        noise_threshold=getattr(options, "noise_threshold", None),
-        samples=getattr(options, "samples", None),
-        trusted=options.enable_autoexec,
-    )
+    # `scene` is the file there
+    given = _named(options, {each.name for each in fields(SceneChoice)} - {"scene"})
+    return SceneChoice(options.scene_name, **given)
 
 
 def request_of(options: argparse.Namespace) -> Request:
     """What the options of `add_request` ask for; raises UsageError."""
     _check_pace(options)
     _check_light(options)
-    return render_request(
-        scale=options.scale,
-        samples=options.samples if options.noise_threshold is None else None,
-        guide_samples=options.guide_samples,
-        preset=options.preset,
-        device=options.device,
-        exposure=options.exposure,
-        seed=options.seed,
-        plain=options.plain,
-        time_budget=options.time_budget,
-        quality=options.quality,
-        memory_limit=options.memory_limit,
-        weights=options.weights,
-        threads=options.threads,
-        denoise=options.denoise,
-        temporal_radius=_temporal_radius(options),
-        same_picture=options.same_picture,
-        deadline=options.deadline,
-        savings=() if options.skip_nothing else SAVINGS,
-        guide_cache=options.guide_cache,
-        guide_limit=options.guide_limit,
-        passes=options.passes,
-        light_aovs=options.light_aovs,
-    )
+    given = _named(options, CHOICES)
+    given["temporal_radius"] = _temporal_radius(options)
+    if options.noise_threshold is not None:  # the most, as `SceneChoice` has it
+        del given["samples"]
+    return render_request(**given)
+
+
+def _named(options: argparse.Namespace, names: Collection[str]) -> dict[str, Any]:
+    """Those options that have one of these names."""
+    return {name: value for name, value in vars(options).items() if name in names}
 
 
 def _temporal_radius(options: argparse.Namespace) -> int:

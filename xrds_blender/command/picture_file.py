@@ -15,6 +15,7 @@ from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
 from xrds_core.frames import frame_path
+from xrds_core.temporal.noise import luminance
 
 from . import png_text
 from .whole_file import png_size
@@ -61,8 +62,8 @@ def save(
         path: ends in .exr or .png.
         radiance: (H, W, 3) scene-linear, premultiplied.
         alpha: (H, W) in [0, 1].
-        scene: its view settings shape the PNG; with a transparent film both formats
-            hold alpha.
+        scene: its view settings shape the PNG, and its output settings where they are
+            for PNG; else with a transparent film both formats hold alpha.
         encoding: of an .exr.
         metadata: texts by name that the file is to hold.
         parts: further passes (H, W, 3) by name, of an .exr.
@@ -100,6 +101,8 @@ def _save_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
     import bpy
 
     height, width = alpha.shape
+    if _png_mode(scene) == "BW":  # as Blender's renders: grey before the view transform
+        radiance = np.repeat(luminance(radiance)[..., None], 3, axis=2)
     image = bpy.data.images.new("xrds", width, height, alpha=True, float_buffer=True)
     try:
         image.alpha_mode = "PREMUL"
@@ -114,17 +117,28 @@ def _save_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
         bpy.data.images.remove(image)
 
 
+def _png_mode(scene: Any) -> str:
+    settings = scene.render.image_settings
+    if settings.file_format == "PNG" or settings.color_mode == "BW":
+        return str(settings.color_mode)
+    return "RGBA" if scene.render.film_transparent else "RGB"
+
+
 @contextmanager
 def _png_settings(scene: Any) -> Iterator[None]:
-    """Ask Blender for PNG, with alpha where the film is transparent."""
+    """Ask Blender for PNG: of the file's colours and bits where it is for PNG.
+
+    Else with alpha where the film is transparent.
+    """
     settings = scene.render.image_settings
     wanted = {
         "media_type": "IMAGE",  # from Blender 5.0 on, and to be set before the format
         "file_format": "PNG",
-        "color_mode": "RGBA" if scene.render.film_transparent else "RGB",
+        "color_mode": _png_mode(scene),
     }
     wanted = {name: value for name, value in wanted.items() if hasattr(settings, name)}
-    old = {name: getattr(settings, name) for name in wanted}
+    # the format decides which depths there are
+    old = {name: getattr(settings, name) for name in (*wanted, "color_depth")}
     try:
         for name, value in wanted.items():
             setattr(settings, name, value)

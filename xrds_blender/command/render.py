@@ -7,11 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import UsageError
+from xrds_core.time_left import duration
 
 from ..planning.plan import DEADLINE, GUIDE_CACHE, SAME_PICTURE
+from ..planning.settings import counted
 from . import arguments
 from .deferred import need_blender
-from .options import add_output, add_request, choice_of, encoding_of, request_of
+from .options import (
+    add_output,
+    add_request,
+    choice_of,
+    encoding_of,
+    request_of,
+    resolve_paths,
+)
 
 
 def add_render(commands: Any) -> argparse.ArgumentParser:
@@ -59,7 +68,7 @@ def _add_frames(command: argparse.ArgumentParser) -> None:
         help="such as 1-24, 1-100x4 (every fourth) or 1-24,30",
         metavar="A-B",
     )
-    which.add_argument(
+    command.add_argument(
         "-a", "--animation", action="store_true", help="the frame range of the file"
     )
 
@@ -72,6 +81,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
         raise UsageError("name the output with -o, or ask for the plan with --explain")
     from .render_file import render_file
 
+    resolve_paths(options)
     return render_file(
         options.scene,
         options.out,
@@ -87,17 +97,28 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("plan")
-    from ..scene.contents import frame_range
     from ..shot.explain import explain
-    from .scene_file import open_scene
+    from .scene_file import frames_of, open_scene
 
+    resolve_paths(options)
     request, frames = request_of(options), options.frames
     scene = open_scene(options.scene, choice_of(options))
-    return explain(scene, request, frame_range(scene) if options.animation else frames)
+    return explain(scene, request, frames_of(scene, frames, options.animation))
 
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:
-    return [f"{_decision(each)}: {each['reason']}" for each in result["decisions"]]
+    lines = [f"{_decision(each)}: {each['reason']}" for each in result["decisions"]]
+    return [_expected(result), *lines, *(f"note: {x}" for x in result["remarks"])]
+
+
+def _expected(plan: dict[str, Any]) -> str:
+    """Frames, memory and seconds in a line."""
+    memory, seconds = plan["memory"], plan["seconds"]
+    window = f", {memory / 1e6:.0f} MB for neighbours beside Cycles" if memory else ""
+    time = "seconds are known after a first render, or give --time-budget or --deadline"
+    if seconds is not None:
+        time = f"about {duration(seconds)} each"
+    return f"{counted(plan['frames'], 'frame')}{window}; {time}"
 
 
 def _decision(decision: dict[str, Any]) -> str:

@@ -11,10 +11,12 @@ from typing import Any
 
 from xrds_core.errors import PictureError, UsageError, XRDSError
 from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
+from xrds_core.files import check_folder
 from xrds_core.frames import frame_path, in_words
-from xrds_core.notices import warn
+from xrds_core.notices import finished, warn
 from xrds_core.time_left import Clock
 
+from ..cycles.settings import subset_of_file
 from ..cycles.size import picture_size
 from ..frame import record
 from ..frame.denoisers import load_denoiser
@@ -23,12 +25,13 @@ from ..frame.picture import NetworkFailed, Picture
 from ..planning.request import Request
 from ..planning.settings import Mode
 from ..scene.contents import frame_range, moves_in_time
+from ..scene.remarks import missing, remarks
 from ..shot.cache import SampleCache, cache_of
 from ..shot.render import render_scene
 from ..shot.sampling import has_neighbours
 from ..shot.shot import cache_samples, render_shot
 from . import picture_file
-from .scene_file import AS_SAVED, SceneChoice, open_scene
+from .scene_file import AS_SAVED, SceneChoice, frames_of, open_scene
 from .whole_file import is_whole
 
 
@@ -61,21 +64,20 @@ def render_file(
     Raises:
         UsageError, SceneError, PictureError, WeightsError: before anything is
             rendered, if it could not succeed. Later: PictureError for a frame that
-            cannot be written, NetworkFailed; both name the file that holds what was
-            rendered, and the frames before are complete.
+            cannot be written, NetworkFailed; both name the file with what there is.
     """
     if sample_cache is not None:
         _check_cache(request)
     if output is not None:
         picture_file.check_output(output, frames or [0], has_passes=bool(request.light))
     scene = open_scene(path, choice)
-    _check_libraries(request)
+    _check_parts(request)
     numbers = _numbers(scene, frames, animation, output)
+    notes = _notes(scene, request, output)
     size = picture_size(scene.render)
-    cache = sample_cache and _cache(scene, request, sample_cache)
+    cache = sample_cache and _cache(scene, request, sample_cache, numbers, choice)
 
-    def is_done(number: int) -> bool:
-        # checked anew for each: another render may be writing the same frames
+    def is_done(number: int) -> bool:  # anew: others may be writing the same frames
         return resume and is_whole(frame_path(str(output), number), size)
 
     written, last = [], None
@@ -91,7 +93,16 @@ def render_file(
         "frames": written,
         "kept": _kept(numbers, written) if output else [],
         "samples": cache and cache.report(numbers),
+        "remarks": notes,
     }
+
+
+def _notes(scene: Any, request: Request, output: str | None) -> list[str]:
+    """Print and return what the pictures, or the samples alone, will lack."""
+    notes = [*missing()] if output is None else remarks(scene, request)
+    for line in notes:
+        warn(line)
+    return notes
 
 
 def _kept(numbers: Sequence[int], written: Sequence[dict[str, Any]]) -> list[int]:
@@ -105,12 +116,10 @@ def _numbers(
 ) -> list[int]:
     """Numbers of the frames to render; says so where the file holds more."""
     there = frame_range(scene)
-    if frames:
-        return list(frames)
-    if animation:
-        if output is not None:
+    if chosen := frames_of(scene, frames, animation):
+        if animation and output is not None:
             picture_file.check_output(output, there)
-        return there
+        return chosen
     current = scene.frame_current
     if len(there) > 1 and moves_in_time(scene):
         warn(
@@ -131,9 +140,11 @@ def _described(last: Picture | None, request: Request) -> dict[str, Any]:
     }
 
 
-def _check_libraries(request: Request) -> None:
+def _check_parts(request: Request) -> None:
     """Raise XRDSError now rather than after the Cycles renders."""
     settings, machine = request.settings, request.machine
+    if request.guide_cache is not None:
+        check_folder(Path(request.guide_cache))
     if request.goal is not None:
         is_ready()  # PyTorch is loaded before the budget begins
     elif settings.is_enlarged:
@@ -180,14 +191,22 @@ def _check_cache(request: Request) -> None:
         )
 
 
-def _cache(scene: Any, request: Request, folder: Path) -> SampleCache:
+def _cache(
+    scene: Any,
+    request: Request,
+    folder: Path,
+    numbers: Sequence[int],
+    choice: SceneChoice,
+) -> SampleCache:
     """The cache of samples; raises UsageError where no frame could use them."""
     if not has_neighbours(scene, request):
         raise UsageError(
             "frames of such a panoramic camera cannot reuse samples: leave out "
             "--sample-cache"
         )
-    return cache_of(scene, request, folder, warn)
+    # neither changes a sample; what scripts did not run is known otherwise
+    decides = dataclasses.replace(choice, threads=None, trusted=False)
+    return cache_of(scene, request, folder, numbers, decides, warn)
 
 
 def _cache_others(
@@ -229,7 +248,8 @@ def _write(
     """Write one frame; returns its entry for the JSON."""
     target = frame_path(output, number)
     settings = picture.settings or request.settings
-    metadata = record.metadata(record.fields(picture, settings, scene.cycles.samples))
+    _, of_file = subset_of_file(scene.cycles, scene.cycles.samples)
+    metadata = record.metadata(record.fields(picture, settings, of_file))
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated
@@ -250,15 +270,17 @@ def _write(
     seconds = dict(picture.seconds)
     seconds["write"] += written
     seconds["total"] += written
-    return {
+    entry = {
         "frame": number,
         "output": str(target),
         "seconds": seconds,
         "temporal": picture.temporal and dataclasses.asdict(picture.temporal),
-        "samples": settings.count(scene.cycles.samples),
+        "samples": settings.count(of_file),
         "share": settings.share,
         "peak_memory": picture.peak_memory,
     }
+    finished.append(entry)
+    return entry
 
 
 def _suffix(scene: Any, view: str) -> str:

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from xrds_core.errors import SceneError
+from xrds_core.errors import SceneError, UsageError
 from xrds_core.files import check_input
+from xrds_core.frames import in_words
 from xrds_core.notices import warn
+
+from ..scene.contents import frame_range
 
 
 @dataclass(frozen=True)
@@ -56,10 +60,40 @@ def open_scene(path: Path, choice: SceneChoice = AS_SAVED) -> Any:
     if choice.scene is not None:
         scene = _named("scene", choice.scene, bpy.data.scenes, path)
     _apply(choice, scene, path)
-    if scene.camera is None:
-        raise SceneError(f"{path} has no camera in scene {scene.name!r}; add one")
+    _check_cameras(scene, path)
     _report_what_did_not_run(scene, path)
     return scene
+
+
+def _check_cameras(scene: Any, path: Path) -> None:
+    """Raise SceneError where a frame would have no camera to be seen by."""
+    if scene.camera is None:
+        scene.frame_set(scene.frame_current)  # markers may bind one
+    if scene.camera is None:
+        raise SceneError(f"{path} has no camera in scene {scene.name!r}; add one")
+    bound = [marker.camera for marker in scene.timeline_markers if marker.camera]
+    for each in (scene.camera, *bound):
+        if each.type != "CAMERA":
+            raise SceneError(
+                f"{path} has {each.name!r}, which is no camera, as the camera of scene "
+                f"{scene.name!r}; choose one, or give --camera"
+            )
+
+
+def frames_of(
+    scene: Any, frames: Sequence[int] | None, animation: bool
+) -> list[int] | None:
+    """The frames that were asked for; None for the file's current one.
+
+    Raises UsageError where `animation`, the file's range, are others than `frames`.
+    """
+    there = frame_range(scene)
+    if animation and frames and list(frames) != there:
+        raise UsageError(
+            f"-a are frames {in_words(there)} of the file, but other frames are asked "
+            "for as well; give one of them"
+        )
+    return there if animation else list(frames or ()) or None
 
 
 def _apply(choice: SceneChoice, scene: Any, path: Path) -> None:

@@ -112,6 +112,16 @@ def has_subsets(scene: Any) -> bool:
     return hasattr(scene.cycles, "use_sample_subset")
 
 
+def subset_of_file(cycles: Any, samples: int) -> tuple[int, int]:
+    """The first sample that a file has Cycles take of `samples`, and how many."""
+    if not getattr(cycles, "use_sample_subset", True):
+        return 0, samples
+    offset = getattr(cycles, "sample_offset", 0)
+    if not hasattr(cycles, "sample_subset_length"):  # before Blender 4.4
+        return offset, samples
+    return offset, max(1, min(cycles.sample_subset_length, samples - offset))
+
+
 def set_blue_noise(borrowed: Borrowed, scene: Any) -> None:
     """Spread the noise so that a denoiser leaves least of it, where Cycles can.
 

@@ -61,13 +61,15 @@ class XRDSRender(bpy.types.RenderEngine):
 
     def _render_requested(self, depsgraph: Any) -> None:
         """Render what the scene's settings describe, and report what was done."""
+        from ..cycles.settings import subset_of_file
         from ..frame import record
         from ..shot.render import render_frame
         from .properties import request_of
 
         scene, request = depsgraph.scene_eval, request_of(depsgraph.scene_eval.xrds)
         # Cycles may free the scene as it renders.
-        frame, samples = scene.frame_current, scene.cycles.samples
+        frame = scene.frame_current
+        _, samples = subset_of_file(scene.cycles, scene.cycles.samples)
         layer, notes = depsgraph.view_layer_eval.name, list(support.notes(scene))
         picture = render_frame(self, depsgraph, request)
         settings = picture.settings or request.settings

@@ -285,4 +285,4 @@ def request_of(settings: XRDSSettings) -> Request:
         deadline=settings.deadline if settings.animation == DEADLINE else None,
         passes=passes,
     )
-    return modes.in_mode(wanted, Mode(settings.mode), settings.id_data)
+    return modes.in_mode(wanted, Mode(settings.mode))

@@ -5,14 +5,12 @@ Pure functions: neither Blender nor torch is needed here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from .budget import Curve, ErrorModel, Model
 from .settings import DEFAULT_DENOISING, MODES, Denoising, Mode, Network, Settings
 
-# Differences in dB that nobody sees.
-ALIKE = 0.1
 LIBRARY_IS_MISSING = "Open Image Denoise is missing: install XRDS from its zip"
 TORCH_IS_MISSING = (
     "Super-resolution needs PyTorch, which is not installed: see the add-on's "
@@ -111,12 +109,12 @@ def estimates(
     return [Estimate(m, below[m], seconds(each)) for m, each in able.items()]
 
 
-def best(found: Sequence[Estimate]) -> Mode:
-    """The mode with the least error expected; Cycles alone where nothing is known."""
-    for each in found:
-        if each.decibels is not None and each.decibels >= -ALIKE:
-            return each.mode
-    return Mode.CYCLES_ONLY
+def automatic(here: Capabilities) -> Mode:
+    """The mode that is taken where none is chosen: full size wherever it can work.
+
+    It is the best at any number of samples; what was measured says so.
+    """
+    return Mode.FULL_SIZE if here.denoiser else Mode.CYCLES_ONLY
 
 
 def _curve(settings: Settings, here: Capabilities, errors: ErrorModel) -> Curve | None:

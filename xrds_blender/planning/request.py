@@ -162,6 +162,13 @@ def render_request(
     return Request(settings, goal, machine, **others)
 
 
+CHOICES = frozenset(
+    {"scale", "plain", "denoise", "denoiser", "time_budget", "quality"}
+    | {each.name for kind in (Settings, Machine, Request) for each in fields(kind)}
+) - {"settings", "machine", "goal", "mode", "denoising"}
+"""The names that `render_request` takes."""
+
+
 def _taken(choices: dict[str, Any], record: Any) -> dict[str, Any]:
     """Take the fields of a record out of the choices."""
     names = {each.name for each in fields(record)} & choices.keys()

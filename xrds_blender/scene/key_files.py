@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -30,6 +31,11 @@ def file_digest(
     import bpy
 
     where = Path(bpy.path.abspath(path, library=library))
+    return tuple(_stat(file) for file in files_of(where, is_sequence))
+
+
+def files_of(where: Path, is_sequence: bool = False) -> list[Path]:
+    """The file at a path, there or not, or all tiles and frames of one."""
     pattern = re.escape(where.name)
     for word in ("<UDIM>", "<UVTILE>"):
         pattern = pattern.replace(re.escape(word), ".*")
@@ -37,12 +43,31 @@ def file_digest(
         # The last number of the name, whatever its digits, counts the frames.
         pattern = re.sub(r"\d+(?=\D*$)", r"\\d+", pattern)
     if pattern == re.escape(where.name):
-        return (_stat(where),)
+        return [where]
     try:
         files = [x for x in where.parent.iterdir() if re.fullmatch(pattern, x.name)]
     except OSError:
-        return (_stat(where),)
-    return tuple(_stat(file) for file in sorted(files))
+        return [where]
+    return sorted(files) or [where]
+
+
+_ENDS = 1 << 16  # bytes
+
+
+def trace(file: Path) -> tuple[str, int, int, str]:
+    """Name, size and time of a file on any machine, and what it begins and ends with.
+
+    Copies keep times in whole seconds, on some disks.
+    """
+    try:
+        with file.open("rb") as opened:
+            about = os.fstat(opened.fileno())
+            ends = opened.read(_ENDS)
+            opened.seek(max(about.st_size - _ENDS, 0))
+            ends += opened.read(_ENDS)
+    except OSError:
+        return file.name, -1, -1, ""
+    return file.name, about.st_size, int(about.st_mtime), _hash(ends)
 
 
 def _stat(file: Path) -> tuple[str, int, int, int]:

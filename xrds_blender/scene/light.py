@@ -32,14 +32,18 @@ def has_light(layer: Any) -> bool:
     return bool(len(layer.lightgroups)) or bool(_LIGHT & {*requested_passes(layer)})
 
 
+def compositor_of(scene: Any) -> Any:
+    """The node tree that a render of the scene is to go through; None without one."""
+    if not scene.render.use_compositing:
+        return None
+    if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later
+        return scene.compositing_node_group
+    return scene.node_tree if scene.use_nodes else None
+
+
 def _is_composited(scene: Any) -> bool:
     """Whether a node of the compositor takes light of a view layer."""
-    if not scene.render.use_compositing:
-        return False
-    if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later
-        tree = scene.compositing_node_group
-    else:
-        tree = scene.node_tree if scene.use_nodes else None
+    tree = compositor_of(scene)
     read = {
         f"{socket.name}.{letter}": None
         for node in (tree.nodes if tree else ())

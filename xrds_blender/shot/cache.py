@@ -7,6 +7,7 @@ processes and machines may fill one folder, in any order.
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,27 +18,32 @@ import numpy as np
 from xrds_core.errors import PictureError
 from xrds_core.files import check_folder
 from xrds_core.frames import frame_numbers, frame_path
-from xrds_core.sequence.reading import Reading, read_frame
+from xrds_core.sequence.reading import FrameFile, Reading, read_frame
 from xrds_core.sequence.sample_cache import Origin, write_cached_frame
 from xrds_core.temporal.frame import Frame, Stored
+from xrds_core.temporal.window import place_of, step_of
 
-from ..cycles.size import picture_size
 from ..planning.request import Request
-from .sampling import Sampled
+from ..scene.key_files import trace
+from ..scene.outer_files import outer_files
+from .sampling import Sampled, subset_at
 
-_FORM = 2  # counts up where samples of the same settings become others
+_FORM = 3  # counts up where samples of the same settings become others
 
 
 @dataclass(frozen=True)
 class SampleCache:
     """A folder of samples of one file and one set of settings.
 
-    `say` takes a line about samples that cannot be used; `rendered` are the frames
-    that were written. Of a stereo pair each view has a file of its own.
+    `numbers` are the frames that are rendered: how far they lie apart decides what
+    frames under a still camera take of the sequence that they share. `say` takes a line
+    about samples that cannot be used; `rendered` are the frames that were written. Of a
+    stereo pair each view has a file of its own.
     """
 
     folder: Path
     origin: Origin
+    numbers: Sequence[int]
     views: tuple[str, ...]
     transparent: bool
     say: Callable[[str], object]
@@ -66,16 +72,14 @@ class SampleCache:
             path = self._path(number, view)
             if not path.is_file():
                 return None
+            outcome = "rendered again" if number in self.numbers else "not reused"
             try:
                 cached = read_frame(path, number, Reading())
             except PictureError as error:
-                self.say(f"frame {number} is rendered again: {error}")
+                self.say(f"frame {number} is {outcome}: {error}")
                 return None
-            if cached.key != self.origin.key:
-                self.say(
-                    f"frame {number} is rendered again: {path} is of another file or "
-                    "of other settings"
-                )
+            if why := self._difference(number, cached):
+                self.say(f"frame {number} is {outcome}: {path} is of {why}")
                 return None
             views[view] = _with_alpha(cached.stored)
         return Sampled(number, views, {})
@@ -83,10 +87,27 @@ class SampleCache:
     def beside(self, numbers: Sequence[int], radius: int) -> list[int]:
         """Return cached frames beyond the ends of these, near enough for them."""
         first, last = min(numbers), max(numbers)
+        step = step_of(numbers) or 1
         there = frame_numbers(self._pattern(self.views[0]))
+        reach = radius * step
         return [
-            n for n in there if first - radius <= n < first or last < n <= last + radius
+            n
+            for n in there
+            if (first - reach <= n < first or last < n <= last + reach)
+            and (n - first) % step == 0
         ]
+
+    def _difference(self, number: int, cached: FrameFile) -> str:
+        """What a stored frame is of that this one is not; "" if it is the same."""
+        if cached.key != self.origin.key:
+            return "another file or of other settings"
+        if cached.subset is None:  # a sequence of its own
+            return ""
+        if number in self.numbers or step_of(self.numbers):
+            place = place_of(number, self.numbers)
+            if cached.subset == subset_at(place, self.origin.radius):
+                return ""
+        return "a shot in other steps"
 
     def _path(self, number: int, view: str) -> Path:
         return frame_path(self._pattern(view), number)
@@ -96,11 +117,17 @@ class SampleCache:
 
 
 def cache_of(
-    scene: Any, request: Request, folder: Path, say: Callable[[str], object]
+    scene: Any,
+    request: Request,
+    folder: Path,
+    numbers: Sequence[int],
+    choice: object,
+    say: Callable[[str], object],
 ) -> SampleCache:
     """Make the cache of an open file's samples, and its folder.
 
-    Raises PictureError where the folder takes no files.
+    `choice` is what came in the place of what the file holds. Raises PictureError where
+    the folder takes no files.
     """
     check_folder(folder)
     layer = next((layer.name for layer in scene.view_layers if layer.use), "")
@@ -109,17 +136,19 @@ def cache_of(
         views = tuple(view.name for view in scene.render.views if view.use)
     return SampleCache(
         folder,
-        Origin(_key(scene, request, layer), layer, request.settings.temporal_radius),
+        Origin(_key(request, choice), layer, request.settings.temporal_radius),
+        numbers,
         views,
         scene.render.film_transparent,
         say,
     )
 
 
-def _key(scene: Any, request: Request, layer: str) -> str:
-    """Name what decides a frame's samples: files, settings, and Blender.
+def _key(request: Request, choice: object) -> str:
+    """Name what decides samples: all files that are read, what was asked, Blender.
 
-    Other files than the .blend are identified by name, size and time of change.
+    Other files than the .blend are identified by name, size, time of change, and by
+    what they begin and end with.
     """
     import bpy
 
@@ -127,30 +156,21 @@ def _key(scene: Any, request: Request, layer: str) -> str:
     with Path(bpy.data.filepath).open("rb") as file:
         while block := file.read(1 << 20):
             digest.update(block)
-    for path in sorted(bpy.utils.blend_paths(absolute=True)):
-        digest.update(repr(_trace(Path(path))).encode())
+    colours = os.environ.get("OCIO", "")  # textures are read by it
+    outer = [path for each in outer_files() for path in each.files]
+    for path in dict.fromkeys([*outer, *filter(None, [colours and Path(colours)])]):
+        digest.update(repr(trace(path)).encode())
     settings = (
         _FORM,
         bpy.app.version_string,
-        scene.name,
-        layer,
-        scene.camera.name_full,
         bpy.app.autoexec_fail,  # drivers of the file did not run
-        picture_size(scene.render),
-        request.settings.samples or scene.cycles.samples,
-        scene.cycles.seed if request.seed is None else request.seed,
+        choice,
+        request.settings.samples,
         request.settings.temporal_radius,
+        request.seed,
     )
     digest.update(repr(settings).encode())
     return digest.hexdigest()
-
-
-def _trace(path: Path) -> tuple[str, int, int]:
-    try:
-        about = path.stat()
-    except OSError:
-        return path.name, 0, 0
-    return path.name, about.st_size, int(about.st_mtime)
 
 
 def _with_alpha(stored: Stored) -> Stored:

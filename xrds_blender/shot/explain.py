@@ -8,12 +8,18 @@ from dataclasses import asdict
 from typing import Any
 
 from ..choosing.chosen import Chosen, chosen
+from ..choosing.history import scene_settings
+from ..choosing.modes import frame_seconds
 from ..choosing.plan_facts import find_facts
+from ..cycles.size import picture_size
 from ..frame.rendering import call_engine
+from ..planning.estimates import resolved
+from ..planning.forecast import shot_memory
 from ..planning.plan import deadline, neighbours, same_picture
 from ..planning.request import Request
 from ..scene.contents import frame_range
 from ..scene.cuts import cuts
+from ..scene.remarks import remarks
 from .pace.same_picture import can_save
 from .sampling import has_neighbours
 
@@ -53,4 +59,14 @@ def _described(
     if request.deadline is not None:
         decisions += (deadline(request.deadline, len(shot)),)
     decisions = choice.all_decisions(decisions)
-    return {"facts": asdict(facts), "decisions": [asdict(each) for each in decisions]}
+    size = picture_size(scene.render)
+    pace = request.deadline and request.deadline / len(shot)
+    settings = resolved(request.settings, scene_settings(scene))
+    return {
+        "frames": len(shot),
+        "seconds": pace or frame_seconds(scene, settings, radius),
+        "memory": shot_memory(*size, radius, settings.scale) if len(shot) > 1 else 0,
+        "facts": asdict(facts),
+        "decisions": [asdict(each) for each in decisions],
+        "remarks": remarks(scene, request),
+    }

@@ -17,6 +17,7 @@ from xrds_core.sequence.finishing import finish_frame
 from xrds_core.temporal.accumulate import Accumulated
 from xrds_core.temporal.equal_noise import IndependentFrames
 
+from ..cycles.layer_session import LayerSession
 from ..cycles.samples import Samples
 from ..frame.denoisers import load_denoiser
 from ..frame.picture import Picture, Temporal, peak_memory
@@ -65,11 +66,13 @@ class FullSize(Method):
             return sample_frame(
                 engine, depsgraph, self.request, place, self._on_sampled
             )
-        while True:
-            request = pace.request(self.request)
-            sampled = sample_frame(engine, depsgraph, request, place)
-            if pace.takes(self, sampled):
-                return sampled
+        # it may be sampled several times: Cycles must not free the dependency graph
+        with LayerSession(engine, depsgraph):
+            while True:
+                request = pace.request(self.request)
+                sampled = sample_frame(engine, depsgraph, request, place)
+                if pace.takes(self, sampled):
+                    return sampled
 
     def begin_finishing(self, engine: Any) -> Report:
         if self._denoise_in_time is not None:

@@ -29,7 +29,7 @@ from ..cycles.samples import (
     Samples,
     sample_layer,
 )
-from ..cycles.settings import has_subsets, set_share
+from ..cycles.settings import has_subsets, set_share, subset_of_file
 from ..cycles.view import cameras_of, can_track
 from ..frame import denoisers, stages
 from ..internals.borrowed import Borrowed
@@ -126,6 +126,11 @@ class Sampling:
             self.place, self.count, self.radius, self.seed, self.most
         )
 
+    @property
+    def shared(self) -> int | None:
+        """The number of the frame's part of a sequence that others continue."""
+        return None if self.place is None else subset_at(self.place, self.radius)
+
     def other_subset(self, count: int) -> SampleSubset | None:
         """As `subset`, of `count` samples of a sequence with another seed."""
         if self.place is None:
@@ -168,6 +173,11 @@ class Sampling:
         return (self.seed + self.number * SEED_STEP) % _LARGEST_SEED
 
 
+def subset_at(place: int, radius: int) -> int:
+    """The number of a frame's subset, of as many as a frame has in its window."""
+    return place % (2 * radius + 1)
+
+
 def has_neighbours(scene: Any, request: Request) -> bool:
     """Whether frames of a shot are to use, and can use, each other's samples.
 
@@ -186,6 +196,12 @@ def can_continue(scene: Any, request: Request) -> bool:
 
     And where the file does not let Cycles decide how many samples a pixel takes.
     """
+    cycles, samples = scene.cycles, request.settings.samples
+    if samples is None and subset_of_file(cycles, cycles.samples) != (
+        0,
+        cycles.samples,
+    ):
+        return False  # the file says which part of a sequence it takes
     return stands_still(scene.camera) and has_subsets(scene) and is_even(scene, request)
 
 
@@ -212,10 +228,11 @@ def sampling_of(
         place = None
     facts = scene_facts(depsgraph)
     geometry = [*_geometry(depsgraph), *([] if even else [COUNTS])]
-    settings, of_file = request.settings, session.samples_of(depsgraph)
+    settings = request.settings
+    offset, of_file = subset_of_file(scene.cycles, session.samples_of(depsgraph))
     seed = scene.cycles.seed if request.seed is None else request.seed
     blurred = scene.render.use_motion_blur
-    if place is not None:
+    if place is not None or (offset and settings.samples is None):
         geometry[0] = LATE_DEPTH
     elif facts.smooth and not request.settings.is_enlarged:
         geometry.append(PATH_LENGTH)
@@ -410,6 +427,7 @@ def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
         counts=counts,
         path_length=samples.path_length,
         parts=samples.parts,
+        subset=how.shared,
     )
 
 

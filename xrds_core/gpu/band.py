@@ -99,7 +99,9 @@ class Band:
         used = {1: own, 4: sums, 5: here.buffers.counts, 6: weights, 7: means}
         calls.append(Call("parts", "mean", self._size, step, used))
         card.start(calls)
-        return card.download(means).reshape(-1, 3)[self._inner]
+        # a buffer holds four floats at least, a single pixel three
+        found = card.download(means)[: 3 * self._count]
+        return found.reshape(-1, 3)[self._inner]
 
     def _own(self) -> Iterator[Call]:
         """What similarity needs to know of the frame itself."""

@@ -8,6 +8,7 @@ from ..errors import UsageError
 from ..notices import warn
 from ..temporal.accumulate import accumulate
 from ..temporal.frame import Camera, Frame, Stored, store
+from ..temporal.motion import FEW_SAMPLES
 from .accumulate import CardAccumulator
 from .card import Card, CardLost, card_names, find_adapters
 
@@ -87,6 +88,6 @@ def _frame(number: int) -> Stored:
             albedo.astype(np.float32),
             normal,
             depth,
-            samples=4.0,
+            samples=FEW_SAMPLES,  # of more a card accumulates none that move
         )
     )

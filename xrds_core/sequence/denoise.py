@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .. import exr
+from .. import exr, notices
 from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
 from ..frames import (
@@ -268,7 +268,9 @@ def _entries(
         seconds["write"] = time.perf_counter() - started
         left = sum(n > number and n not in loader.failed for n in shot.frames)
         say(f"frame {number}: {path}, {clock.lap(left)}")
-        yield _entry(number, path, shot.radius, finished, seconds)
+        entry = _entry(number, path, shot.radius, finished, seconds)
+        notices.finished.append(entry)
+        yield entry
     selection.report()
 
 

@@ -39,6 +39,9 @@ _APART, _USUAL, _NEAR = 1.5, 33, 24
 # few noisy pixels are.
 _LEAST_FACTOR, _MOST_FACTOR = 1.0, 2.0
 _SMOOTH = 3  # pixels across
+# Frames of so many samples are denoised once: a denoiser no longer mistakes their noise
+# beside that of more, and the frame alone would bring it back.
+_DENOISED_ONCE = 8.0
 # The frame alone is denoised in parts where these are less than this much of it.
 _PART = 0.75
 AROUND = 96
@@ -84,9 +87,10 @@ def finish_frame(
 ) -> Finished:
     """Accumulate the samples of `neighbours` on a frame and denoise it.
 
-    Where few samples are reused the picture is that of the frame alone, also denoised:
-    next to pixels of many samples a denoiser mistakes the noise of few for detail.
-    Where that is a small part of the picture, that part alone is denoised again.
+    Where a frame has few samples, and few are reused, the picture is that of the frame
+    alone, also denoised: next to pixels of many samples a denoiser mistakes the noise
+    of few for detail. Where that is a small part of the picture, that part alone is
+    denoised again.
     `region`, rows and columns, is the part to denoise: black around a crop would give
     the denoiser a wrong exposure. `accumulated` is the frame with its neighbours if it
     is known already; `light` are the parts that are denoised as well. Raises Cancelled
@@ -95,12 +99,13 @@ def finish_frame(
     started = time.perf_counter()
     if accumulated is None:
         accumulated = accumulate(own, neighbours)
-    alone = accumulate(own) if neighbours else accumulated
-    share = _share(accumulated, alone, own.samples)
-    denoise_started = time.perf_counter()
     region = region or (slice(None), slice(None))
-    share = share[region]
-    areas = _lacking(share)
+    areas: list[_Area] = []
+    if neighbours and own.samples < _DENOISED_ONCE:
+        alone = accumulate(own)
+        share = _share(accumulated, alone, own.samples)[region]
+        areas = _lacking(share)
+    denoise_started = time.perf_counter()
     parts = 1 + len(areas)
     passes = _Passes.of(accumulated, light, region)
     told = [_part(progress, number, parts) for number in range(parts)]

@@ -17,6 +17,7 @@ NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
 CAMERA_NORMAL = "Denoising Normal"
 PATH_LENGTH = "Denoising Depth"
 NOISE = "XRDS Noise"  # of the samples, as XRDS estimated it before storing them
+COUNTS = "XRDS Samples"  # of each pixel, where they differ
 # Names of passes in the order in which they are tried, case-insensitive.
 _USUAL = {
     "beauty": (NOISY, COMBINED, "beauty", "RGBA", "rgb", "C", "Ci"),
@@ -64,6 +65,7 @@ class Found:
     path_length: list[str]
     vector: list[str]
     noise: list[str]
+    counts: list[str]
     picture: list[str]
     alpha: str | None
     has_camera_normal: bool
@@ -91,16 +93,18 @@ def find(channels: Channels, names: PassNames) -> Found:
         depth=_depth(channels, names),
         path_length=_path_length(channels, names),
         vector=_channels(channels, names, "vector", _MOTION),
-        noise=_noise(channels),
+        noise=_ours(channels, NOISE, "XYZ"),
+        counts=_ours(channels, COUNTS, "X"),
         picture=channels.of(target) or ["R", "G", "B"],
         alpha=next((x for x in alphas if x in channels.names), None),
         has_camera_normal=(normal or "").endswith(CAMERA_NORMAL),
     )
 
 
-def _noise(channels: Channels) -> list[str]:
-    found = channels.find(NOISE, ("XYZ",))
-    return [] if found is None else channels.of(found, ("XYZ",))
+def _ours(channels: Channels, name: str, letters: str) -> list[str]:
+    """The channels of a pass of stored samples."""
+    found = channels.find(name, (letters,))
+    return [] if found is None else channels.of(found, (letters,))
 
 
 def _target(channels: Channels, prefix: str) -> str:

@@ -71,4 +71,9 @@ def _difference(one: FrameFile, two: FrameFile) -> str:
         return "they hold different parts of the light"
     if one.key != two.key:
         return "they were rendered from other files or with other settings"
+    if one.subset is not None and one.subset == two.subset:
+        return (
+            "they have the same noise, of frames in other steps; render both with the "
+            "frames of the whole shot"
+        )
     return ""

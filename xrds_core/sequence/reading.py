@@ -31,10 +31,11 @@ if TYPE_CHECKING:
     from ..light_parts.find import LightPart
 
 SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
+SUBSET = "xrds/subset"
 NAME = "cameraLabel"
 """Attributes: samples per pixel; a key of what the frame was rendered from; the
 temporal radius that its sample subsets are for; 1 where nothing at all moves in the
-shot; the camera's name."""
+shot; `Frame.subset`, none of a sequence of its own; the camera's name."""
 _DEFAULT_SAMPLES = 16
 _FITS = 2.0  # pixels by which a reprojected Position pass may be off
 _NEAREST = 1e-30  # depth of a hit, in any unit: dividing by it stays within float32
@@ -75,9 +76,10 @@ class FrameFile:
     crops its arrays to the latter, `data_window`. `part` is the file's part with the
     picture and `channels` are those of the picture, R, G, B and, where the file has
     alpha, A. Frames with the same `key` have the same render settings; "" if unknown.
-    `radius` is the one that the file recommends, or None. `reusable` is False where the
-    frame cannot be reprojected. `light` are the parts of its light that were read;
-    `places` says in which part of the file a channel lies, and what it is called there.
+    `radius` is the one that the file recommends, or None, and `subset` that of
+    `Frame`. `reusable` is False where the frame cannot be reprojected. `light` are the
+    parts of its light that were read; `places` says in which part of the file a channel
+    lies, and what it is called there.
     `others` are the other views of a stereo file, `unread` says why some are not read.
     """
 
@@ -89,6 +91,7 @@ class FrameFile:
     key: str
     radius: int | None
     reusable: bool
+    subset: int | None = None
     light: tuple[LightPart, ...] = ()
     places: Mapping[str, tuple[int, str]] = field(default_factory=dict)
     others: Mapping[str, FrameFile] = field(default_factory=dict)
@@ -131,6 +134,7 @@ def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> Fra
         depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
         samples=_samples(file, part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
+        counts=file.plane(found.counts[0]) if found.counts else None,
         vector=_vector(file, found, reading) if reusable else None,
         path_length=_path_length(file, found) if reusable else None,
         still=attributes.whole_or_none(part.attributes.get(STILL)) == 1,
@@ -150,6 +154,7 @@ def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> Fra
         key=str(part.attributes.get(KEY, "")),
         radius=attributes.whole_or_none(part.attributes.get(RADIUS), 0, MOST_RADIUS),
         reusable=camera is not None and depth is not None,
+        subset=attributes.whole_or_none(part.attributes.get(SUBSET)),
         light=light,
         places={
             name: _place(file, number_of_part, name)
@@ -363,10 +368,13 @@ def _noise(file: File, found: Found) -> Noise:
     return Noise(*(plane.astype(np.float16) for plane in cut))
 
 
-def _samples(file: File, part: Part, reading: Reading) -> int:
+def _samples(file: File, part: Part, reading: Reading) -> float:
     """Samples per pixel: from the options, or as XRDS or Blender wrote them."""
     if reading.samples:
         return reading.samples
+    mean = part.attributes.get(SAMPLES)
+    if isinstance(mean, float) and 1.0 <= mean <= attributes.MOST:
+        return mean
     values = []
     for each in (part, *file.parts):  # renderers may tell the first part alone
         values.append(each.attributes.get(SAMPLES))

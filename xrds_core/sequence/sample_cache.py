@@ -14,10 +14,10 @@ import numpy as np
 
 from .. import exr
 from ..exr.openexr_io import Part
-from ..temporal.frame import LARGEST_HALF, noise_in
+from ..temporal.frame import LARGEST_HALF, noise_in, pack_counts
 from .cameras import to_header
-from .names import CAMERA_NORMAL, NOISE, NOISY, PATH_LENGTH
-from .reading import KEY, NAME, RADIUS, SAMPLES, STILL
+from .names import CAMERA_NORMAL, COUNTS, NOISE, NOISY, PATH_LENGTH
+from .reading import KEY, NAME, RADIUS, SAMPLES, STILL, SUBSET
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -48,12 +48,15 @@ def write_cached_frame(path: Path, frame: Frame, origin: Origin) -> None:
     right, bottom = (side - 1 for side in frame.camera.size)
     attributes: dict[str, Any] = {
         **to_header(frame.camera),
-        SAMPLES: int(frame.samples),
+        # a mean where counts differ
+        SAMPLES: frame.samples if frame.counts is not None else int(frame.samples),
         KEY: origin.key,
         RADIUS: origin.radius,
         STILL: int(frame.still),
         NAME: frame.camera.name,
     }
+    if frame.subset is not None:
+        attributes[SUBSET] = frame.subset
     part = Part(
         "",
         ((x, y), (x + width - 1, y + height - 1)),
@@ -75,6 +78,9 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
     ]
     if frame.alpha is not None:
         passes.append((NOISY, "A", frame.alpha[..., None]))
+    if frame.counts is not None:
+        counts = pack_counts(frame.counts).reshape(frame.shape)
+        passes.append((COUNTS, "X", counts[..., None]))
     if frame.vector is not None:
         passes.append(("Vector", "XYZW", frame.vector))
     channels: dict[str, NDArray[Any]] = {

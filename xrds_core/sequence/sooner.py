@@ -50,5 +50,5 @@ class Clock:
             warn(
                 f"Same Picture takes {ours / count:.3g} s a frame here, Cycles with "
                 f"its denoiser about {theirs / count:.3g} s: --plain is sooner, "
-                "--same-time has the better picture"
+                "and without Same Picture the picture is better"
             )

@@ -1,11 +1,11 @@
 """Accumulates the noisy samples of neighbour frames on the pixels of one frame.
 
 Samples are gathered, never interpolated: each pixel takes the nearest pixel of the
-neighbour frame as it is. Interpolation would correlate the noise of adjacent pixels,
-and denoisers mistake correlated noise for texture. The mean is weighted by sample
-counts, by the distance between the reprojected position and the pixel taken, which
-keeps fine texture sharp, and by a similarity weight: do both frames show the same
-light?
+neighbour frame. Interpolation would correlate the noise of adjacent pixels, and
+denoisers mistake correlated noise for texture. How far that pixel lies from the true
+place is taken out by `registration`, for which a frame is gathered twice. The mean is
+weighted by sample counts, by what distance remains, which keeps fine texture sharp, and
+by a similarity weight: do both frames show the same light?
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ from .candidates import Images, find_images
 from .coarse_rejection import pixel_weights, tile_weights
 from .half_floats import floats
 from .local_filters import extreme
-from .motion import grid, inverse_depth_range, pair, places
+from .motion import FEW_SAMPLES, grid, inverse_depth_range, pair, places
+from .registration import AS_DISTANCE, MOMENTS, Guess, moments
 from .shot_cuts import same_shot
 from .similarity import MARGIN, GuideSimilarity, Similarity, light_for_albedo
 from .vectors import Movement
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
     from ..arrays import Array
     from .frame import Stored
-    from .motion import Pair
+    from .motion import Pair, Places
 
     Mask = NDArray[np.bool_]
 
@@ -96,11 +97,21 @@ def accumulate(
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
     lit = _lit(target, others)
     means, device = None, PROCESSOR
-    if card is not None and card.takes(target, others):
+    # G's own noise counts more than texture where samples are few
+    registers = bool(pairs) and target.samples > FEW_SAMPLES
+    # a card's kernels take no offsets out
+    if card is not None and not registers and card.takes(target, others):
         means = card.means(target, [x for x in groups if x], images, usual, lit)
         device = card.name
     if means is None:
-        means = _by_rows(target, groups, images, usual, lit, threads)
+        gather = partial(
+            _by_rows, target, images=images, usual=usual, lit=lit, threads=threads
+        )
+        guess = None
+        if registers:
+            near = gather(groups[:1])
+            guess = Guess([*near.passes, *near.parts], target.has_light)
+        means = gather(groups, guess=guess)
         device = PROCESSOR
     height, width = target.shape
     requested = sum(x.samples for x in others) * height * width
@@ -152,6 +163,7 @@ def _by_rows(
     usual: float,
     lit: tuple[str, ...],
     threads: int | None,
+    guess: Guess | None = None,
 ) -> Means:
     """Accumulate block by block, on the processor."""
     height, width = target.shape
@@ -161,7 +173,7 @@ def _by_rows(
 
     def work(first: int) -> float:
         rows = slice(first, min(first + _ROWS, height))
-        block = _Block(target, rows, usual, images, lit)
+        block = _Block(target, rows, usual, images, lit, guess)
         sums = [_block_sums(block, group) for group in groups if group]
         for each in sums:
             each.finish()
@@ -231,6 +243,7 @@ class _Block:
         usual: float,
         images: Images | None,
         lit: tuple[str, ...] = (),
+        guess: Guess | None = None,
     ) -> None:
         height, width = target.shape
         first, last = max(rows.start - MARGIN, 0), min(rows.stop + MARGIN, height)
@@ -247,6 +260,7 @@ class _Block:
         self.known = np.ones(len(self.own), bool)
         if target.invalid is not None:
             self.known = ~target.invalid[self.wide.pixels]
+        self.guess = guess
         self._target, self._usual = target, usual
 
     @cached_property
@@ -295,13 +309,15 @@ def _similarity(target: Stored, block: _Block, usual: float) -> Similarity:
 class _Sums:
     """The samples of some neighbours, summed over the rows of a block and its margin.
 
-    `values` (n, C), `parts` (n, 3 P) and `brightness` (n,) are weighted sums, `weights`
-    (n,) the sums of weights, `reused` (n,) the numbers of samples.
+    `values` (n, C), `parts` (n, 3 P), `brightness` (n,) and `moments` (MOMENTS, n) are
+    weighted sums, `weights` (n,) the sums of weights, `reused` (n,) the numbers of
+    samples.
     """
 
     def __init__(self, block: _Block) -> None:
         self.block = block
         self.values, self.parts = np.zeros_like(block.own), np.zeros_like(block.parts)
+        self.moments = np.zeros((MOMENTS, len(block.own)), np.float32)
         self.weights, self.reused, self.brightness = np.zeros(
             (3, len(block.own)), np.float32
         )
@@ -328,6 +344,7 @@ class _Sums:
     def finish(self) -> None:
         """Apply the similarity weight and crop to the block's own rows."""
         block = self.block
+        self._register()
         weights = np.maximum(self.weights, _TINY)
         means = block.shaped(self.values / weights[:, None])
         seen = block.shaped(self.weights > 0.0)
@@ -343,6 +360,18 @@ class _Sums:
         inner = block.inner
         self.values, self.parts = self.values[inner], self.parts[inner]
         self.weights, self.reused = self.weights[inner], self.reused[inner]
+
+    def _register(self) -> None:
+        """Take out the offsets of the pixels taken."""
+        block, guess = self.block, self.block.guess
+        if guess is None:
+            return
+        change = guess.change(block.rows, self.moments)
+        channels = self.values.shape[1]
+        self.values += change[:, :channels]
+        self.parts += change[:, channels:][:, : self.parts.shape[1]]
+        if block.similarity is not None:
+            self.brightness += change[:, -1]
 
     def _scale(self, factor: Array) -> None:
         self.values *= factor[:, None]
@@ -436,9 +465,25 @@ class Reprojected:
         weight *= tiles
         weight *= sample_counts(other, found.pixel, len(weight))
         reused = weight.copy()
-        weight *= np.exp(found.apart * self.fall)
+        if block.guess is None:
+            weight *= np.exp(found.apart * self.fall)
+        else:
+            x, y = self._offsets(found, block)
+            less = (x * x + y * y) * np.float32(1.0 - AS_DISTANCE)
+            weight *= np.exp((found.apart - less) * self.fall)
+            sums.moments += moments(x, y, weight)
         parts = block.parts_of(other, found.pixel)
         sums.add(values, parts, weight, reused, _noise(other, found.pixel, block))
+
+    def _offsets(self, found: Places, block: _Block) -> tuple[Array, Array]:
+        """Return the offsets (n,) that can be taken out; 0 elsewhere.
+
+        Beside a nearer surface what a pixel mixes moves in two ways.
+        """
+        beside = self.pair.here.rims[block.wide.pixels]
+        beside = beside | self.other.rims.take(found.pixel)
+        inner = found.seen & ~beside
+        return found.x * inner, found.y * inner
 
 
 def sample_counts(

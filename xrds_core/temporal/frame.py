@@ -137,6 +137,8 @@ class Frame:
     their mean. `halves` are the half buffers, from which noise is estimated better than
     from the surrounding pixels. `path_length` (H, W): the way from the camera, through
     mirrors and glass, to what albedo and normal show (Cycles' `Denoising Depth`).
+    `subset` is the number of the part that the frame has of a sequence that frames
+    share: two with the same have the same noise. None of a sequence of its own.
     """
 
     number: int
@@ -153,6 +155,7 @@ class Frame:
     halves: Halves | None = None
     path_length: Array | None = None
     parts: Mapping[str, Array] = field(default_factory=dict)
+    subset: int | None = None
 
     def __post_init__(self) -> None:
         shapes = _PASSES | _OPTIONAL

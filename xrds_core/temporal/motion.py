@@ -47,7 +47,7 @@ _AS_DISTANCE_AT_RIMS, _MOST_AT_RIMS = 0.3, 1.0
 # by whole pixels would all show the same points, and lines thinner than a pixel would
 # break up. So there the pixel taken is jittered by up to this much. Motion counts as
 # whole pixels where a position is nearer to a centre than this, per frame between.
-_FEW_SAMPLES = 2.0
+FEW_SAMPLES = 2.0
 _OFF, _WHOLE = 0.6, 0.02
 # Multiples of these spread evenly over a unit square (M. Roberts, R3 and R2 sequences);
 # as fractions of 2^32, so that no rounding depends on the processor.
@@ -70,20 +70,23 @@ class Grid:
 class Places:
     """Where pixels were in another frame.
 
-    `pixel`: flat index of the other frame's nearest pixel, 0 where not seen;
-    `apart`: squared distance in pixels from the true position to that pixel's centre,
-    plus the differences of forward and backward motion and of both sides of an edge;
-    `seen`: where the other frame shows the same. All (n,), in the order of the grid.
+    `pixel`: flat index of the other frame's nearest pixel, 0 where not seen; `x` and
+    `y`: from the true position to that pixel's centre, in pixels; `apart`: the square
+    of this distance, plus the differences of forward and backward motion and of both
+    sides of an edge; `seen`: where the other frame shows the same. All (n,), in the
+    order of the grid.
     """
 
     pixel: NDArray[np.int32]
+    x: Array
+    y: Array
     apart: Array
     seen: NDArray[np.bool_]
 
     def put(self, at: NDArray[np.intp] | slice, other: Places) -> None:
         """Replace those `at` some indices by others."""
         self.pixel[at], self.apart[at] = other.pixel, other.apart
-        self.seen[at] = other.seen
+        self.x[at], self.y[at], self.seen[at] = other.x, other.y, other.seen
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,7 @@ class Pair:
         here, there = self.here, self.there
         is_static = here.camera.same(replace(there.camera, window=here.camera.window))
         moment = here.number == there.number
-        return not (here.samples > _FEW_SAMPLES or is_static or moment)
+        return not (here.samples > FEW_SAMPLES or is_static or moment)
 
     @property
     def whole_motion(self) -> float:
@@ -316,7 +319,7 @@ def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
     seen = found.seen & (left < _TOLERANCE**2) & (near >= least) & (near <= most)
     left[~seen] = 0.0
     apart = found.apart + np.float32(_AS_DISTANCE) * left
-    return Places(found.pixel, apart, seen), found.seen
+    return replace(found, apart=apart, seen=seen), found.seen
 
 
 def _jitter(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
@@ -332,7 +335,9 @@ def _jitter(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
         for x in (_SPREAD_X, _SPREAD_Y)
     )
     other = nearest(x[at] + off_x, y[at] + off_y, there.shape)
-    found.pixel[at[other.seen]] = other.pixel[other.seen]
+    at, inside = at[other.seen], other.seen
+    found.pixel[at] = other.pixel[inside]
+    found.x[at], found.y[at] = (other.x + off_x)[inside], (other.y + off_y)[inside]
 
 
 def _fraction(
@@ -398,8 +403,9 @@ def nearest(x: Array, y: Array, shape: tuple[int, int]) -> Places:
     seen = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
     x, y = np.where(seen, x, np.float32(0.5)), np.where(seen, y, np.float32(0.5))
     column, row = x.astype(np.int32), y.astype(np.int32)
-    off_x, off_y = x - column - np.float32(0.5), y - row - np.float32(0.5)
-    return Places(row * np.int32(width) + column, off_x**2 + off_y**2, seen)
+    off_x, off_y = column - x + np.float32(0.5), row - y + np.float32(0.5)
+    pixel = row * np.int32(width) + column
+    return Places(pixel, off_x, off_y, off_x**2 + off_y**2, seen)
 
 
 def centres(pixels: NDArray[np.integer], width: int) -> tuple[Array, Array]:

@@ -79,9 +79,14 @@ def place_of(frame: int, frames: Sequence[int]) -> int:
     Frames in even steps are counted from frame 0, so that parts of a shot rendered
     separately agree. Others are counted from the first one.
     """
-    order = sorted(set(frames))
-    steps = {after - before for before, after in pairwise(order)}
-    return frame // max(steps, default=1) if len(steps) < 2 else order.index(frame)
+    step = step_of(frames)
+    return frame // step if step else sorted(set(frames)).index(frame)
+
+
+def step_of(frames: Sequence[int]) -> int | None:
+    """Return how far frames lie apart, 1 for a single one; None if not evenly."""
+    steps = {after - before for before, after in pairwise(sorted(set(frames)))}
+    return max(steps, default=1) if len(steps) < 2 else None
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning import budget
 from xrds_blender.planning.budget import Curve
-from xrds_blender.planning.estimates import ALIKE
 from xrds_blender.planning.settings import (
     DEFAULT_DENOISING,
     OUR_DENOISING,
@@ -28,6 +27,8 @@ if TYPE_CHECKING:
     Point = dict[str, Any]
     Report = dict[str, Any]
 
+ALIKE = 0.1
+"""Differences in dB that nobody sees."""
 # A picker keeps its promise between these shares of the seconds asked for.
 EARLIEST, LATEST = 0.8, 1.05
 OURS, CACHED, RIVAL = "XRDS", pareto.CACHED, "OIDN, best mode"

@@ -32,7 +32,7 @@ def scene_plot(
     scene: str, points: Sequence[Point], unit: float, floor: float | None
 ) -> bytes:
     """SVG of one scene: all points, each group's frontier, the reference's floor."""
-    figure, panels = two_panels(scene, "seconds of a whole frame")
+    figure, panels = two_panels(as_text(scene), "seconds of a whole frame")
     groups = pareto.groups(points)
     for panel, measure in zip(panels, MEASURES, strict=True):
         for name in STYLES:
@@ -83,8 +83,9 @@ def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
             here = [e for e in entries if e["scene"] == scene and e[f"rival_{key}"]]
             line = sorted((e["budget"], e[f"rival_{key}"] / e[key]) for e in here)
             if line:
-                panel.plot(*zip(*line, strict=True), color=f"C{number}", label=scene,
-                           marker="osD^v<>"[number % 7], markersize=4)  # fmt: skip
+                panel.plot(*zip(*line, strict=True), color=f"C{number}",
+                           label=as_text(scene), marker="osD^v<>"[number % 7],
+                           markersize=4)  # fmt: skip
     return svg_of(figure, panels)
 
 
@@ -110,6 +111,11 @@ def growth_plot(growth: dict[str, Any]) -> bytes:
                 panel.plot(*zip(*shown, strict=True), color=f"C{number}", label=name,
                            marker="osD^v<>"[number % 7], markersize=4)  # fmt: skip
     return svg_of(figure, panels, outside=True)
+
+
+def as_text(name: str) -> str:
+    """A scene's name for a plot, which takes what stands between $ for a formula."""
+    return name.replace("$", r"\$")
 
 
 def two_panels(title: str, axis: str) -> tuple[Any, Any]:

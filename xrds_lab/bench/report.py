@@ -7,7 +7,6 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.planning.estimates import ALIKE
 from xrds_core.atomic import replacing
 
 from . import analysis, plots
@@ -208,14 +207,14 @@ def _picker(report: Report) -> str:
     )
     if picker["alike"] is not None:
         line += (
-            f" {picker['alike']:.0%} were within {ALIKE} dB of the best way "
+            f" {picker['alike']:.0%} were within {analysis.ALIKE} dB of the best way "
             f"of the sweep, the worst {picker['farthest_behind']:.2f} dB below it."
         )
     if picker["alike_in_hindsight"] is not None:
         line += (
             f" Of the ways at full size that fitted at the speed of that very frame, "
-            f"{picker['alike_in_hindsight']:.0%} were within {ALIKE} dB of the best, "
-            f"the worst {picker['missed']:.2f} dB below it."
+            f"{picker['alike_in_hindsight']:.0%} were within {analysis.ALIKE} dB of "
+            f"the best, the worst {picker['missed']:.2f} dB below it."
         )
     rows = [
         [f"{row['budget']:g}", _gap(row["behind_best"]), _gap(row["behind_oidn"])]

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_core.atomic import replacing
 
+from ..bench.plots import as_text
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -49,8 +51,10 @@ def draw(results: dict[str, Any], path: Path) -> None:
     axes.set_xlabel("seconds per frame")
     axes.set_ylabel("PSNR, dB")
     axes.set_title(
-        f"{size[0]}x{size[1]}: {results['machine']['cycles_device']}, "
-        f"accumulation on {results['machine']['accumulated_on']}"
+        as_text(
+            f"{size[0]}x{size[1]}: {results['machine']['cycles_device']}, "
+            f"accumulation on {results['machine']['accumulated_on']}"
+        )
     )
     axes.grid(visible=True, which="both", alpha=0.3)
     axes.legend()

@@ -91,10 +91,46 @@ def test_png_is_as_blender_saves_it(
     assert not [image for image in bpy.data.images if image.name.startswith("xrds")]
 
 
+@pytest.mark.parametrize(
+    ("form", "colours", "depth", "mode", "bits"),
+    [
+        ("PNG", "BW", "8", "L", 8),
+        ("PNG", "BW", "16", "I;16", 16),
+        ("PNG", "RGB", "16", "RGB", 16),
+        ("PNG", "RGBA", "8", "RGBA", 8),
+        ("JPEG", "BW", "8", "L", 8),
+        ("JPEG", "RGB", "8", "RGB", 8),
+        ("OPEN_EXR", "RGBA", "16", "RGB", 16),
+        ("OPEN_EXR", "RGBA", "32", "RGB", 16),
+    ],
+)
+def test_png_has_the_colours_and_bits_of_the_file(
+    tmp_path: Path,
+    scene: bpy.types.Scene,
+    form: str,
+    colours: str,
+    depth: str,
+    mode: str,
+    bits: int,
+) -> None:
+    settings = scene.render.image_settings
+    settings.file_format, settings.color_mode = form, colours
+    settings.color_depth = depth
+    path = tmp_path / "out.png"
+    picture_file.save(path, *shape(), scene)
+    assert Image.open(path).mode == mode
+    assert path.read_bytes()[24] == bits
+    assert (settings.file_format, settings.color_depth) == (form, depth)
+
+
 def test_exposure_shapes_png_alone(tmp_path: Path, scene: bpy.types.Scene) -> None:
     scene.view_settings.exposure = 1.0
     picture_file.save(tmp_path / "out.png", *shape(), scene)
-    assert np.asarray(Image.open(tmp_path / "out.png"))[0, 0].tolist() == [255, 0, 0]
+    assert np.asarray(Image.open(tmp_path / "out.png"))[0, 0, :3].tolist() == [
+        255,
+        0,
+        0,
+    ]
     picture_file.save(tmp_path / "out.exr", *shape(), scene)
     image = bpy.data.images.load(str(tmp_path / "out.exr"))
     lowest = np.array(image.pixels[:4])

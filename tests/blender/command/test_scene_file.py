@@ -11,10 +11,10 @@ import OpenEXR
 import pytest
 
 from xrds_blender.command import main
-from xrds_blender.command.scene_file import SceneChoice, open_scene
+from xrds_blender.command.scene_file import SceneChoice, frames_of, open_scene
 from xrds_blender.interface.registration import ensure_registered
 from xrds_core.children import run_python
-from xrds_core.errors import SceneError
+from xrds_core.errors import SceneError, UsageError
 
 
 @pytest.fixture(autouse=True)
@@ -172,6 +172,15 @@ def short_range(blend: Path) -> Path:
     scene.frame_set(4)
     bpy.ops.wm.save_mainfile()
     return blend
+
+
+def test_a_range_that_is_given_twice_must_be_the_same(blend: Path) -> None:
+    scene = open_scene(blend)
+    whole = list(range(scene.frame_start, scene.frame_end + 1))
+    assert frames_of(scene, whole, True) == frames_of(scene, None, True) == whole
+    assert frames_of(scene, None, False) is None
+    with pytest.raises(UsageError, match="-a are frames"):
+        frames_of(scene, whole[:-1], True)
 
 
 def test_the_range_of_the_file_is_rendered(

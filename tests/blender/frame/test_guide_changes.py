@@ -35,6 +35,8 @@ from xrds_blender.planning.request import Request, render_request
 from xrds_lab.studio import traps
 from xrds_lab.studio.nodes import Surface
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 KEPT = render_request(scale=2, samples=1, guide_samples=1, seed=1)
 ANEW = replace(KEPT, savings=savings_but("guide cache"))
 Passes = dict[tuple[str, str], np.ndarray]

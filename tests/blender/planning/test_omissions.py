@@ -20,6 +20,8 @@ from xrds_blender.planning.settings import Settings
 from xrds_blender.shot.explain import explain
 from xrds_lab.studio import traps
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 SAMPLES = 32
 # What the guide render may do less, by itself.
 LESS = {

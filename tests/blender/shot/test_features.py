@@ -322,7 +322,6 @@ def test_baking_is_cycles_own(life: Any, network: Any) -> None:
     assert not network
 
 
-@pytest.mark.timeout(600)
 def test_tiles_of_a_frame_merge_nearly_to_the_whole(life: Any, written: Any) -> None:
     """Crops of one frame with the shipped network, as Flamenco renders stills.
 

@@ -23,6 +23,7 @@ from xrds_lab.demo import scene as demo
 from xrds_lab.metrics import psnr
 
 RECORD = Path(__file__).with_name("golden.json")
+SCALES = [pytest.param(x, marks=[pytest.mark.nightly] * (x > 2)) for x in (2, 4, 8)]
 SERIES = ".".join(map(str, bpy.app.version[:2]))
 SIZE = 128, 80
 SAMPLES = {1: 4, 2: 16, 4: 16, 8: 16}
@@ -50,7 +51,7 @@ def recorded() -> dict[str, dict[str, float]]:
     return json.loads(RECORD.read_text("utf-8"))
 
 
-@pytest.mark.parametrize("scale", SAMPLES)
+@pytest.mark.parametrize("scale", [1, *SCALES])
 def test_decibels_do_not_fall(
     scale: int, decibels: Decibels, pytestconfig: pytest.Config
 ) -> None:
@@ -80,7 +81,7 @@ def shifted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(inputs, "fill_holes", fill)
 
 
-@pytest.mark.parametrize("scale", [2, 4, 8])
+@pytest.mark.parametrize("scale", SCALES)
 @pytest.mark.parametrize("fault", [brightened, shifted])
 def test_a_broken_front_end_is_seen(
     fault: Callable[[pytest.MonkeyPatch], None],

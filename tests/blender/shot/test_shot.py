@@ -23,6 +23,7 @@ from xrds_blender.internals.lifetimes import RENDER_JOB
 from xrds_blender.planning.request import render_request
 from xrds_blender.shot import full_size, shot
 from xrds_blender.shot import render as engine_shots
+from xrds_core import exr
 from xrds_core.sequence import accumulator
 
 FRAMES = [1, 2, 3, 4, 5]
@@ -68,6 +69,27 @@ def test_neighbours_make_a_better_picture(blend: Path) -> None:
     assert 2.0 < temporal[2]["mean_samples"] <= 5.0
     assert all(0.0 <= t["rejected"] < 0.5 for t in temporal)
     assert all(frame["seconds"]["accumulate"] > 0.0 for frame in result["frames"])
+
+
+@pytest.mark.skipif(
+    not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
+)
+@pytest.mark.parametrize(("offset", "length", "taken"), [(4, 2, 2), (6, 4, 2)])
+def test_a_sample_subset_of_the_file(
+    blend: Path, offset: int, length: int, taken: int
+) -> None:
+    """Cycles writes no depth with an offset; the frames are reused all the same."""
+    cycles = bpy.context.scene.cycles
+    cycles.samples, cycles.use_adaptive_sampling = 8, False
+    cycles.use_sample_subset = True
+    cycles.sample_offset, cycles.sample_subset_length = offset, length
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    for frame in render(blend, "shot", frames=[1, 2, 3])["frames"]:
+        assert frame["samples"] == taken
+        assert frame["temporal"]["rejected"] < 0.75  # all of it without depth
+        assert taken < frame["temporal"]["mean_samples"] <= 3 * taken
+    file = exr.File(blend.parent / "shot" / "1.exr")
+    assert file.parts[0].attributes["xrds.samples"] == str(taken)
 
 
 def test_every_frame_is_sampled_once(

@@ -338,6 +338,7 @@ def in_new_process(code: str, *arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.nightly
 @ON_LINUX
 def test_memory_limit_holds() -> None:
     limit = 256 << 20

@@ -13,6 +13,7 @@ from shots import PIXEL, World, camera, vector, view
 from xrds_core.gpu import accumulate as on_card
 from xrds_core.gpu.accumulate import CardAccumulator
 from xrds_core.gpu.card import Card, CardLost, find_adapters
+from xrds_core.temporal import accumulate as processor
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.frame import Frame, Stored, store
 
@@ -25,6 +26,12 @@ def card() -> CardAccumulator:
     if not adapters:
         pytest.skip("no software Vulkan here: install mesa-vulkan-drivers")
     return CardAccumulator(Card(adapters[0]))
+
+
+@pytest.fixture(autouse=True)
+def as_few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Kernels take no offsets out: their frames have few samples for the method."""
+    monkeypatch.setattr(processor, "FEW_SAMPLES", np.inf)
 
 
 def shot(pan: float, turn: float = 0.0, **more: Any) -> list[Frame]:
@@ -159,6 +166,34 @@ def test_parts_of_the_light_have_the_weights_of_the_whole(
         for name, part in expected.parts.items():
             assert part.any() == (name != "never")
             np.testing.assert_allclose(found.parts[name], part, rtol=1e-4, atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (2, 1), (3, 5)])
+def test_small_pictures_have_parts(
+    card: CardAccumulator, shape: tuple[int, int]
+) -> None:
+    height, width = shape
+    frames = []
+    for k in range(3):
+        light = np.full((*shape, 3), 0.5 + k, np.float32)
+        normal = np.broadcast_to(np.float32([0, 0, -1]), (*shape, 3))
+        eye = replace(camera(0.0), size=(width, height))
+        depth = np.full(shape, 5.0, np.float32)
+        frames.append(Frame(k, eye, light, light, normal, depth, parts={"Emit": light}))
+    stored = [store(x) for x in frames]
+    expected = accumulate(stored[1], [stored[0], stored[2]])
+    found = accumulate(stored[1], [stored[0], stored[2]], card=card)
+    assert found.device == card.name
+    np.testing.assert_allclose(found.parts["Emit"], expected.parts["Emit"], rtol=1e-4)
+
+
+def test_offsets_are_left_to_the_processor(
+    card: CardAccumulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(processor, "FEW_SAMPLES", 2.0)
+    for samples, device in ((2.0, card.name), (3.0, "cpu")):
+        frames = [store(x) for x in shot(0.05, samples=samples)]
+        assert accumulate(frames[1], frames[::2], card=card).device == device
 
 
 def test_a_picture_in_bands_is_the_same(

@@ -37,7 +37,10 @@ IN_BF16: list[Work] = [light.scaling, light.constants, light.black, *sameness.CH
 def cases() -> Iterator[Any]:
     for subject in SUBJECTS:
         for work in EVERY if subject.precision == "fp32" else IN_BF16:
-            yield pytest.param(subject, work, id=f"{subject.name} {work.__name__}")
+            name, marks = f"{subject.name} {work.__name__}", []
+            if subject.scale > 2:
+                marks = [pytest.mark.nightly]
+            yield pytest.param(subject, work, id=name, marks=marks)
 
 
 @pytest.fixture(autouse=True)

@@ -122,6 +122,7 @@ def test_only_few_samples_are_filtered(upscaler: Upscaler) -> None:
     assert np.abs(few - many).max() > 1e-2
 
 
+@pytest.mark.nightly
 def test_tiles_show_no_seams(upscaler: Upscaler) -> None:
     low, albedo, normal = arrays(224)
     whole = upscaler(low, albedo, normal, guide_samples=1)

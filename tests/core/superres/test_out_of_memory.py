@@ -119,6 +119,7 @@ for spare in (1 << 20, 8 << 20):
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc, limits memory")
 def test_what_torch_really_raises_is_understood() -> None:
     done = subprocess.run(

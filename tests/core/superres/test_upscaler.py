@@ -350,6 +350,7 @@ print(status("VmHWM") - before - result.nbytes)
 """
 
 
+@pytest.mark.nightly
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_a_memory_limit_is_kept() -> None:
     def peak(limit: int) -> int:

@@ -11,10 +11,10 @@ from xrds_core.superres.weights_header import PRESETS
 
 from ...choosing import history
 from ...choosing.capabilities import capabilities
-from ...choosing.modes import best_mode, estimates
+from ...choosing.modes import estimates
 from ...internals.engine_override import ENGINE
 from ...internals.lifetimes import FILE
-from ...planning.estimates import Capabilities
+from ...planning.estimates import Capabilities, automatic
 from ...planning.request import Request
 from ...planning.settings import Mode
 from ...scene.light import has_light
@@ -59,7 +59,7 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
             expected = animation.expected(scene, request, here, found)
             animation.draw(layout, context, expected)
             layout.separator()
-        mode_table.draw(layout, scene, here, best_mode(scene, request), found)
+        mode_table.draw(layout, scene, here, automatic(here), found)
         layout.use_property_split = True
         layout.use_property_decorate = False
         _draw_choices(layout, scene, request, here)

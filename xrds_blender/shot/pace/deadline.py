@@ -33,6 +33,10 @@ _ALIKE = 0.05  # a change of samples below this is not made
 _NEWEST = 0.3  # weight of the newest frame in what is expected of the next
 
 
+def _now() -> float:
+    return time.perf_counter()
+
+
 @dataclass
 class Deadline:
     """Samples of the frames of a shot that ends `seconds` from now.
@@ -49,7 +53,7 @@ class Deadline:
     continues: bool = False
     samples: int = 0
     room: int = 0
-    _began: float = field(default_factory=time.perf_counter)
+    _began: float = field(default_factory=_now)
     _try: int = _FIRST_TRY  # samples of the next one
     _tried_before: tuple[int, float] = (0, 0.0)  # samples and seconds
     _sync: float = 0.0  # seconds until Cycles has a frame's scene
@@ -91,7 +95,7 @@ class Deadline:
         self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: More
     ) -> Sampled:
         """The frame as it is, with why it has its samples."""
-        now = time.perf_counter()
+        now = _now()
         if self._completed is not None:
             beside = max(now - self._completed - self._rendered, 0.0)
             self._measured += 1
@@ -108,7 +112,7 @@ class Deadline:
 
     @property
     def _left(self) -> float:
-        return self.seconds - (time.perf_counter() - self._began)
+        return self.seconds - (_now() - self._began)
 
     def _tried(self, method: Finishing, frame: Sampled, seconds: float) -> None:
         """Learn from a try; choose once there are enough of them."""

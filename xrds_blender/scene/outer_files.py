@@ -1,0 +1,195 @@
+"""The files that an open .blend file reads beside itself: textures, caches, libraries.
+
+Blender's own list of them names the first file of a sequence alone, and no input of
+geometry nodes. So every path that data-blocks hold is looked at.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .key_files import files_of
+
+# Collections of `bpy.data` whose paths a render reads.
+_KINDS = (
+    "libraries images fonts volumes cache_files objects materials worlds lights "
+    "textures particles node_groups"
+)
+_PATHS = {"FILE_PATH", "DIR_PATH"}
+_SEQUENCES = {"SEQUENCE", "MOVIE"}  # sources of images
+_IN_MEMORY = {"GENERATED", "VIEWER"}
+_SETTINGS = ("modifiers", "particle_systems", "soft_body", "rigid_body")  # of objects
+# Particles by the thousand, and the caches of a system, which lead to each other.
+_SHIPPED = "datafiles/assets/"
+_LEFT_OUT = {"particles", "child_particles", "seed", "vertex_groups"}
+
+
+@dataclass(frozen=True)
+class OuterFile:
+    """What a data-block reads: its `kind` and `owner` in words, a `path`, its `files`.
+
+    Those of a sequence, of tiles and of a folder are many; one that is not there is
+    among them where the path names it.
+    """
+
+    kind: str
+    owner: str
+    path: Path
+    files: tuple[Path, ...]
+
+    @property
+    def missing(self) -> Path | None:
+        """The first file that is not there."""
+        return next((file for file in self.files if not file.exists()), None)
+
+
+def outer_files() -> list[OuterFile]:
+    """All that the open file reads, by their paths; packed data lies in the file."""
+    import bpy
+
+    found = [
+        each
+        for kind in _KINDS.split()
+        for item in getattr(bpy.data, kind)
+        if not _is_inside(item)
+        for each in _of(item)
+    ]
+    known = {each.path for each in found}
+    found += [
+        OuterFile("", "the file", path, _files(path))
+        for path in map(Path, bpy.utils.blend_paths(absolute=True))
+        if path not in known and path.exists()
+    ]
+    # Blender's own assets, of its version
+    found = [each for each in found if _SHIPPED not in each.path.as_posix()]
+    return sorted(found, key=lambda each: (str(each.path), each.owner))
+
+
+def _is_inside(item: Any) -> bool:
+    """Whether a data-block reads no file: it is packed, computed or built in."""
+    import bpy
+
+    if isinstance(item, bpy.types.Image):
+        return bool(item.packed_files) or item.source in _IN_MEMORY
+    if isinstance(item, bpy.types.NodeTree):  # the compositor's paths are outputs
+        return item.bl_idname == "CompositorNodeTree"
+    return bool(getattr(item, "packed_file", None))
+
+
+def _of(item: Any) -> Iterator[OuterFile]:
+    kind = item.bl_rna.name.lower()
+    owner = f"{kind} {item.name!r}"
+    for text in dict.fromkeys(_paths_in(item)):
+        path = _place(item, text)
+        if not text.startswith("<") and not _is_around(path):
+            yield OuterFile(kind, owner, path, _files(path, item))
+
+
+def _files(path: Path, item: Any = None) -> tuple[Path, ...]:
+    if path.is_dir():
+        return tuple(sorted(file for file in path.rglob("*") if file.is_file()))
+    is_sequence = getattr(item, "is_sequence", False)
+    is_sequence |= getattr(item, "source", "") in _SEQUENCES
+    found = files_of(path, is_sequence)
+    tiles = [str(each.number) for each in getattr(item, "tiles", ())]
+    if "<UDIM>" in path.name:
+        found += [path.with_name(path.name.replace("<UDIM>", x)) for x in tiles]
+    return tuple(sorted({x for x in found if "<UDIM>" not in x.name}) or found)
+
+
+def _is_around(path: Path) -> bool:
+    """Whether a folder holds the .blend file: also what is rendered may lie there."""
+    import bpy
+
+    return path.is_dir() and Path(bpy.data.filepath).is_relative_to(path)
+
+
+def _paths_in(item: Any) -> Iterator[str]:
+    """The paths that a data-block, its settings and its own nodes hold."""
+    import bpy
+
+    yield from _texts(item)
+    if isinstance(item, bpy.types.Object):
+        for name in _SETTINGS:
+            value = getattr(item, name, None)
+            for each in value if hasattr(value, "keys") else [value]:
+                yield from _inner(each, set())
+    if isinstance(item, bpy.types.CacheFile):
+        for layer in item.layers:
+            yield from _texts(layer)
+    tree = item if isinstance(item, bpy.types.NodeTree) else None
+    tree = tree or getattr(item, "node_tree", None)
+    for node in tree.nodes if tree else ():
+        yield from _texts(node)
+        for socket in node.inputs:
+            yield from _texts(socket)
+
+
+def _inner(struct: Any, seen: set[tuple[type, int]]) -> Iterator[str]:
+    """The same of a struct and of the structs inside."""
+    import bpy
+
+    if struct is None or isinstance(struct, bpy.types.ID):
+        return
+    place = type(struct), struct.as_pointer()
+    if place in seen or _is_in_flux(struct):
+        return
+    seen.add(place)
+    yield from _texts(struct)
+    for each in struct.bl_rna.properties:
+        if each.identifier in _LEFT_OUT:
+            continue
+        if each.type == "POINTER" and each.identifier != "rna_type":
+            yield from _inner(getattr(struct, each.identifier), seen)
+        if each.type == "COLLECTION":
+            for inner in getattr(struct, each.identifier):
+                yield from _inner(inner, seen)
+
+
+def _is_in_flux(struct: Any) -> bool:
+    """Whether a path is one to write to, as of a simulation that was not baked."""
+    if getattr(struct, "type", "") == "OCEAN" and not struct.is_cached:
+        return True
+    is_output = type(struct).__name__ == "DynamicPaintSurface"
+    return is_output or getattr(struct, "cache_type", "") == "REPLAY"
+
+
+def _texts(struct: Any) -> Iterator[str]:
+    """The paths among the values of a struct, not of those inside."""
+    import bpy
+
+    for each in struct.bl_rna.properties:
+        if each.type == "STRING" and each.subtype in _PATHS:
+            text = getattr(struct, each.identifier)
+            # one that is not there was not baked
+            is_folder = each.subtype == "DIR_PATH"
+            if text and not (is_folder and not _place(struct, text).is_dir()):
+                yield text
+    if _is_disk_cache(struct):
+        blend = Path(bpy.data.filepath)
+        yield str(blend.with_name(f"blendcache_{blend.stem}"))
+    try:
+        values = [struct[name] for name in struct.keys()]  # noqa: SIM118  # no iterator
+    except TypeError:  # this type of struct has no custom properties
+        return
+    texts = [value for value in values if isinstance(value, str)]
+    # inputs of geometry nodes, say: a text is a path where there is such a file
+    yield from (
+        text
+        for text in texts
+        if {"/", "\\"} & {*text} and _place(struct, text).is_file()
+    )
+
+
+def _place(struct: Any, text: str) -> Path:
+    import bpy
+
+    library = getattr(struct.id_data, "library", None)
+    return Path(bpy.path.abspath(text, library=library))
+
+
+def _is_disk_cache(struct: Any) -> bool:
+    return getattr(struct, "use_disk_cache", False) and struct.is_baked
