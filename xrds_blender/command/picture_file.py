@@ -14,7 +14,7 @@ from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
 from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
-from xrds_core.frames import frame_path
+from xrds_core.frames import check_pattern, frame_path
 from xrds_core.temporal.noise import luminance
 
 from . import png_text
@@ -29,10 +29,11 @@ def check_output(
     """Refuse, before anything is rendered, an output that could not be written.
 
     Makes the folder. Raises UsageError for a suffix that is neither .exr nor .png, for
-    one that holds no passes where there are some, and for several frames of one name,
-    PictureError as `xrds_core.files.check_output`.
+    one that holds no passes where there are some, for several frames of one name, and
+    for other programs' frame numbers, PictureError as `xrds_core.files.check_output`.
     """
     path = Path(pattern)
+    check_pattern(pattern)
     if has_passes and path.suffix.lower() != ".exr":
         raise UsageError(f"--passes needs an output that ends in .exr, not {pattern!r}")
     if path.suffix.lower() not in SUFFIXES:

@@ -46,14 +46,13 @@ def by_view(
             found[named[-1]][".".join((*layers, letter))] = place
         else:
             found[views[0]].setdefault(name, place)
-    return {view: channels for view, channels in found.items() if channels}
+    return {view: channels for view, channels in found.items() if channels} or {"": {}}
 
 
 def _views(parts: Sequence[Part], names: Mapping[str, Any]) -> list[str]:
-    told = [part.attributes.get(VIEWS) for part in parts]
-    listed = next((x for x in told if isinstance(x, list)), None)
-    if listed:
-        return listed
+    for told in (part.attributes.get(VIEWS) for part in parts):
+        if isinstance(told, list) and all(x and isinstance(x, str) for x in told):
+            return list(dict.fromkeys(told))
     of_parts = [part.attributes.get("view") for part in parts]
     views = list(dict.fromkeys(x for x in of_parts if isinstance(x, str)))
     if views:

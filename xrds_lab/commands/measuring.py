@@ -104,11 +104,25 @@ def add_stability(commands: Any) -> argparse.ArgumentParser:
     add("--cache", type=Path, help="folder that keeps rendered pictures")
     add("--device", default="auto", help=DEVICE_HELP)
     add("--weights", type=Path, help="folder of weights files")
+    add(
+        "--fuzz",
+        type=arguments.factor,
+        metavar="MINUTES",
+        help="instead denoise odd shots for so long; faults go to fuzz.json",
+    )
+    add("--seed", type=arguments.whole, default=0, help="of --fuzz")
+    add(
+        "--case",
+        type=arguments.whole,
+        help="of --fuzz: this one alone, whose files are kept",
+    )
     command.set_defaults(work=_stability, lines=no_lines)
     return command
 
 
 def _stability(options: argparse.Namespace) -> dict[str, Any]:
+    if options.fuzz is not None or options.case is not None:
+        return _fuzz(options)
     if set(options.parts) - {"arrays", "large"}:
         need_blender("stability")
     from ..stability.suite import stability
@@ -125,6 +139,27 @@ def _stability(options: argparse.Namespace) -> dict[str, Any]:
     )
     if not result["passed"]:
         raise XRDSError(f"some bounds are not held: see {options.out / 'report.md'}")
+    return result
+
+
+def _fuzz(options: argparse.Namespace) -> dict[str, Any]:
+    from ..stability import fuzz
+
+    if options.case is not None:
+        runs = fuzz.keep_case(options.out, options.seed, options.case)
+        return {"runs": [vars(run) for run in runs]}
+    result = fuzz.fuzz(
+        options.out,
+        options.fuzz,
+        seed=options.seed,
+        resume=options.resume,
+        progress=report_line,
+    )
+    if not result["passed"]:
+        raise XRDSError(
+            f"{result['wrong']} of {result['cases']} cases have faults: see "
+            f"{options.out / 'fuzz.json'}"
+        )
     return result
 
 

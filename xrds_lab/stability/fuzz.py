@@ -1,15 +1,15 @@
-"""`python -m xrds_lab.stability.fuzz`: `xrds denoise` on shots that are all wrong.
+"""`xrds stability --fuzz`: `xrds denoise` on shots that are all wrong.
 
 Each case is a small shot whose headers, windows, channels, bytes, cameras and options
-are made odd by chance, and a process of its own that denoises it. What must not happen
-is counted: tracebacks and NumPy's warnings, hangs, crashes, much memory, half-written
-files, inputs that change, frames that are lost without a word. A seed and a number tell
-a case. POSIX alone: processes are forked, so that each begins with all modules loaded.
+are made odd by chance, and processes of their own that denoise it. What must not happen
+is told: tracebacks and NumPy's warnings, hangs, crashes, much memory, half-written
+files, inputs that change, frames or attributes that are lost without a word, frames of
+`--resume` that differ from those of a run from nothing. A seed and a number tell a
+case. POSIX alone: processes are forked, so that each begins with all modules loaded.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import hashlib
 import json
@@ -28,24 +28,35 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core import exr
-from xrds_core.atomic import write_json
+from xrds_core.atomic import read_json, write_json
 from xrds_core.errors import PictureError
+from xrds_core.exr.openexr_io import read
+from xrds_core.exr.raw_header import attributes_in, header_bytes
+from xrds_core.time_left import duration
 
+from ..progress import silent
+from .fuzz_shots import Twice, make_twice
 from .odd_shots import Case, make_case
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterator
 
-LIMIT = 60.0  # seconds that a case may take
-MEMORY = 2 << 30  # bytes that a case may take
+    from ..progress import Progress
+
+LIMIT = 60.0  # seconds that a run may take
+MEMORY = 2 << 30  # bytes that a run may take
 _STATUSES = (0, 1, 2)
+_OF_CODING = (
+    *(b"channels", b"compression", b"chunkCount", b"dataWindow", b"lineOrder"),
+    *(b"tiles", b"type", b"name", b"version", b"xrds.made_of", b"xrds.samples"),
+)
+_TELL = 20.0  # seconds between lines of progress
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """How one case went; `faults` are the names of what must not happen."""
+class Run:
+    """How one run went; `faults` are the names of what must not happen."""
 
-    case: int
     words: list[str]
     status: int
     seconds: float
@@ -56,18 +67,70 @@ class Outcome:
     """The last ones on stderr."""
 
 
-def fuzz(seconds: float, seed: int = 0, first: int = 0) -> Iterator[Outcome]:
-    """Yield the outcomes of cases `first`, `first` + 1, ... for some seconds."""
+def fuzz(
+    out: Path,
+    minutes: float,
+    *,
+    seed: int = 0,
+    resume: bool = False,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Run cases 0, 1, ... of a seed for some minutes; `resume` goes on after the last.
+
+    Appends each case with a fault to OUT/fuzz.json, one a line.
+    """
     _load()
-    end, number = time.monotonic() + seconds, first
-    while time.monotonic() < end:
+    out.mkdir(parents=True, exist_ok=True)
+    so_far, findings = out / f"fuzz-{seed}.progress.json", out / "fuzz.json"
+    told = {"cases": 0, "wrong": 0, "seconds": 0.0}
+    if resume and so_far.is_file():
+        told = read_json(so_far)
+    started = last = time.monotonic()
+    while (now := time.monotonic()) < started + 60 * minutes:
+        number = int(told["cases"])
         with tempfile.TemporaryDirectory(prefix="xrds-fuzz-") as folder:
-            yield run_case(number, make_case(Path(folder), seed, number))
-        number += 1
+            runs = run_case(Path(folder), seed, number)
+        if any(run.faults for run in runs):
+            told["wrong"] += 1
+            line = {"seed": seed, "case": number, "runs": [asdict(x) for x in runs]}
+            with findings.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(line) + "\n")
+            progress(f"case {number}: {', '.join(x for y in runs for x in y.faults)}")
+        told |= {
+            "cases": number + 1,
+            "seconds": told["seconds"] + time.monotonic() - now,
+        }
+        write_json(so_far, told)
+        if now > last + _TELL:
+            last = now
+            left = duration(max(started + 60 * minutes - now, 0.0))
+            progress(f"{number + 1} cases, {told['wrong']} wrong, {left} left")
+    return {"seed": seed, **told, "passed": not told["wrong"]}
 
 
-def run_case(number: int, case: Case) -> Outcome:
-    """Denoise one shot in a process of its own."""
+def keep_case(out: Path, seed: int, number: int) -> list[Run]:
+    """Run one case alone and leave its files in a folder of `out`."""
+    _load()
+    folder = out / f"case-{seed}-{number}"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    return run_case(folder, seed, number)
+
+
+def run_case(folder: Path, seed: int, number: int) -> list[Run]:
+    """Make a case in an empty folder and denoise it: two of three of them twice."""
+    if number % 3 == 0:
+        return [run(make_case(folder, seed, number))]
+    case = make_twice(folder, seed, number)
+    first = run(case)
+    case.change()
+    second, third = run(case.resumed), run(case.afresh)
+    second.faults.extend(_differences(case, second, third))
+    return [first, second, third]
+
+
+def run(case: Case) -> Run:
+    """Denoise a shot in a process of its own."""
     before, started = _inputs(case.folder), time.monotonic()
     process = os.fork()
     if process == 0:
@@ -79,15 +142,8 @@ def run_case(number: int, case: Case) -> Outcome:
     if any(after.get(name) != told for name, told in before.items()):
         faults.append("inputs changed")
     faults += _written(case, status)
-    return Outcome(
-        number,
-        case.words,
-        status,
-        time.monotonic() - started,
-        memory,
-        faults,
-        errors.splitlines()[-12:],
-    )
+    seconds = time.monotonic() - started
+    return Run(case.words, status, seconds, memory, faults, errors.splitlines()[-12:])
 
 
 def _load() -> None:
@@ -96,6 +152,8 @@ def _load() -> None:
     from xrds_core.denoising import denoiser, oidn_device  # noqa: F401
     from xrds_core.sequence import denoise  # noqa: F401
 
+    with contextlib.suppress(ImportError):
+        import wgpu.backends.wgpu_native  # noqa: F401
     with contextlib.suppress(PictureError):
         exr.attributes(os.devnull)
 
@@ -157,6 +215,8 @@ def _written(case: Case, status: int) -> Iterator[str]:
     if status == 0 and len(outputs) < case.least:
         yield "frames lost"
     for path in outputs:
+        if status > 0 or not (case.folder / "in" / path.name).is_file():
+            continue  # what no run has made lately
         try:
             planes = [exr.File(path).pixels(name) for name in case.picture(path)]
         except (PictureError, KeyError):
@@ -164,61 +224,62 @@ def _written(case: Case, status: int) -> Iterator[str]:
             continue
         if not all(np.isfinite(plane).all() for plane in planes):
             yield "not finite"
+        if {"--picture-only", "--resume"}.isdisjoint(case.words):
+            lost = _attributes(case.folder / "in" / path.name) - _attributes(path)
+            yield from (f"{path.name} lacks {x[:2]}" for x in sorted(lost)[:1])
+
+
+def _attributes(path: Path) -> set[tuple[bytes, bytes, bytes]]:
+    """What the headers of a file say of the picture, byte by byte.
+
+    Of what they say twice, and otherwise, no reader knows which one is meant.
+    """
+    try:
+        found = [*attributes_in(header_bytes(path) + b"\0\0")]
+    except (OSError, ValueError):
+        return set()
+    told = {(x.name, x.kind, x.value) for x in found if x.name not in _OF_CODING}
+    count = Counter(name for name, _, _ in told)
+    return {x for x in told if count[x[0]] == 1}
+
+
+def _differences(case: Twice, resumed: Run, fresh: Run) -> Iterator[str]:
+    """What `--resume` left otherwise than a run from nothing, without a line."""
+    if fresh.status != 0:
+        return
+    if resumed.status != 0:
+        yield "resume fails"
+        return
+    for path in sorted((case.folder / "new").glob("*.exr")):
+        if not _are_equal(case.output / path.name, path):
+            yield f"{path.name} differs"
+
+
+def _are_equal(one: Path, two: Path) -> bool:
+    """Whether all channels of all parts are, bit by bit, and where they lie."""
+    try:
+        parts = [read(path) for path in (one, two)]
+    except PictureError:
+        return False
+    kinds, others = (
+        [(x.name, x.data_window, x.display_window, [*x.channels]) for x in each]
+        for each in parts
+    )
+    if kinds != others or _attributes(one) != _attributes(two):
+        return False
+    return all(
+        a.channels[name].tobytes() == b.channels[name].tobytes()
+        for a, b in zip(*parts, strict=True)
+        for name in a.channels
+    )
 
 
 def _inputs(folder: Path) -> dict[str, str]:
     """What the input files hold, by name."""
-    files = [x for x in (folder / "in").iterdir() if x.is_file()]
-    files += [x for x in folder.glob("cameras.*") if x.is_file()]
-    return {x.name: hashlib.blake2b(x.read_bytes()).hexdigest() for x in files}
-
-
-def summary(outcomes: Sequence[Outcome], seed: int) -> dict[str, Any]:
-    """What is told of many cases: counts, and those that went wrong."""
-    faults = Counter(fault for x in outcomes for fault in set(x.faults))
-    largest = max(outcomes, key=lambda x: x.memory)
+    files = [x for each in ("in", "more") for x in (folder / each).glob("*")]
+    files += folder.glob("cameras.*")
     return {
-        "seed": seed,
-        "cases": len(outcomes),
-        "statuses": dict(sorted(Counter(str(x.status) for x in outcomes).items())),
-        "faults": dict(faults),
-        "peak_memory": largest.memory,
-        "peak_memory_case": largest.case,
-        "longest_seconds": round(max(x.seconds for x in outcomes), 1),
-        "wrong": [asdict(x) for x in outcomes if x.faults],
+        str(x): hashlib.blake2b(x.read_bytes()).hexdigest()
+        for x in files
+        if x.is_file()
     }
-
-
-def _main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=60.0)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--first", type=int, default=0, help="number of the first case")
-    parser.add_argument("--out", type=Path, required=True, help="folder for fuzz.json")
-    parser.add_argument("--keep", action="store_true", help="run the first case alone")
-    options = parser.parse_args()
-    options.out.mkdir(parents=True, exist_ok=True)
-    if options.keep:
-        _keep(options.out / f"case{options.first}", options.seed, options.first)
-        return
-    outcomes: list[Outcome] = []
-    for outcome in fuzz(options.seconds, options.seed, options.first):
-        outcomes.append(outcome)
-        if outcome.faults:
-            print(f"case {outcome.case}: {', '.join(outcome.faults)}", flush=True)
-        if len(outcomes) % 50 == 1 or outcome.faults:
-            write_json(options.out / "fuzz.json", summary(outcomes, options.seed))
-    write_json(options.out / "fuzz.json", summary(outcomes, options.seed))
-
-
-def _keep(folder: Path, seed: int, number: int) -> None:
-    """Run one case alone and leave its files."""
-    _load()
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir()
-    outcome = run_case(number, make_case(folder, seed, number))
-    print(json.dumps(asdict(outcome), indent=1))
-
-
-if __name__ == "__main__":
-    _main()

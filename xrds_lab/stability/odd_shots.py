@@ -15,11 +15,13 @@ from xrds_core import exr
 from xrds_core.sequence import cameras
 from xrds_core.temporal.frame import Camera, Sphere
 
+from .odd_headers import chance_attribute, insert
+
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-WIDTH, HEIGHT = 40, 28
+WIDTH, HEIGHT = 24, 18
 _CAMERAS = ("perspective", "perspective", "orthographic", "panorama")
 _NUMBERS = (0, 1, -1, 2, 16, 33, 0.0, 1.0, -0.5, 1.5, 1e-30, 1e30, 3e38, 2**31 - 1)
 _ODD = (float("nan"), float("inf"), -float("inf"))
@@ -56,7 +58,7 @@ class Case:
 
 
 @dataclass
-class _File:
+class FrameFile:
     """A frame before it is written."""
 
     header: dict[str, Any]
@@ -71,7 +73,7 @@ def make_case(folder: Path, seed: int, number: int) -> Case:
     (folder / "in").mkdir()
     (folder / "out").mkdir()
     style, kind = dice.choice(("flat", "cycles")), dice.choice(_CAMERAS)
-    frames = [_frame(i, style, kind) for i in (1, 2, 3)]
+    frames = [make_frame(i, style, kind) for i in (1, 2, 3)]
     if dice.random() < 0.85:
         for _ in range(dice.choice((1, 1, 2, 4))):
             odd = dice.choice(_FILES)
@@ -79,7 +81,7 @@ def make_case(folder: Path, seed: int, number: int) -> Case:
             for frame in which:
                 odd(frame, dice)
     for frame in frames:
-        _write(folder / "in" / f"{frame.number:04d}.exr", frame)
+        write_frame(folder / "in" / f"{frame.number:04d}.exr", frame)
     words = ["denoise", "in/####.exr", "-o", "out/####.exr", "--denoise", "fast"]
     case = Case(folder, folder / "out", words)
     words += _camera(folder, dice) if dice.random() < 0.35 else []
@@ -94,7 +96,8 @@ def make_case(folder: Path, seed: int, number: int) -> Case:
 # --- frames ---------------------------------------------------------------------------
 
 
-def _eye(number: int, kind: str) -> Camera:
+def make_camera(number: int, kind: str) -> Camera:
+    """One that moves to the right."""
     world = np.eye(4)
     world[0, 3] = 0.1 * number
     project = np.diag([1.5, 1.5 * WIDTH / HEIGHT, -1.0, 0.0])
@@ -105,10 +108,12 @@ def _eye(number: int, kind: str) -> Camera:
     return Camera(np.linalg.inv(world), project, (WIDTH, HEIGHT), sphere=sphere)
 
 
-def _frame(number: int, style: str, kind: str) -> _File:
+def make_frame(
+    number: int, style: str, kind: str, seed: int | None = None
+) -> FrameFile:
     """A wall before a moving camera, as a renderer writes it."""
-    camera = _eye(number, kind)
-    chance = np.random.default_rng(number)
+    camera = make_camera(number, kind)
+    chance = np.random.default_rng(number if seed is None else seed)
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
     albedo = 0.5 + 0.4 * np.sin((x + 0.3 * number) / 3) * np.cos(y / 4)
     light = albedo * chance.exponential(1.0, albedo.shape)
@@ -123,19 +128,27 @@ def _frame(number: int, style: str, kind: str) -> _File:
     channels["V.Depth.Z" if style == "cycles" else "Z"] = 5 * ones
     header: dict[str, Any] = {**cameras.to_header(camera), "xrds/samples": 4}
     planes = {k: v.astype(np.float32) for k, v in channels.items()}
-    return _File(header, planes, number)
+    return FrameFile(header, planes, number)
 
 
-def _write(path: Path, frame: _File) -> None:
+def write_frame(path: Path, frame: FrameFile) -> None:
+    """Write a frame, and do to its file what else was chosen."""
     import OpenEXR
 
     header = {"type": OpenEXR.scanlineimage, **frame.header}
     for name, value in header.items():
-        if isinstance(value, list):
+        if isinstance(value, list) and not isinstance(value[0], str):
             header[name] = np.asarray(value, np.float32)
-    parts = header.pop("parts", 1)
+    parts, views = header.pop("parts", 1), header.pop("views", ())
     try:
-        if parts == 1:
+        if views:
+            OpenEXR.File(
+                [
+                    OpenEXR.Part({**header, "view": x}, dict(frame.channels), x)
+                    for x in views
+                ]
+            ).write(str(path))
+        elif parts == 1:
             OpenEXR.File(header, dict(frame.channels)).write(str(path))
         else:
             names = list(frame.channels)
@@ -170,11 +183,11 @@ def _value(dice: random.Random) -> Any:
     return matrix.tolist() if kind == 3 else matrix[:3, :3].tolist()
 
 
-def _attribute(frame: _File, dice: random.Random) -> None:
+def _attribute(frame: FrameFile, dice: random.Random) -> None:
     frame.header[dice.choice(_ATTRIBUTES)] = _value(dice)
 
 
-def _bent(frame: _File, dice: random.Random) -> None:
+def _bent(frame: FrameFile, dice: random.Random) -> None:
     """One number of a camera's matrix."""
     name = dice.choice(("worldToCamera", "worldToNDC", "xrds/project"))
     try:
@@ -187,24 +200,24 @@ def _bent(frame: _File, dice: random.Random) -> None:
         frame.header[name] = matrix.tolist()
 
 
-def _without(frame: _File, dice: random.Random) -> None:
+def _without(frame: FrameFile, dice: random.Random) -> None:
     name = dice.choice([*frame.header, *frame.channels])
     frame.header.pop(name, None)
     if len(frame.channels) > 1:
         frame.channels.pop(name, None)
 
 
-def _windows(frame: _File, dice: random.Random) -> None:
+def _windows(frame: FrameFile, dice: random.Random) -> None:
     corner = [dice.choice((0, 0, 1, -5, 300, -300, 30000, -(2**30))) for _ in "xy"]
     name = dice.choice(("dataWindow", "displayWindow"))
     size = (WIDTH, HEIGHT)
     if name == "displayWindow":
-        size = tuple(dice.choice((1, 7, 40, 500, 3000, 70000)) for _ in "xy")
+        size = tuple(dice.choice((1, 7, WIDTH, 500, 3000, 70000)) for _ in "xy")
     last = [a + b - 1 for a, b in zip(corner, size, strict=True)]
     frame.header[name] = (np.array(corner, np.int32), np.array(last, np.int32))
 
 
-def _channel(frame: _File, dice: random.Random) -> None:
+def _channel(frame: FrameFile, dice: random.Random) -> None:
     """A channel more, or one called otherwise."""
     name = dice.choice(list(frame.channels))
     plane = frame.channels[name]
@@ -213,7 +226,7 @@ def _channel(frame: _File, dice: random.Random) -> None:
     frame.channels[dice.choice(_NAMES)] = plane
 
 
-def _kind(frame: _File, dice: random.Random) -> None:
+def _kind(frame: FrameFile, dice: random.Random) -> None:
     kind = dice.choice((np.float16, np.uint32))
     some = dice.choice((list(frame.channels), [dice.choice(list(frame.channels))]))
     for name in some:
@@ -222,9 +235,9 @@ def _kind(frame: _File, dice: random.Random) -> None:
         ).astype(kind)
 
 
-def _poison(frame: _File, dice: random.Random) -> None:
+def _poison(frame: FrameFile, dice: random.Random) -> None:
     names = dice.sample(list(frame.channels), dice.randint(1, len(frame.channels)))
-    place: Any = dice.choice(((slice(None),), (slice(5, 9), slice(3, 30)), (0, 0)))
+    place: Any = dice.choice(((slice(None),), (slice(5, 9), slice(3, 20)), (0, 0)))
     value = dice.choice(_POISON)
     for name in names:
         if frame.channels[name].dtype != np.uint32:
@@ -234,7 +247,7 @@ def _poison(frame: _File, dice: random.Random) -> None:
             frame.channels[name] = plane
 
 
-def _passes(frame: _File, dice: random.Random) -> None:
+def _passes(frame: FrameFile, dice: random.Random) -> None:
     """Passes that renderers may add."""
     chance = np.random.default_rng(dice.randrange(99))
     name, letters = dice.choice(
@@ -253,7 +266,7 @@ def _passes(frame: _File, dice: random.Random) -> None:
         frame.channels[f"{name}.{letter}"] = plane.astype(np.float32)
 
 
-def _form(frame: _File, dice: random.Random) -> None:
+def _form(frame: FrameFile, dice: random.Random) -> None:
     import OpenEXR
 
     if dice.random() < 0.5:
@@ -263,14 +276,42 @@ def _form(frame: _File, dice: random.Random) -> None:
     frame.header["tiles"] = OpenEXR.TileDescription()
 
 
-def _small(frame: _File, dice: random.Random) -> None:
+def _views(frame: FrameFile, dice: random.Random) -> None:
+    """A second eye: in parts of its own, or in channels with or without a list."""
+    how = dice.randrange(3)
+    if how == 0:
+        frame.header["views"] = ("left", "right")
+        return
+    if how == 1:
+        frame.header["multiView"] = ["left", "right"]
+    for name, plane in list(frame.channels.items()):
+        layers, dot, letter = name.rpartition(".")
+        for view in ("left", "right")[how == 1 :]:
+            frame.channels[f"{layers}{dot}{view}.{letter}"] = plane
+        if how == 2:
+            del frame.channels[name]
+
+
+def _raw_attributes(frame: FrameFile, dice: random.Random) -> None:
+    """Of any kind, name and bytes."""
+    chosen = [chance_attribute(dice) for _ in range(dice.choice((1, 1, 3)))]
+
+    def insert_all(path: Path) -> None:
+        for each in chosen:
+            if path.is_file():
+                insert(path, *each)
+
+    frame.after.append(insert_all)
+
+
+def _small(frame: FrameFile, dice: random.Random) -> None:
     """Another size."""
-    rows, columns = dice.choice(((1, 1), (1, 40), (28, 1), (13, 17)))
+    rows, columns = dice.choice(((1, 1), (1, WIDTH), (HEIGHT, 1), (13, 17)))
     for name, plane in frame.channels.items():
         frame.channels[name] = np.ascontiguousarray(plane[:rows, :columns])
 
 
-def _bytes(frame: _File, dice: random.Random) -> None:
+def _bytes(frame: FrameFile, dice: random.Random) -> None:
     how, spot, bits = dice.randrange(5), dice.random(), dice.randrange(256)
     word = dice.choice((0, 1, 2**31 - 1, 2**32 - 1, 65536, 2**30))
 
@@ -290,7 +331,7 @@ def _bytes(frame: _File, dice: random.Random) -> None:
     frame.after.append(damage)
 
 
-def _no_file(frame: _File, dice: random.Random) -> None:
+def _no_file(frame: FrameFile, dice: random.Random) -> None:
     what = dice.randrange(4)
 
     def replace(path: Path) -> None:
@@ -307,9 +348,14 @@ def _no_file(frame: _File, dice: random.Random) -> None:
     frame.after.append(replace)
 
 
+HARMLESS = (
+    *(_attribute, _bent, _kind, _poison, _passes, _form, _views),
+    *(_raw_attributes, _raw_attributes),
+)
+"""What files may hold and still be finished."""
 _FILES = (
-    *(_attribute, _attribute, _bent, _without, _windows, _channel),
-    *(_kind, _poison, _poison, _passes, _form, _small, _bytes, _bytes, _no_file),
+    *(*HARMLESS, _attribute, _without, _windows, _channel),
+    *(_poison, _small, _bytes, _bytes, _no_file),
 )
 
 # --- cameras and options --------------------------------------------------------------

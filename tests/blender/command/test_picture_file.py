@@ -40,6 +40,13 @@ def test_frames_of_one_name_are_refused(tmp_path: Path) -> None:
         picture_file.check_output(str(tmp_path / "out.exr"), [1, 2])
 
 
+@pytest.mark.parametrize("name", ["a.%04d.exr", "a_$F4.png", "*.exr", "a.<frame>.exr"])
+def test_other_programs_frame_numbers_are_told(tmp_path: Path, name: str) -> None:
+    with pytest.raises(UsageError, match="the frame number is written ####"):
+        picture_file.check_output(str(tmp_path / name), [1])
+    assert not list(tmp_path.iterdir())
+
+
 def test_unwritable_places_are_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "folder.exr").mkdir()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import subprocess
 import sys
 from dataclasses import replace
@@ -525,6 +526,20 @@ LATIN_1 = "D:\\projets\\été.ma".encode("latin-1")
         hostile.attribute("deepImageState", "deepImageState", b"\0"),
         hostile.attribute("ours", "ofMyOwn", LATIN_1),
         hostile.attribute("owner", "string", "été".encode()),
+        hostile.attribute("framesPerSecond", "rational", struct.pack("<iI", 48, 2)),
+        hostile.attribute("framesPerSecond", "rational", bytes(8)),
+        hostile.attribute("keyCode", "keycode", b"\xff" * 28),
+        hostile.attribute("envmap", "envmap", b"\x09"),
+        hostile.attribute("multiView", "stringvector", b""),
+        hostile.attribute("a", "stringvector", b"\4\0\0\0ab"),
+        hostile.attribute("a", "floatvector", b""),
+        hostile.attribute("a", "int", b"\1\2\3"),
+        hostile.attribute("a", "m33f", b"\1\0\xa0\x7f" * 9),  # a signalling NaN
+        hostile.attribute("a", "preview", b"\2\0\0\0\2\0\0\0ab"),
+        hostile.attribute("a", "tiledesc", b"\0" * 9),
+        hostile.attribute("a", "chlist", b"ab"),
+        hostile.attribute("a", "bytes", b"ab"),
+        b"a\0k\xe9\0\2\0\0\0ab",
     ],
 )
 @pytest.mark.parametrize("alone", [True, False])
@@ -541,3 +556,18 @@ def test_any_attribute_is_carried_on_byte_for_byte(
         assert told in copied.read_bytes()
         assert path.read_bytes() == given
         np.testing.assert_array_equal(exr.File(copied).pixels("R"), plane)
+
+
+def test_attributes_of_one_name_leave_each_other_and_the_next_alone(
+    path: Path, tmp_path: Path
+) -> None:
+    told = [
+        hostile.attribute("a", "v3d", bytes(24)),
+        hostile.attribute("a", "string", b"abc"),
+        hostile.attribute("b", "int", b"abcd"),
+    ]
+    plane = np.ones((4, 5), np.float32)
+    hostile.write_odd_exr(path, dict.fromkeys("RGB", plane), attributes=b"".join(told))
+    copied = tmp_path / "copy.exr"
+    exr.copy_picture(path, copied, {0: dict.fromkeys("RGB", plane)})
+    assert all(attribute in copied.read_bytes() for attribute in told)

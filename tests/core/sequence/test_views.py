@@ -138,3 +138,17 @@ def test_the_picture_alone_holds_all_views(tmp_path: Path) -> None:
     denoise_sequence(files, Denoiser("fast", "cpu", threads=1))
     (part,) = exr.File(tmp_path / "out.exr").parts
     assert set(part.channels) == {*"RGB", "right.R", "right.G", "right.B"}
+
+
+@pytest.mark.parametrize(
+    "value", [np.eye(4, dtype=np.float32), "left", ["left"], ["", "right"], ["a", "a"]]
+)
+def test_a_list_of_views_that_is_none_is_no_stereo_file(
+    tmp_path: Path, value: Any
+) -> None:
+    planes = sequences.planes(vars(frame(1)), PLAIN)
+    planes = {name: np.ascontiguousarray(plane) for name, plane in planes.items()}
+    OpenEXR.File(header(1) | {"multiView": value}, planes).write(
+        str(tmp_path / "1.exr")
+    )
+    assert not read_frame(tmp_path / "1.exr", 1, Reading()).others
