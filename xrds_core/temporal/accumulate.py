@@ -173,8 +173,12 @@ def _by_rows(
 
     def work(first: int) -> float:
         rows = slice(first, min(first + _ROWS, height))
-        block = _Block(target, rows, usual, images, lit, guess)
+        block = _Block(target, rows, usual, images, lit, guess is not None)
         sums = [_block_sums(block, group) for group in groups if group]
+        if guess is not None:
+            changes = guess.changes(block.rows, [each.moments for each in sums])
+            for each, change in zip(sums, changes, strict=True):
+                each.register(change)
         for each in sums:
             each.finish()
         found = _means(target, block, sums)
@@ -233,7 +237,8 @@ class _Block:
 
     `usual` is as in `Similarity`. `void` (n,) marks where a frame with alpha is
     transparent, in a pixel or next to it: there is no noise to remove, and an outline
-    accumulated from several frames is wider than that of one.
+    accumulated from several frames is wider than that of one. Where the block
+    `registers` the moments of offsets are summed.
     """
 
     def __init__(
@@ -243,7 +248,7 @@ class _Block:
         usual: float,
         images: Images | None,
         lit: tuple[str, ...] = (),
-        guess: Guess | None = None,
+        registers: bool = False,
     ) -> None:
         height, width = target.shape
         first, last = max(rows.start - MARGIN, 0), min(rows.stop + MARGIN, height)
@@ -260,7 +265,7 @@ class _Block:
         self.known = np.ones(len(self.own), bool)
         if target.invalid is not None:
             self.known = ~target.invalid[self.wide.pixels]
-        self.guess = guess
+        self.registers = registers
         self._target, self._usual = target, usual
 
     @cached_property
@@ -341,10 +346,17 @@ class _Sums:
         self.weights += weight
         self.reused += reused
 
+    def register(self, change: Array) -> None:
+        """Take out the offsets of the pixels taken: add a change as `Guess` has it."""
+        channels = self.values.shape[1]
+        self.values += change[:, :channels]
+        self.parts += change[:, channels:][:, : self.parts.shape[1]]
+        if self.block.similarity is not None:
+            self.brightness += change[:, -1]
+
     def finish(self) -> None:
         """Apply the similarity weight and crop to the block's own rows."""
         block = self.block
-        self._register()
         weights = np.maximum(self.weights, _TINY)
         means = block.shaped(self.values / weights[:, None])
         seen = block.shaped(self.weights > 0.0)
@@ -360,18 +372,6 @@ class _Sums:
         inner = block.inner
         self.values, self.parts = self.values[inner], self.parts[inner]
         self.weights, self.reused = self.weights[inner], self.reused[inner]
-
-    def _register(self) -> None:
-        """Take out the offsets of the pixels taken."""
-        block, guess = self.block, self.block.guess
-        if guess is None:
-            return
-        change = guess.change(block.rows, self.moments)
-        channels = self.values.shape[1]
-        self.values += change[:, :channels]
-        self.parts += change[:, channels:][:, : self.parts.shape[1]]
-        if block.similarity is not None:
-            self.brightness += change[:, -1]
 
     def _scale(self, factor: Array) -> None:
         self.values *= factor[:, None]
@@ -465,7 +465,7 @@ class Reprojected:
         weight *= tiles
         weight *= sample_counts(other, found.pixel, len(weight))
         reused = weight.copy()
-        if block.guess is None:
+        if not block.registers:
             weight *= np.exp(found.apart * self.fall)
         else:
             x, y = self._offsets(found, block)

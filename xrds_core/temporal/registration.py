@@ -60,22 +60,24 @@ class Guess:
         np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
         self._picture: NDArray[np.float16] = picture.astype(np.float16)
 
-    def change(self, rows: slice, moments: Array) -> Array:
-        """Return the sum of G(x) - G(x + d) over neighbours, of some rows: (n, C).
+    def changes(self, rows: slice, moments: Sequence[Array]) -> list[Array]:
+        """Return the sums of G(x) - G(x + d) over groups of neighbours, each (n, C).
 
-        `moments` (MOMENTS, n) are their sums. 0 beside pixels without samples.
+        They are of some rows; `moments` are the sums over each group, (MOMENTS, n).
+        0 beside pixels without samples.
         """
         height, width, channels = self._picture.shape
         wide = np.arange(rows.start - _MARGIN, rows.stop + _MARGIN)
         picture = self._picture[np.clip(wide, 0, height - 1)].astype(np.float32)
         picture = np.pad(picture, ((0, 0), (_MARGIN, _MARGIN), (0, 0)), "edge")
-        result = np.zeros((rows.stop - rows.start, width, channels), np.float32)
-        planes = moments.reshape(len(moments), *result.shape[:2], 1)
-        for moment, power in zip(planes, _powers(picture), strict=True):
-            result -= moment * power
+        shape = rows.stop - rows.start, width
+        result = np.zeros((len(moments), *shape, channels), np.float32)
+        for number, power in enumerate(_powers(picture)):
+            for group, of_group in enumerate(moments):
+                result[group] -= of_group[number].reshape(*shape, 1) * power
         if self._has_holes:
             result[~np.isfinite(result)] = 0.0
-        return result.reshape(-1, channels)
+        return list(result.reshape(len(moments), -1, channels))
 
 
 def _powers(picture: Array) -> Iterator[Array]:

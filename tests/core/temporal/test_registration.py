@@ -54,7 +54,7 @@ def test_a_polynomial_of_second_degree_is_taken_out_exactly() -> None:
     told = sum(
         moments(*d.reshape(2, -1), w.ravel()) for d, w in zip(off, weight, strict=True)
     )
-    found = Guess([polynomial(x, y)], False).change(slice(0, 9), told)
+    found = Guess([polynomial(x, y)], False).changes(slice(0, 9), [told])[0]
     apart = [polynomial(x, y) - polynomial(x + d[0] / 8, y + d[1] / 8) for d in off]
     expected = sum(w[..., None] * a for w, a in zip(weight, apart, strict=True))
     inner = np.s_[2:-2, 2:-2]
@@ -65,10 +65,10 @@ def test_rows_of_a_picture_are_those_of_the_whole() -> None:
     rng = np.random.default_rng(2)
     guess = Guess([rng.uniform(0, 2, (20, 7, 3)).astype(np.float32)], True)
     told = rng.normal(size=(MOMENTS, 20 * 7)).astype(np.float32)
-    whole = guess.change(slice(0, 20), told).reshape(20, 7, 4)
-    part = guess.change(
-        slice(5, 9), told.reshape(MOMENTS, 20, 7)[:, 5:9].reshape(5, -1)
-    )
+    (whole,) = guess.changes(slice(0, 20), [told])
+    whole = whole.reshape(20, 7, 4)
+    some = told.reshape(MOMENTS, 20, 7)[:, 5:9].reshape(MOMENTS, -1)
+    part = guess.changes(slice(5, 9), [some, some])[1]
     np.testing.assert_array_equal(part.reshape(4, 7, 4), whole[5:9])
 
 
