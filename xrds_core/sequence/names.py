@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
+from ..errors import Unfit
 from ..exr.channels import COMPONENTS
-from .file_errors import Unfit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import PictureError
+from ..errors import NotReusable, PictureError, Unfit
 from ..exr import File
 from ..exr.limits import is_mostly_empty
 from ..frames import MOST_RADIUS, frame_path
@@ -20,7 +20,6 @@ from ..temporal.motion import centres, pixels_of
 from ..temporal.noise import Noise
 from . import attributes
 from .cameras import camera_of_frame, from_header, has_camera
-from .file_errors import NotReusable, Unfit
 from .names import Found, PassNames, find
 
 if TYPE_CHECKING:

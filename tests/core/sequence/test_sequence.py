@@ -20,10 +20,9 @@ from xrds_core import exr
 pytest.importorskip("mitsuba_oidn")
 
 from xrds_core.denoising import Denoiser
-from xrds_core.errors import PictureError, UsageError
+from xrds_core.errors import NotReusable, PictureError, Unfit, UsageError
 from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.denoise import Files, denoise_sequence
-from xrds_core.sequence.file_errors import NotReusable, Unfit
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.sequence.names import PassNames
 from xrds_core.sequence.reading import Reading, read_frame
