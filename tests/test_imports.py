@@ -6,7 +6,6 @@ import ast
 import subprocess
 import sys
 import tomllib
-from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -202,12 +201,6 @@ def test_files_and_functions_stay_small(path: Path) -> None:
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             assert node.end_lineno - node.lineno < most, node.name
-
-
-@pytest.mark.parametrize("package", SHIPPED)
-def test_folders_stay_small(package: str) -> None:
-    count = Counter(path.parent for path in below(package) if path.stem != "__init__")
-    assert max(count.values()) <= 18, count.most_common(1)
 
 
 def test_no_child_process_runs_what_lies_in_the_working_folder() -> None:

@@ -111,9 +111,10 @@ def test_a_frame_whose_camera_is_none_is_denoised_by_itself(
 @pytest.mark.parametrize(
     ("value", "count"),
     [(3, 3), ("64", 64), (4.0, 4), ("²", 16), ("9" * 400, 16), ("9" * 5000, 16)]
-    + [(x, 16) for x in ("", "-3", "1e9", -1, 0, 2.5, np.eye(4).tolist())],
+    + [(2.5, 2.5)]  # the mean of pixels that took as many as they needed
+    + [(x, 16) for x in ("", "-3", "1e9", -1, 0, 0.5, np.inf, np.eye(4).tolist())],
 )
-def test_samples_are_told_by_whole_numbers_alone(
+def test_samples_are_told_by_counts_and_means(
     tmp_path: Path, value: Any, count: int
 ) -> None:
     path = write(tmp_path, frame(1), header={"xrds/samples": value})
