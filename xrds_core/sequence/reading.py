@@ -291,7 +291,13 @@ def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array 
     if depth and position and _is_half(file, position):
         position = []  # half floats give positions only to centimetres
     if not position:
-        return _from_depth(file.plane(depth[0])) if depth else None
+        if not depth:
+            return None
+        plane = file.plane(depth[0])
+        if found.has_length:
+            height, width = plane.shape
+            plane = plane * camera.depth_per_length((height, width))
+        return _from_depth(plane)
     points = _stack(file, position)
     points[~np.isfinite(points).all(axis=-1)] = 0.0
     if reading.position_space == "camera":
