@@ -112,7 +112,8 @@ def unit_of(frame: Stored, other: Stored) -> str:
     # what moves with the camera fits an infinite depth
     if left.min() > _BESIDE * min(as_it_is, misfit(np.inf)):
         return ""
-    return f"the cameras when multiplied by about {_FACTORS[left.argmin()]:.2g}"
+    factor = float(f"{_FACTORS[left.argmin()]:.2g}")
+    return f"the cameras when multiplied by about {factor:g}"
 
 
 def _points(frame: Stored, x: Array, y: Array, inverse_depth: Array) -> Array:

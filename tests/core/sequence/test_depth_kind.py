@@ -51,7 +51,7 @@ def told(change: Change, make: Callable[[int], Frame] = turned) -> list[str]:
         (lambda x: 1 / x.depth, "1 / depth"),
         (lambda x: 100 * x.depth, "multiplied by about 0.01"),
         (lambda x: 1000 * x.depth, "multiplied by about 0.001"),
-        (lambda x: x.depth / 100, "multiplied by about 1e+02"),
+        (lambda x: x.depth / 100, "multiplied by about 100"),
         (lambda x: x.depth / 0.0254, "multiplied by about 0.02"),
     ],
 )
