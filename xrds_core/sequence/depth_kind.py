@@ -30,11 +30,17 @@ _FRAMES = 8  # that are looked at: a camera may rest at first
 _SMOOTH = 0.999  # cosine of two normals on one surface
 _NEAR = 0.1  # relative difference of their depths
 _ACROSS = 0.02  # sine of the angle by which steps leave a surface, where all is right
+_FAR_ACROSS = 0.05  # where something is wrong, whatever it is
 _STEEPER = 0.3  # share of it that the right kind leaves
 _DIFFERS = 0.02  # mean difference of albedo of two frames, where all is right
 _BESIDE = 0.5  # share of it that the right unit leaves; some is noise
 _MOST = 0.2  # difference of albedo that counts
 _FACTORS = 10.0 ** (np.arange(-96, 97) / 24)  # of units: from 1/10000 to 10000
+
+_NO_FIT = (
+    "does not fit the normals: it may be scaled between near and far, or they may be "
+    "in another space (--normal-space)"
+)
 
 
 class DepthKind:
@@ -58,13 +64,13 @@ class DepthKind:
         if found:
             self._left = 0
             self._say(
-                f"the depth of frame {own.number} fits {found}; as it is, few "
+                f"the depth of frame {own.number} {found}; as it is, few "
                 "samples of neighbours are reused: convert it, or render Position"
             )
 
 
 def kind_of(frame: Stored) -> str:
-    """Say what a depth along the ray, or an inverse one, is; "" for any other."""
+    """Say how a depth differs from one along the axis by its normals; "" if it fits."""
     pairs = _surface(frame)
     if pairs.shape[1] < _FEWEST:
         return ""
@@ -73,8 +79,8 @@ def kind_of(frame: Stored) -> str:
     length = np.linalg.norm(_points(frame, x, y, np.ones_like(x)), axis=0)
     kinds = {
         "": near,
-        "the normals as length of the ray, not along the camera's axis": near * length,
-        "the normals as 1 / depth": 1.0 / near,
+        "fits the normals as length of the ray, not along the axis": near * length,
+        "fits the normals as 1 / depth": 1.0 / near,
     }
     normal = floats(frame.picture[pairs][..., frame.normals]).mean(axis=0)
     left: dict[str, float] = {}
@@ -84,7 +90,9 @@ def kind_of(frame: Stored) -> str:
         across = np.abs((step * normal.T).sum(axis=0))
         left[kind] = float(np.median(across / np.linalg.norm(step, axis=0)))
     best = min(left, key=lambda kind: left[kind])
-    return best if left[""] > max(_ACROSS, left[best] / _STEEPER) else ""
+    if left[""] > max(_ACROSS, left[best] / _STEEPER):
+        return best
+    return _NO_FIT if left[""] > _FAR_ACROSS else ""
 
 
 def unit_of(frame: Stored, other: Stored) -> str:
@@ -113,7 +121,7 @@ def unit_of(frame: Stored, other: Stored) -> str:
     if left.min() > _BESIDE * min(as_it_is, misfit(np.inf)):
         return ""
     factor = float(f"{_FACTORS[left.argmin()]:.2g}")
-    return f"the cameras when multiplied by about {factor:g}"
+    return f"fits the cameras when multiplied by about {factor:g}"
 
 
 def _points(frame: Stored, x: Array, y: Array, inverse_depth: Array) -> Array:

@@ -49,6 +49,8 @@ def told(change: Change, make: Callable[[int], Frame] = turned) -> list[str]:
         (lambda x: x.depth * ray(x), "length of the ray"),
         (lambda x: 100 * x.depth * ray(x), "length of the ray"),
         (lambda x: 1 / x.depth, "1 / depth"),
+        (lambda x: 1 - x.depth / 60, "the normals"),
+        (lambda x: (x.depth - 4) / 30, "does not fit the normals"),
         (lambda x: 100 * x.depth, "multiplied by about 0.01"),
         (lambda x: 1000 * x.depth, "multiplied by about 0.001"),
         (lambda x: x.depth / 100, "multiplied by about 100"),
@@ -68,7 +70,6 @@ def test_another_kind_of_depth_is_told_once(change: Change, words: str) -> None:
         (lambda x: x.depth, lambda n: frame(n, step=0.0)),
         (lambda x: 100 * x.depth, lambda n: turned(n, 0.0)),  # a camera that rests
         (lambda x: np.full_like(x.depth, np.inf), turned),
-        (lambda x: np.full_like(x.depth, 1e-30), turned),
     ],
 )
 def test_what_fits_or_says_nothing_is_not_told(change: Change, make: Any) -> None:
