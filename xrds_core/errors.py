@@ -33,6 +33,21 @@ class PictureError(XRDSError):
     """Arrays or picture files that cannot be used: wrong size, pass, or format."""
 
 
+class Unfit(PictureError):
+    """A complete file that lacks something needed, or holds something unusable."""
+
+
+class NotReusable(Unfit):
+    """A frame that can be denoised by itself, but whose pixels cannot be reprojected.
+
+    `reason` is the message without the remedy.
+    """
+
+    def __init__(self, reason: str, remedy: str) -> None:
+        super().__init__(f"{reason}; {remedy}")
+        self.reason = reason
+
+
 class SceneError(XRDSError):
     """A scene that cannot be rendered, e.g. without a camera."""
 

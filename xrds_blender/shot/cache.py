@@ -28,7 +28,7 @@ from ..scene.key_files import trace
 from ..scene.outer_files import outer_files
 from .sampling import Sampled, subset_at
 
-_FORM = 3  # counts up where samples of the same settings become others
+_FORM = 4  # counts up where samples of the same settings become others
 
 
 @dataclass(frozen=True)

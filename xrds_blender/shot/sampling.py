@@ -108,6 +108,12 @@ class Sampling:
         """Whether the frame has no neighbours."""
         return not self.radius
 
+    @property
+    def has_length(self) -> bool:
+        """Whether what is sampled as depth is a length along the ray."""
+        is_late = LATE_DEPTH in self.geometry and GEOMETRY[0] not in self.geometry
+        return is_late and not (self.has_halves and self.needs_motion)
+
     def named(self, stage: str) -> str:
         """A stage's name in the status bar, with the frame's number in a shot."""
         return stage if self.is_alone else f"{stage} of frame {self.number}"
@@ -410,6 +416,9 @@ def first_sample(engine: Any, depsgraph: Any, request: Request, place: int) -> N
 def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
     """One view's samples as accumulation takes them."""
     assert samples.depth is not None
+    depth = samples.depth
+    if how.has_length:
+        depth = depth * camera.depth_per_length(depth.shape)
     counts = samples.counts
     if counts is not None:
         counts = counts * np.float32(how.count)
@@ -420,7 +429,7 @@ def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
         alpha=samples.picture[..., 3],
         albedo=samples.albedo,
         normal=samples.normal,
-        depth=samples.depth,
+        depth=depth,
         vector=samples.vector,
         samples=how.count if counts is None else max(float(counts.mean()), _FEWEST),
         still=how.still,

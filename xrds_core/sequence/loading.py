@@ -6,9 +6,8 @@ import time
 from collections.abc import Callable, Container, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from ..errors import PictureError
+from ..errors import NotReusable, PictureError, Unfit
 from ..frames import frame_path, in_words
-from .file_errors import NotReusable, Unfit
 from .reading import read_frame
 
 if TYPE_CHECKING:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
+from ..errors import Unfit
 from ..exr.channels import COMPONENTS
-from .file_errors import Unfit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -54,7 +54,8 @@ class Found:
     """The full names of the channels of the passes that a file has.
 
     `picture` are the channels that the finished picture is written to, R, G, B, and
-    `alpha` is the one that holds alpha in the input.
+    `alpha` is the one that holds alpha in the input. With `has_length` depth is a
+    length along the ray.
     """
 
     beauty: list[str]
@@ -69,6 +70,7 @@ class Found:
     picture: list[str]
     alpha: str | None
     has_camera_normal: bool
+    has_length: bool
 
 
 def find(channels: Channels, names: PassNames) -> Found:
@@ -84,13 +86,13 @@ def find(channels: Channels, names: PassNames) -> Found:
         raise _missing(channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB")
     target = _target(channels, prefix)
     alphas = [f"{x}.A" if x else "A" for x in (prefix, target)]
-    normal = _pass(channels, names, "normal")
+    normal, depth = _pass(channels, names, "normal"), _depth(channels, names)
     return Found(
         beauty=here,
         albedo=_needed(channels, names, "albedo"),
         normal=_needed(channels, names, "normal"),
         position=_channels(channels, names, "position"),
-        depth=_depth(channels, names),
+        depth=depth,
         path_length=_path_length(channels, names),
         vector=_channels(channels, names, "vector", _MOTION),
         noise=_ours(channels, NOISE, "XYZ"),
@@ -98,6 +100,7 @@ def find(channels: Channels, names: PassNames) -> Found:
         picture=channels.of(target) or ["R", "G", "B"],
         alpha=next((x for x in alphas if x in channels.names), None),
         has_camera_normal=(normal or "").endswith(CAMERA_NORMAL),
+        has_length=any(PATH_LENGTH in name for name in depth),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from ..temporal.equal_noise import IndependentFrames
+from .depth_kind import DepthKind
 
 if TYPE_CHECKING:
     from ..temporal.accumulate import Accumulated
@@ -16,14 +17,15 @@ if TYPE_CHECKING:
 class NeighbourSelection:
     """Leaves out neighbours of another size, with other passes, or of another render.
 
-    And those that have the same noise.
-    `say` takes a line about each frame that does not fit its neighbours, once.
+    And those that have the same noise. `say` takes a line about each frame that does
+    not fit its neighbours, once, and about depths of another kind.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
         self._say = say
         self._odd: set[int] = set()
         self._independent = IndependentFrames(say)
+        self._depth = DepthKind(say)
         self._had_neighbours = self._reused = False
 
     def select(
@@ -37,6 +39,8 @@ class NeighbourSelection:
             for n, other in beside.items()
             if other.reusable and self._fits(number, own, n, other)
         ]
+        if not own.key:  # others' files
+            self._depth.look(own.stored, fitting)
         return self._independent.of(own.stored, fitting)
 
     def record(self, others: Sequence[Stored], accumulated: Accumulated) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import PictureError
+from ..errors import NotReusable, PictureError, Unfit
 from ..exr import File
 from ..exr.limits import is_mostly_empty
 from ..frames import MOST_RADIUS, frame_path
@@ -20,7 +20,6 @@ from ..temporal.motion import centres, pixels_of
 from ..temporal.noise import Noise
 from . import attributes
 from .cameras import camera_of_frame, from_header, has_camera
-from .file_errors import NotReusable, Unfit
 from .names import Found, PassNames, find
 
 if TYPE_CHECKING:
@@ -292,7 +291,13 @@ def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array 
     if depth and position and _is_half(file, position):
         position = []  # half floats give positions only to centimetres
     if not position:
-        return _from_depth(file.plane(depth[0])) if depth else None
+        if not depth:
+            return None
+        plane = file.plane(depth[0])
+        if found.has_length:
+            height, width = plane.shape
+            plane = plane * camera.depth_per_length((height, width))
+        return _from_depth(plane)
     points = _stack(file, position)
     points[~np.isfinite(points).all(axis=-1)] = 0.0
     if reading.position_space == "camera":

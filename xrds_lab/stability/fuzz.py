@@ -214,9 +214,9 @@ def _written(case: Case, status: int) -> Iterator[str]:
     outputs = [x for x in case.output.glob("*.exr") if x.is_file()]
     if status == 0 and len(outputs) < case.least:
         yield "frames lost"
+    if status > 0 or "--resume" in case.words:  # not all are made by this run
+        return
     for path in outputs:
-        if status > 0 or not (case.folder / "in" / path.name).is_file():
-            continue  # what no run has made lately
         try:
             planes = [exr.File(path).pixels(name) for name in case.picture(path)]
         except (PictureError, KeyError):
@@ -224,7 +224,7 @@ def _written(case: Case, status: int) -> Iterator[str]:
             continue
         if not all(np.isfinite(plane).all() for plane in planes):
             yield "not finite"
-        if {"--picture-only", "--resume"}.isdisjoint(case.words):
+        if "--picture-only" not in case.words:
             lost = _attributes(case.folder / "in" / path.name) - _attributes(path)
             yield from (f"{path.name} lacks {x[:2]}" for x in sorted(lost)[:1])
 
@@ -245,10 +245,9 @@ def _attributes(path: Path) -> set[tuple[bytes, bytes, bytes]]:
 
 def _differences(case: Twice, resumed: Run, fresh: Run) -> Iterator[str]:
     """What `--resume` left otherwise than a run from nothing, without a line."""
-    if fresh.status != 0:
-        return
-    if resumed.status != 0:
-        yield "resume fails"
+    if resumed.status != fresh.status:
+        if fresh.status == 0:
+            yield "resume fails"
         return
     for path in sorted((case.folder / "new").glob("*.exr")):
         if not _are_equal(case.output / path.name, path):

@@ -30,7 +30,7 @@ _NEW = "new/####.exr"
 _SETTINGS = (
     *("--temporal-radius=0", "--temporal-radius=1", "--temporal-radius=2"),
     *("--samples=1", "--samples=64", "--picture-only", "--passes=all"),
-    *("--denoise=balanced", "--denoise=high", "--denoise=nonsense"),
+    *("--denoise=balanced", "--denoise=high", "--denoise=no"),
     *("--halves=more/####.exr", "--halves=more/0001.exr", "--passes=groups"),
     *("--also=more/####.exr", "--also=more/b.####.exr", "--passes=Emission"),
     *("--crop=8x8+3+2", "--crop=24x18+0+0", "--crop=0x0+0+0"),

@@ -23,8 +23,10 @@ from xrds_blender.internals.lifetimes import RENDER_JOB
 from xrds_blender.planning.request import render_request
 from xrds_blender.shot import full_size, shot
 from xrds_blender.shot import render as engine_shots
+from xrds_blender.shot.sampling import noisy_frame
 from xrds_core import exr
 from xrds_core.sequence import accumulator
+from xrds_core.temporal.frame import SKY_DEPTH
 
 FRAMES = [1, 2, 3, 4, 5]
 
@@ -90,6 +92,24 @@ def test_a_sample_subset_of_the_file(
         assert taken < frame["temporal"]["mean_samples"] <= 3 * taken
     file = exr.File(blend.parent / "shot" / "1.exr")
     assert file.parts[0].attributes["xrds.samples"] == str(taken)
+
+
+@pytest.mark.skipif(
+    not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
+)
+def test_depth_of_a_sample_subset_lies_along_the_axis(blend: Path) -> None:
+    """What Cycles writes there is a length along the ray."""
+    scene, made = bpy.context.scene, []
+    cycles, job = scene.cycles, render_request(scale=1, temporal_radius=1)
+    cycles.samples, cycles.use_adaptive_sampling = 8, False
+    for cycles.use_sample_subset in (False, True):
+        cycles.sample_offset, cycles.sample_subset_length = 4, 2
+        frames, _ = call_engine(scene, lambda *given: noisy_frame(*given, job))
+        made.append(frames[""])
+    first, late = (frame.depth for frame in made)
+    axis = made[0].camera.depth_per_length(first.shape)
+    corners = (axis < np.quantile(axis, 0.2)) & (first < SKY_DEPTH)
+    assert abs(np.median((late / first)[corners]) - 1.0) < 0.03
 
 
 def test_every_frame_is_sampled_once(

@@ -26,11 +26,10 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_core import files
 from xrds_core.denoising import Denoiser
-from xrds_core.errors import PictureError, UsageError
+from xrds_core.errors import NotReusable, PictureError, Unfit, UsageError
 from xrds_core.frames import in_words
 from xrds_core.sequence import attributes, cameras
 from xrds_core.sequence.denoise import Files, denoise_sequence
-from xrds_core.sequence.file_errors import NotReusable, Unfit
 from xrds_core.sequence.reading import Reading, read_frame
 from xrds_core.temporal.window import Shot
 

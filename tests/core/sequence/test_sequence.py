@@ -20,10 +20,9 @@ from xrds_core import exr
 pytest.importorskip("mitsuba_oidn")
 
 from xrds_core.denoising import Denoiser
-from xrds_core.errors import PictureError, UsageError
+from xrds_core.errors import NotReusable, PictureError, Unfit, UsageError
 from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.denoise import Files, denoise_sequence
-from xrds_core.sequence.file_errors import NotReusable, Unfit
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.sequence.names import PassNames
 from xrds_core.sequence.reading import Reading, read_frame
@@ -221,7 +220,7 @@ def test_usual_names_are_known(tmp_path: Path, names: dict[str, str]) -> None:
 
 
 def test_cycles_denoising_depth_is_the_path_through_mirrors(tmp_path: Path) -> None:
-    """Beside a depth; alone it is the depth, as it always was."""
+    """Beside a depth; alone depth is computed from it."""
     own = replace(frame(1), path_length=np.full((48, 64), 30.0, np.float32))
     name = {"path_length": "ViewLayer.Denoising Depth.Z"}
     both = read_frame(write(tmp_path, own, CYCLES | name), 1, Reading()).stored
@@ -229,8 +228,12 @@ def test_cycles_denoising_depth_is_the_path_through_mirrors(tmp_path: Path) -> N
     np.testing.assert_array_equal(both.inverse_depth, store(own).inverse_depth)
     assert np.isfinite(both.image).any()
     alone = {k: v for k, v in CYCLES.items() if k != "depth"}
-    alone |= {"depth": name["path_length"]}
-    assert read_frame(write(tmp_path, own, alone), 1, Reading()).stored.image is None
+    alone |= name
+    ray = own.depth / own.camera.depth_per_length(own.shape)
+    path = write(tmp_path, replace(own, path_length=ray), alone)
+    told = read_frame(path, 1, Reading()).stored
+    np.testing.assert_allclose(told.inverse_depth, store(own).inverse_depth, rtol=1e-5)
+    assert told.image is None
 
 
 def test_other_names_can_be_told(tmp_path: Path) -> None:
