@@ -22,9 +22,7 @@ from xrds_lab.training.guide_filter import (
     train_guide_filter,
 )
 
-pytestmark = pytest.mark.nightly  # it takes minutes
-
-pytestmark = pytest.mark.usefixtures("one_thread")
+pytestmark = [pytest.mark.nightly, pytest.mark.usefixtures("one_thread")]
 
 SIDE = 72
 

@@ -19,6 +19,8 @@ from xrds_lab.studio import dataset, datasheet, framing, geometry, scenes
 from xrds_lab.studio.assets import Library
 from xrds_lab.studio.framing import Window
 
+pytestmark = pytest.mark.nightly  # it takes minutes
+
 KINDS = list(scenes.RECIPES)
 
 

@@ -33,7 +33,7 @@ from xrds_lab.training.windows import WindowSet
 ROOT = Path(__file__).resolve().parents[2]
 
 
-pytestmark = pytest.mark.usefixtures("one_thread")
+pytestmark = [pytest.mark.nightly, pytest.mark.usefixtures("one_thread")]
 
 
 @pytest.fixture
