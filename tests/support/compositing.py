@@ -7,18 +7,22 @@ from typing import Any
 import bpy
 
 
+def empty_compositor(scene: Any) -> Any:
+    """The node tree of a compositor, without any node."""
+    if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later
+        scene.compositing_node_group = bpy.data.node_groups.new(
+            "compositor", "CompositorNodeTree"
+        )
+        return scene.compositing_node_group
+    scene.use_nodes = True
+    scene.node_tree.nodes.clear()
+    return scene.node_tree
+
+
 def compositor(scene: Any) -> tuple[Any, Any]:
     """A compositor whose only node so far is the end; (tree, its image socket)."""
-    if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later
-        tree = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
-        scene.compositing_node_group = tree
-        tree.interface.new_socket(
-            "Image", in_out="OUTPUT", socket_type="NodeSocketColor"
-        )
-        end = tree.nodes.new("NodeGroupOutput")
-    else:
-        scene.use_nodes = True
-        tree = scene.node_tree
-        tree.nodes.clear()
-        end = tree.nodes.new("CompositorNodeComposite")
-    return tree, end.inputs[0]
+    tree = empty_compositor(scene)
+    if not hasattr(scene, "compositing_node_group"):
+        return tree, tree.nodes.new("CompositorNodeComposite").inputs[0]
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    return tree, tree.nodes.new("NodeGroupOutput").inputs[0]

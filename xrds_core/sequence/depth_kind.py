@@ -12,7 +12,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..temporal.half_floats import floats
-from ..temporal.motion import centres, nearest, reproject, reprojection, world_of
+from ..temporal.motion import (
+    centres,
+    nearest,
+    reproject,
+    reprojection,
+    spread,
+    world_of,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -99,7 +106,7 @@ def unit_of(frame: Stored, other: Stored) -> str:
     """Say by which factor the depth of two frames fits their cameras; "" for 1."""
     if frame.shape != other.shape:
         return ""
-    spots = _spread(np.flatnonzero(frame.inverse_depth > 0.0))
+    spots = spread(np.flatnonzero(frame.inverse_depth > 0.0), _SPOTS)
     if len(spots) < _FEWEST:
         return ""
     x, y = centres(spots, frame.shape[1])
@@ -140,16 +147,10 @@ def _surface(frame: Stored) -> Pixels:
     """Return pairs (2, n) of pixels, beside and below, that lie on one surface."""
     height, width = frame.shape
     inner = np.arange(height * width).reshape(height, width)[:-1, :-1]
-    pixels = _spread(inner.ravel(), 8 * _SPOTS)
+    pixels = spread(inner.ravel(), 8 * _SPOTS)
     pairs = np.stack((pixels, pixels + width + 1))
     one, two = frame.inverse_depth[pairs]
     close = (np.abs(one - two) < _NEAR * np.minimum(one, two)) & (one > 0.0)
     first, second = floats(frame.picture[pairs][..., frame.normals])
     smooth = (first * second).sum(axis=-1) > _SMOOTH
-    return pairs[:, _spread(np.flatnonzero(close & smooth))]
-
-
-def _spread(places: Pixels, most: int = _SPOTS) -> Pixels:
-    """Return some of many places, evenly."""
-    # an odd step has no common factor with the width of many pictures
-    return places[:: (-(-len(places) // most) | 1)]
+    return pairs[:, spread(np.flatnonzero(close & smooth), _SPOTS)]

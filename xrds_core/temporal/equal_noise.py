@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .half_floats import floats
-from .motion import centres, nearest, reproject, reprojection
+from .motion import centres, nearest, reproject, reprojection, spread
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -114,10 +114,7 @@ def _spots(shape: tuple[int, int]) -> Pixels:
     """Return pixels (n,) that are spread over a picture, but for its edge."""
     height, width = shape
     rows, columns = np.arange(1, height - 1), np.arange(1, width - 1)
-    inner = (rows[:, None] * width + columns).ravel()
-    # an odd step has no common factor with the width of many pictures
-    step = -(-len(inner) // _SPOTS) | 1
-    return inner[::step]
+    return spread((rows[:, None] * width + columns).ravel(), _SPOTS)
 
 
 def _inner(pixels: Pixels, shape: tuple[int, int]) -> Pixels:

@@ -269,6 +269,12 @@ def spot_stride(shape: tuple[int, int]) -> int:
     return _STRIDES[shape[0] * shape[1] >= _LARGE]
 
 
+def spread(pixels: NDArray[np.integer], most: int) -> NDArray[np.integer]:
+    """Return at most so many of some pixels (n,), evenly."""
+    # an odd step has no common factor with the width of many pictures
+    return pixels[:: (-(-len(pixels) // most) | 1)]
+
+
 def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Grid:
     """Return the centres of the pixels of rows `first` to `last` (excluded)."""
     height, width = shape

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from compositing import empty_compositor
 
 bpy = pytest.importorskip("bpy")
 
@@ -23,13 +24,7 @@ def scene(empty_scene: Callable[..., Any], tmp_path: Path) -> Any:
 
 
 def composite(scene: Any, kind: str) -> None:
-    if hasattr(scene, "compositing_node_group"):
-        tree = bpy.data.node_groups.new("c", "CompositorNodeTree")
-        scene.compositing_node_group = tree
-    else:
-        scene.use_nodes = True
-        tree = scene.node_tree
-    tree.nodes.new(kind)
+    empty_compositor(scene).nodes.new(kind)
 
 
 def strip(scene: Any) -> None:

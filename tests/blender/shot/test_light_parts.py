@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from channels import read_channels
+from compositing import empty_compositor
 from light_passes import with_light_passes
 
 bpy = pytest.importorskip("bpy")
@@ -163,13 +164,7 @@ def test_light_that_nobody_looks_at_stays_as_it_is(lit: Any) -> None:
 
 @pytest.mark.parametrize(("socket", "expected"), [(0, "none"), (-1, "all")])
 def test_the_compositor_looks_at_light(lit: Any, socket: int, expected: str) -> None:
-    if hasattr(lit, "compositing_node_group"):
-        tree = bpy.data.node_groups.new("compositor", "CompositorNodeTree")
-        lit.compositing_node_group = tree
-    else:
-        lit.use_nodes = True
-        tree = lit.node_tree
-        tree.nodes.clear()
+    tree = empty_compositor(lit)
     layers = tree.nodes.new("CompositorNodeRLayers")
     viewer = tree.nodes.new("CompositorNodeViewer")
     names = ["Image", *(x.name for x in layers.outputs if "Combined_" in x.name)]
