@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from xrds_core.arrays import Array
-from xrds_core.temporal.frame import LARGEST_HALF, Frame
+from xrds_core.temporal.frame import Frame
+from xrds_core.temporal.half_floats import LARGEST_HALF
 
 # What the window keeps in half floats as well.
 _HALF = {"radiance", "albedo", "normal", "alpha", "vector", "halves"}

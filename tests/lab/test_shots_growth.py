@@ -24,7 +24,7 @@ SIZES = ((32, 18), (64, 36))
 
 
 def test_synthetic_frames_lend_to_each_other() -> None:
-    shot = [store(frame(n, 96, 54), np.float16) for n in range(3)]
+    shot = [store(frame(n, 96, 54)) for n in range(3)]
     together = accumulate(shot[1], [shot[0], shot[2]])
     alone = accumulate(shot[1], [])
     assert together.samples.mean() > 1.8 * SAMPLES

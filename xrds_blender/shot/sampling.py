@@ -315,7 +315,7 @@ def sample_frame(
     frames, seconds = noisy_frame(engine, depsgraph, request, place)
     if on_sampled is not None:
         on_sampled(frames)
-    views = {view: store(frame, np.float16) for view, frame in frames.items()}
+    views = {view: store(frame) for view, frame in frames.items()}
     return Sampled(number, views, seconds, samples=count, light=light)
 
 

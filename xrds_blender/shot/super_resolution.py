@@ -395,7 +395,7 @@ class _Renders:
             samples=guides.samples or self.chosen.guide_samples or 1,
             still=self.how.still,
         )
-        return store(frame, np.float16)
+        return store(frame)
 
     def _begin(self, stage: str, number: int) -> None:
         stages.begin(self.engine, self.how.named(stage), number)
@@ -428,7 +428,7 @@ def _guide_request(request: Request, how: Sampling, samples: int) -> Request:
 def _stored_light(how: Sampling, scale: int, low: LowSamples, view: str) -> Stored:
     window = low.place.window.x, low.place.window.y
     camera = low_view(how.cameras[view], scale, window)
-    return store(light_of(how, camera, low.samples), np.float16)
+    return store(light_of(how, camera, low.samples))
 
 
 def _summed(rendered: Sequence[Mapping[str, float]]) -> dict[str, float]:

@@ -74,7 +74,7 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
         None if x is None else x[rows] for x in (found.radiance, found.alpha)
     )
     guides = found.albedo[rows], found.normal[rows]
-    picture[place], invalid[place] = pack(light, *guides, alpha, picture.dtype)
+    picture[place], invalid[place] = pack(light, *guides, alpha)
     total = found.samples
     is_even = bool((total == total.flat[0]).all())
     noise = frame.noise
@@ -88,7 +88,7 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=noise,
-        parts=pack_parts(found.parts, frame.picture.dtype),
+        parts=pack_parts(found.parts),
     )
 
 

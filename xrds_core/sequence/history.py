@@ -62,7 +62,7 @@ def extended(history: Stored | None, frame: Stored, accumulate: Accumulator) -> 
     total = found.samples.ravel()
     counts = np.minimum(total, own * LONGEST)
     passes = found.radiance, found.albedo, found.normal, found.alpha
-    picture, invalid = pack(*passes, frame.picture.dtype)
+    picture, invalid = pack(*passes)
     share = np.where(total > 0.0, own / np.maximum(total, 1e-9), 1.0)
     noise = frame.noise
     if noise is not None and history.noise is not None:
@@ -74,5 +74,5 @@ def extended(history: Stored | None, frame: Stored, accumulate: Accumulator) -> 
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=noise,
-        parts=pack_parts(found.parts, frame.picture.dtype),
+        parts=pack_parts(found.parts),
     )

@@ -14,7 +14,7 @@ from ..exr.limits import is_mostly_empty
 from ..frames import MOST_RADIUS, frame_path
 from ..light_parts.find import Wanted, find_parts
 from ..light_parts.light import light_of
-from ..temporal.frame import LARGEST_HALF, SKY_DEPTH, Camera, Frame, Stored, store
+from ..temporal.frame import SKY_DEPTH, Camera, Frame, Stored, store
 from ..temporal.halves import Halves
 from ..temporal.motion import centres, pixels_of
 from ..temporal.noise import Noise
@@ -141,7 +141,7 @@ def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> Fra
     )
     if reading.halves is not None:
         frame = _with_other_half(frame, file, camera, reading)
-    stored = store(frame, np.float16)
+    stored = store(frame)
     if reading.halves is None and found.noise:
         stored = replace(stored, noise=_noise(file, found))
     return FrameFile(
@@ -368,9 +368,7 @@ def _vector(file: File, found: Found, reading: Reading) -> Array | None:
 
 def _noise(file: File, found: Found) -> Noise:
     """The noise of a frame as XRDS stored it."""
-    planes = (np.nan_to_num(file.plane(name).ravel()) for name in found.noise)
-    cut = (np.clip(plane, -LARGEST_HALF, LARGEST_HALF) for plane in planes)
-    return Noise(*(plane.astype(np.float16) for plane in cut))
+    return Noise.of(*(file.plane(name) for name in found.noise))
 
 
 def _samples(file: File, part: Part, reading: Reading) -> float:

@@ -14,7 +14,8 @@ import numpy as np
 
 from .. import exr
 from ..exr.openexr_io import Part
-from ..temporal.frame import LARGEST_HALF, noise_in, pack_counts
+from ..temporal.frame import noise_in, pack_counts
+from ..temporal.half_floats import LARGEST_HALF
 from .cameras import to_header
 from .names import CAMERA_NORMAL, COUNTS, NOISE, NOISY, PATH_LENGTH
 from .reading import KEY, NAME, RADIUS, SAMPLES, STILL, SUBSET
@@ -96,7 +97,7 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
 
 def _noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
-    noise = noise_in(frame, np.float16)
+    noise = noise_in(frame)
     parts = (noise.brightness, noise.difference, noise.guides)
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 

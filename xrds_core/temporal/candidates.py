@@ -10,6 +10,7 @@ best is taken (a plane sweep, Collins 1996), for a lattice of spots.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from .half_floats import floats
 from .local_filters import box
-from .motion import Grid, Places, centres, nearest, reproject, spot_stride
+from .motion import Grid, centres, nearest, reproject, spot_stride
 from .noise import guides_of
 
 if TYPE_CHECKING:
@@ -58,31 +59,25 @@ class Images:
     stride: int
     lattice: Array
 
-    def of(self, grid: Grid) -> ImagePlaces:
-        """The images among the pixels of whole rows."""
+    @cached_property
+    def _shown(self) -> tuple[Grid, Array, Array]:
+        """The pixels that show an image, its inverse depth (n,) and motion (n, 2)."""
         assert self.frame.image is not None
-        assert isinstance(grid.pixels, slice)
-        at = np.flatnonzero(~np.isnan(self.frame.image[grid.pixels]))
-        row, column = np.divmod(at + grid.pixels.start, self.frame.shape[1])
+        pixels = np.flatnonzero(~np.isnan(self.frame.image))
+        row, column = np.divmod(pixels, self.frame.shape[1])
         found = self.lattice[row // self.stride, column // self.stride]
         shows = ~np.isnan(found[:, 0])
-        at, found = at[shows], found[shows]
-        spots = Grid(at + grid.pixels.start, grid.x[at], grid.y[at])
-        return ImagePlaces(self.frame, spots, at, found)
+        pixels, found = pixels[shows], found[shows]
+        spots = Grid(pixels, *centres(pixels, self.frame.shape[1]))
+        return spots, _depth_of(self.frame, spots, found[:, 0]), found[:, 1:]
 
-
-class ImagePlaces:
-    """Images at some pixels: `at`, counted from the first of their rows."""
-
-    def __init__(
-        self, frame: Stored, spots: Grid, at: NDArray[np.intp], images: Array
-    ) -> None:
-        self.at, self._spots, self._motion = at, spots, images[:, 1:]
-        self._depth = _depth_of(frame, spots, images[:, 0])
-
-    def places(self, pair: Pair) -> Places:
-        """Return where they were in the other frame."""
-        return _places(pair, self._spots, self._depth, self._motion)
+    def positions(self, pair: Pair) -> tuple[NDArray[np.intp], Array, Array]:
+        """Return pixels (n,), flat and ascending, and where their images were in the
+        other frame: x and y (n,).
+        """
+        spots, depth, motion = self._shown
+        assert not isinstance(spots.pixels, slice)
+        return spots.pixels, *_positions(pair, spots, depth, motion)
 
 
 def reach(shape: tuple[int, int]) -> int:
@@ -170,7 +165,8 @@ class _Sweep:
         depth = _depth_of(self._target, self._spots, candidate[:, 0])
 
         def compare(pair: Pair) -> Array:
-            found = _places(pair, self._spots, depth, candidate[:, 1:])
+            place = _positions(pair, self._spots, depth, candidate[:, 1:])
+            found = nearest(*place, pair.there.shape)
             apart = _guides(pair.there, found.pixel, pair.turn) - self._own
             seen = found.seen.astype(np.float32)
             if pair.there.invalid is not None:
@@ -216,12 +212,12 @@ def _filled(lattice: Array) -> Array:
     return result
 
 
-def _places(pair: Pair, spots: Grid, depth: Array, motion: Array) -> Places:
+def _positions(
+    pair: Pair, spots: Grid, depth: Array, motion: Array
+) -> tuple[Array, Array]:
     x, y, _ = reproject(pair.forth, spots.x, spots.y, depth)
     frames = np.float32(pair.there.number - pair.here.number)
-    return nearest(
-        x + motion[:, 0] * frames, y + motion[:, 1] * frames, pair.there.shape
-    )
+    return x + motion[:, 0] * frames, y + motion[:, 1] * frames
 
 
 def _depth_of(frame: Stored, spots: Grid, share: Array) -> Array:

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .motion import Grid, spot_stride, still_places
+from .motion import spot_stride
 from .noise import brightness, luminance
+from .sums import find_spots
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -43,16 +44,14 @@ def tile_weights(pair: Pair) -> Array:
     step = spot_stride(pair.here.shape)
     y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]
     spots = (y * width + x).ravel()
-    half = np.float32(0.5)
-    grid = Grid(spots, x.ravel().astype(np.float32) + half, y.ravel() + half)
-    found, in_frame = still_places(pair, grid)
-    still = _still(pair, spots, found.pixel)
-    seen = found.seen & still
+    there, seen, in_frame = find_spots(pair, step)
+    still = _still(pair, spots, there)
+    seen &= still
     if _is_shot_cut(pair, step, spots, seen, in_frame & still):
         return np.zeros(tiles, np.float32)
     alike = pair.here.samples == pair.there.samples
     own = _brightness(pair.here, spots, alike)
-    other = _brightness(pair.there, found.pixel, alike)
+    other = _brightness(pair.there, there, alike)
     tile = (y // TILE * tiles[1] + x // TILE).ravel()[seen]
     difference = (other - own)[seen]
     sums = [
@@ -62,20 +61,6 @@ def tile_weights(pair: Pair) -> Array:
         for part in (np.ones(len(tile)), difference, difference**2, own[seen])
     ]
     return _weights(sums)
-
-
-def pixel_weights(tiles: Array, shape: tuple[int, int], rows: slice) -> Array:
-    """Return the weights (h, W) of some rows: linear between the tiles' centres."""
-    down = _hats(tiles.shape[0], np.arange(rows.start, rows.stop))
-    across = _hats(tiles.shape[1], np.arange(shape[1]))
-    return np.asarray(down.T @ tiles @ across)
-
-
-def _hats(tiles: int, pixels: NDArray[np.integer]) -> Array:
-    """Return (tiles, n): the share of each tile in each pixel, along one axis."""
-    place = np.clip((pixels + 0.5) / TILE - 0.5, 0, tiles - 1)
-    hats = 1 - np.abs(place - np.arange(tiles)[:, None])
-    return np.maximum(hats, 0.0).astype(np.float32)
 
 
 def _is_shot_cut(

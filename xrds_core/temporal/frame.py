@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import PictureError
+from ..native.surfaces import find_rims
+from .half_floats import LARGEST_HALF
 from .halves import Halves
 from .local_filters import extreme
 from .noise import Noise, noise_of
@@ -22,7 +24,7 @@ from .noise import Noise, noise_of
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import DTypeLike, NDArray
+    from numpy.typing import NDArray
 
     from ..arrays import Array
 
@@ -30,9 +32,6 @@ if TYPE_CHECKING:
 
 # Blender writes 1e10 where no ray hits anything.
 SKY_DEPTH = 1e9
-LARGEST_HALF = 65504.0
-# Relative difference in inverse depth between adjacent pixels of one surface.
-_SURFACE = 0.02
 # Relative to the surface's depth: how far behind it an image lies at least. Less is
 # the slope of a surface, or the edge of something.
 _BEHIND = 0.04
@@ -199,15 +198,15 @@ class Stored:
     camera: Camera
     shape: tuple[int, int]
     samples: float
-    picture: NDArray[Any]
+    picture: NDArray[np.float16]
     inverse_depth: Array
     invalid: NDArray[np.bool_] | None = None
-    vector: NDArray[Any] | None = None
+    vector: NDArray[np.float16] | None = None
     still: bool = False
-    counts: NDArray[Any] | None = None
+    counts: NDArray[np.float16] | None = None
     noise: Noise | None = None
     image: Array | None = None
-    parts: Mapping[str, NDArray[Any] | None] = field(default_factory=dict)
+    parts: Mapping[str, NDArray[np.float16] | None] = field(default_factory=dict)
 
     @property
     def has_light(self) -> bool:
@@ -219,18 +218,13 @@ class Stored:
         """The channels of `picture` with normals; albedo lies before them."""
         return slice(6, 9) if self.has_light else slice(3, 6)
 
-    @property
-    def nearer(self) -> np.ufunc:
-        """Which of two values of `inverse_depth` is that of the nearer surface."""
-        return np.fmin if self.camera.orthographic else np.fmax
-
     @cached_property
-    def rims(self) -> NDArray[np.bool_]:
-        """(H W): pixels next to a nearer surface, some of whose light they contain."""
-        nearest = extreme(self.inverse_depth.reshape(self.shape), self.nearer).ravel()
-        with np.errstate(invalid="ignore"):  # infinite where a depth is denormal
-            apart = np.abs(nearest - self.inverse_depth)
-        return apart > _SURFACE * np.abs(self.inverse_depth)
+    def rims(self) -> NDArray[np.uint8]:
+        """(H W): pixels next to a nearer surface, some of whose light they contain.
+
+        0, or 1 + which of the 3x3 pixels around has the nearest surface.
+        """
+        return find_rims(self.inverse_depth, self.shape, self.camera.orthographic)
 
     @property
     def is_empty(self) -> bool:
@@ -242,14 +236,14 @@ class Stored:
         return self.still and other.still and self.camera.same(other.camera)
 
 
-def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
+def store(frame: Frame) -> Stored:
     """Pack a frame; pixels with NaN or infinities in any pass are invalid.
 
-    `dtype` float16 halves the memory; values beyond +-65504 are clipped.
+    Values beyond +-65504, the largest half float, are clipped.
     """
     passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
-    picture, invalid = pack(*passes, dtype)
-    noise = None if frame.radiance is None else noise_in(frame, dtype)
+    picture, invalid = pack(*passes)
+    noise = None if frame.radiance is None else noise_in(frame)
     return Stored(
         number=frame.number,
         camera=frame.camera,
@@ -263,7 +257,7 @@ def store(frame: Frame, dtype: DTypeLike = np.float32) -> Stored:
         counts=None if frame.counts is None else pack_counts(frame.counts),
         noise=None if noise is None else noise.without(invalid),
         image=_image(frame),
-        parts=pack_parts(frame.parts, dtype),
+        parts=pack_parts(frame.parts),
     )
 
 
@@ -272,8 +266,7 @@ def pack(
     albedo: Array,
     normal: Array,
     alpha: Array | None,
-    dtype: DTypeLike,
-) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+) -> tuple[NDArray[np.float16], NDArray[np.bool_]]:
     """Return `Stored.picture` of passes as in `Frame`, and its invalid pixels (H W)."""
     parts = [albedo, normal]
     if radiance is not None:
@@ -284,38 +277,34 @@ def pack(
     picture = picture.reshape(-1, picture.shape[-1])
     invalid = ~np.isfinite(picture).all(axis=-1)
     picture[invalid] = 0.0
-    if np.dtype(dtype) == np.float16:
-        np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
-    return picture.astype(dtype, copy=False), invalid
+    np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
+    return picture.astype(np.float16), invalid
 
 
-def pack_parts(
-    parts: Mapping[str, Array], dtype: DTypeLike
-) -> dict[str, NDArray[Any] | None]:
+def pack_parts(parts: Mapping[str, Array]) -> dict[str, NDArray[np.float16] | None]:
     """Return `Stored.parts`; a part is 0 where it is not finite, the picture stays."""
-    return {name: _packed_part(part, dtype) for name, part in parts.items()}
+    return {name: _packed_part(part) for name, part in parts.items()}
 
 
-def _packed_part(part: Array, dtype: DTypeLike) -> NDArray[Any] | None:
+def _packed_part(part: Array) -> NDArray[np.float16] | None:
     if not part.any():
         return None
     finite = np.nan_to_num(part.reshape(-1, 3), posinf=0.0, neginf=0.0)
-    if np.dtype(dtype) == np.float16:
-        np.clip(finite, -LARGEST_HALF, LARGEST_HALF, out=finite)
-    return finite.astype(dtype, copy=False)
+    np.clip(finite, -LARGEST_HALF, LARGEST_HALF, out=finite)
+    return finite.astype(np.float16)
 
 
-def noise_in(frame: Frame, dtype: DTypeLike) -> Noise:
+def noise_in(frame: Frame) -> Noise:
     """Return the noise of a frame with radiance."""
     assert frame.radiance is not None
     parts = [frame.albedo, frame.normal]
     if frame.alpha is not None:
         parts.append(frame.alpha[..., None])
     guides = np.concatenate(parts, axis=-1)
-    return noise_of(frame.halves or frame.radiance, guides, frame.samples, dtype)
+    return noise_of(frame.halves or frame.radiance, guides, frame.samples)
 
 
-def pack_counts(counts: Array) -> NDArray[Any]:
+def pack_counts(counts: Array) -> NDArray[np.float16]:
     """Flat, in half floats; what is no count becomes 0."""
     counts = np.nan_to_num(counts.ravel(), posinf=0.0, neginf=0.0)
     return np.clip(counts, 0.0, LARGEST_HALF).astype(np.float16)
@@ -351,7 +340,7 @@ def _image(frame: Frame) -> Array | None:
     return image if frame.camera.orthographic else np.float32(1.0) / image
 
 
-def _half(vector: Array | None) -> NDArray[Any] | None:
+def _half(vector: Array | None) -> NDArray[np.float16] | None:
     if vector is None:
         return None
     with np.errstate(over="ignore"):  # vectors beyond half's range are useless

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from ..arrays import Array
 
+LARGEST_HALF = 65504.0
 # Every half float, by its bits.
 _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
 

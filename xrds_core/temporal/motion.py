@@ -4,13 +4,6 @@ A pixel's centre and depth give a point in the world, which the other frame's ca
 shows elsewhere. That is linear in (x, y, 1, inverse depth), so one 4x4 matrix for each
 pair of frames describes it. Inverse depth is 1 / depth for a perspective camera, 0 for
 the sky; for an orthographic camera the depth takes its place.
-
-A reprojected position is valid if it survives the way back: what the other frame shows
-there must come from this pixel, to within a pixel of motion, and be as near as
-something in the 9x9 pixels around it. This rejects occlusions and disocclusions, and
-leaves edges their mixed samples as long as both sides of the edge move alike. Selecting
-samples by what is at the pixel's own centre would select by content: edges would lose
-their antialiasing.
 """
 
 from __future__ import annotations
@@ -21,7 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .local_filters import extreme, extreme_at
+from ..native.surfaces import find_ranges
+from .local_filters import extreme
 from .panorama import PanoramaReprojection, panorama_reprojection
 
 if TYPE_CHECKING:
@@ -32,27 +26,15 @@ if TYPE_CHECKING:
 
     Reprojection = Array | PanoramaReprojection
 
-# Pixels by which forward and backward motion may differ; half as much for moving
-# objects, whose edges are known less well.
-_TOLERANCE = 1.0
+# Pixels by which forward and backward motion of moving objects may differ; half as much
+# as of what stands still, for their edges are known less well.
 MOVING_TOLERANCE = 0.5
-# Their difference counts as this much distance from the true position (squared).
-_AS_DISTANCE = 2.0
-# Relative excess of inverse depth over the range around a pixel that is allowed.
-_INVERSE_DEPTH_SLACK = 0.02
-# Parallax between both sides of an edge counts as this much distance (squared), up to a
-# pixel. Where all is fine edges, 0.5 cost 0.2 dB, and leaving such samples out 1 dB.
-_AS_DISTANCE_AT_RIMS, _MOST_AT_RIMS = 0.3, 1.0
 # Cycles' first sample lies at the pixel's centre. Frames of a sample or two that move
 # by whole pixels would all show the same points, and lines thinner than a pixel would
-# break up. So there the pixel taken is jittered by up to this much. Motion counts as
+# break up. So there the pixel taken is jittered. Motion counts as
 # whole pixels where a position is nearer to a centre than this, per frame between.
 FEW_SAMPLES = 2.0
-_OFF, _WHOLE = 0.6, 0.02
-# Multiples of these spread evenly over a unit square (M. Roberts, R3 and R2 sequences);
-# as fractions of 2^32, so that no rounding depends on the processor.
-_SPREAD_X = np.array([3518319155, 2882110345, 2360945575], np.uint32)
-_SPREAD_Y = np.array([3242174889, 2447445414, 2654435769], np.uint32)
+_WHOLE = 0.02
 # Distance between spots along each axis, in small and large pictures.
 _STRIDES, _LARGE = (2, 4), 1_000_000
 
@@ -68,25 +50,13 @@ class Grid:
 
 @dataclass(frozen=True)
 class Places:
-    """Where pixels were in another frame.
+    """The pixels of another frame that positions fall into, in their order (n,).
 
-    `pixel`: flat index of the other frame's nearest pixel, 0 where not seen; `x` and
-    `y`: from the true position to that pixel's centre, in pixels; `apart`: the square
-    of this distance, plus the differences of forward and backward motion and of both
-    sides of an edge; `seen`: where the other frame shows the same. All (n,), in the
-    order of the grid.
+    `pixel`: flat index, 0 where not `seen`, outside of the frame.
     """
 
     pixel: NDArray[np.int32]
-    x: Array
-    y: Array
-    apart: Array
     seen: NDArray[np.bool_]
-
-    def put(self, at: NDArray[np.intp] | slice, other: Places) -> None:
-        """Replace those `at` some indices by others."""
-        self.pixel[at], self.apart[at] = other.pixel, other.apart
-        self.x[at], self.y[at], self.seen[at] = other.x, other.y, other.seen
 
 
 @dataclass(frozen=True)
@@ -215,7 +185,7 @@ def pair(
 ) -> Pair:
     """Return what `places` needs to know of two frames.
 
-    `extent` is `surroundings` of `here`, for callers with many pairs.
+    `extent` is `find_ranges` of `here`, for callers with many pairs.
     """
     forth = reprojection(here.camera, there.camera)
     back = reprojection(there.camera, here.camera)
@@ -224,7 +194,7 @@ def pair(
     if object_motion is not None:
         object_motion = _with_rims(object_motion, here, there)
     return Pair(
-        here, there, forth, back, extent or inverse_depth_range(here), object_motion
+        here, there, forth, back, extent or find_ranges(here.inverse_depth, here.shape), object_motion
     )
 
 
@@ -246,22 +216,7 @@ def _with_rims(
 def _beside(mask: NDArray[np.bool_], frame: Stored) -> NDArray[np.bool_]:
     """Return the rims (H W) that are adjacent to a mask (H W), but not in it."""
     wide = extreme(mask.reshape(frame.shape), np.logical_or).ravel()
-    return np.asarray(wide & ~mask & frame.rims)
-
-
-def inverse_depth_range(frame: Stored) -> tuple[Array, Array]:
-    """Return the range of inverse depth in the 9x9 pixels around, with some slack.
-
-    Less than 9x9 cost 1.4 dB on a house with fine rails: for objects thinner than a
-    pixel, hits and misses must not decide which samples are reused.
-    """
-    inverse_depth = frame.inverse_depth.reshape(frame.shape)
-    least, most = (
-        extreme(extreme(inverse_depth, smaller), smaller, step=3).ravel()
-        for smaller in (np.fmin, np.fmax)
-    )
-    slack = np.float32(_INVERSE_DEPTH_SLACK)
-    return least * (1 - slack), most * (1 + slack)
+    return np.asarray(wide & ~mask & (frame.rims > 0))
 
 
 def spot_stride(shape: tuple[int, int]) -> int:
@@ -299,119 +254,13 @@ def reproject(
     return across / w, down / w, near / w
 
 
-def places(pair: Pair, grid: Grid) -> Places:
-    """Find where rows of pixels of `pair.here` were in `pair.there`."""
-    found, _ = still_places(pair, grid)
-    _penalise_rims(found, pair, grid)
-    return (
-        found if pair.object_motion is None else _with_object_motion(found, pair, grid)
-    )
-
-
-def still_places(pair: Pair, grid: Grid) -> tuple[Places, NDArray[np.bool_]]:
-    """Find places as if only the camera moved, and which of them are in the frame."""
-    near = pair.here.inverse_depth[grid.pixels]
-    x, y, _ = reproject(pair.forth, grid.x, grid.y, near)
-    found = nearest(x, y, pair.there.shape)
-    _jitter(found, pair, grid, x, y)
-    centre_x, centre_y = centres(found.pixel, pair.there.shape[1])
-    near = pair.there.inverse_depth.take(found.pixel)
-    back_x, back_y, near = reproject(pair.back, centre_x, centre_y, near)
-    # the difference of forward and backward motion
-    back_x += x - grid.x - centre_x
-    back_y += y - grid.y - centre_y
-    left = back_x**2 + back_y**2
-    least, most = (part[grid.pixels] for part in pair.extent)
-    seen = found.seen & (left < _TOLERANCE**2) & (near >= least) & (near <= most)
-    left[~seen] = 0.0
-    apart = found.apart + np.float32(_AS_DISTANCE) * left
-    return replace(found, apart=apart, seen=seen), found.seen
-
-
-def _jitter(found: Places, pair: Pair, grid: Grid, x: Array, y: Array) -> None:
-    """Jitter the pixel taken where places (n,) lie at pixel centres."""
-    there = pair.there
-    if not pair.jitters:
-        return
-    at = np.flatnonzero(found.seen & (found.apart < pair.whole_motion))
-    column, row = (x[at].astype(np.uint32) for x in (grid.x, grid.y))
-    number = np.uint32(there.number % (1 << 32))
-    off_x, off_y = (
-        np.float32(2 * _OFF) * (_fraction(column, row, number, x) - np.float32(0.5))
-        for x in (_SPREAD_X, _SPREAD_Y)
-    )
-    other = nearest(x[at] + off_x, y[at] + off_y, there.shape)
-    at, inside = at[other.seen], other.seen
-    found.pixel[at] = other.pixel[inside]
-    found.x[at], found.y[at] = (other.x + off_x)[inside], (other.y + off_y)[inside]
-
-
-def _fraction(
-    column: NDArray[np.uint32],
-    row: NDArray[np.uint32],
-    number: np.uint32,
-    spread: NDArray[np.uint32],
-) -> Array:
-    """Return numbers (n,) in [0, 1) that spread over pixels and frames."""
-    with np.errstate(over="ignore"):  # the whole part goes
-        mixed = column * spread[0] + row * spread[1] + number * spread[2]
-    return (mixed >> np.uint32(8)).astype(np.float32) * np.float32(2.0**-24)
-
-
-def _penalise_rims(found: Places, pair: Pair, grid: Grid) -> None:
-    """Add distance to pixels with light of a nearer surface that moves differently.
-
-    Pixels at an edge contain some samples of the nearer side. A nearer surface next to
-    the pixel taken does not belong here; one next to this pixel is missing there.
-    """
-    assert isinstance(grid.pixels, slice)
-    here, there = pair.here, pair.there
-    apart = np.zeros(len(found.apart), np.float32)
-    at = np.flatnonzero(found.seen & here.rims[grid.pixels])
-    apart[at] = _parallax(pair.forth, here, at + grid.pixels.start)
-    at = np.flatnonzero(found.seen & there.rims.take(found.pixel))
-    apart[at] = np.fmax(apart[at], _parallax(pair.back, there, found.pixel[at]))
-    np.fmin(apart, np.float32(_MOST_AT_RIMS), out=apart)  # NaN behind the camera
-    found.apart[...] += np.float32(_AS_DISTANCE_AT_RIMS) * apart
-
-
-def _parallax(
-    transform: Reprojection, frame: Stored, pixels: NDArray[np.integer]
-) -> Array:
-    """Return the squared parallax of flat pixels to the nearest surface around them."""
-    x, y = centres(pixels, frame.shape[1])
-    own_x, own_y, _ = reproject(transform, x, y, frame.inverse_depth.take(pixels))
-    nearest = extreme_at(frame.inverse_depth, pixels, frame.shape, frame.nearer)
-    near_x, near_y, _ = reproject(transform, x, y, nearest)
-    return (near_x - own_x) ** 2 + (near_y - own_y) ** 2
-
-
-def _with_object_motion(found: Places, pair: Pair, grid: Grid) -> Places:
-    """Return places with those of moving objects replaced by their own."""
-    object_motion = pair.object_motion
-    assert object_motion is not None
-    assert isinstance(grid.pixels, slice)
-    found.seen[...] &= ~object_motion.moving.take(found.pixel)
-    if object_motion.beside is not None:
-        found.seen[...] &= ~object_motion.beside[grid.pixels]
-    part = slice(
-        *object_motion.pixels.searchsorted((grid.pixels.start, grid.pixels.stop))
-    )
-    moved = nearest(object_motion.x[part], object_motion.y[part], pair.there.shape)
-    inside = object_motion.pixels[part] - grid.pixels.start
-    found.put(inside, moved)
-    return found
-
-
 def nearest(x: Array, y: Array, shape: tuple[int, int]) -> Places:
     """Return the pixels that positions (n,) fall into; not seen outside the frame."""
     height, width = shape
     seen = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
     x, y = np.where(seen, x, np.float32(0.5)), np.where(seen, y, np.float32(0.5))
     column, row = x.astype(np.int32), y.astype(np.int32)
-    off_x, off_y = column - x + np.float32(0.5), row - y + np.float32(0.5)
-    pixel = row * np.int32(width) + column
-    return Places(pixel, off_x, off_y, off_x**2 + off_y**2, seen)
+    return Places(row * np.int32(width) + column, seen)
 
 
 def centres(pixels: NDArray[np.integer], width: int) -> tuple[Array, Array]:

@@ -9,14 +9,15 @@ divided by albedo is smooth in most places.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .half_floats import LARGEST_HALF
 from .local_filters import box
 
 if TYPE_CHECKING:
-    from numpy.typing import DTypeLike, NDArray
+    from numpy.typing import NDArray
 
     from ..arrays import Array
     from .halves import Halves
@@ -41,23 +42,39 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Estimates of a frame's noise, flat, (H W).
+    """Estimates of a frame's noise, flat, in half floats.
 
-    `brightness` is the square root of luminance, the mean of both halves' roots;
-    `difference` is half the difference of these roots. `guides` is the standard
-    deviation of the frame's guides.
+    `light` (H W, 2) is brightness and difference: the square root of luminance, the
+    mean of both halves' roots, and half the difference of these roots. They lie side by
+    side since they are gathered together. `guides` (H W) is the standard deviation of
+    the frame's guides.
     """
 
-    brightness: NDArray[Any]
-    difference: NDArray[Any]
-    guides: NDArray[Any]
+    light: NDArray[np.float16]
+    guides: NDArray[np.float16]
+
+    @classmethod
+    def of(cls, brightness: Array, difference: Array, guides: Array) -> Noise:
+        """Pack these, each of as many pixels; what is not finite becomes it."""
+        light = np.empty((brightness.size, 2), np.float16)
+        light[:, 0], light[:, 1] = _packed(brightness), _packed(difference)
+        return cls(light, _packed(guides))
+
+    @property
+    def brightness(self) -> NDArray[np.float16]:
+        """(H W)."""
+        return self.light[:, 0]
+
+    @property
+    def difference(self) -> NDArray[np.float16]:
+        """(H W)."""
+        return self.light[:, 1]
 
     def without(self, invalid: NDArray[np.bool_]) -> Noise:
         """Return the same with 0 at `invalid` pixels (H W)."""
-        valid = ~invalid
-        return Noise(
-            self.brightness * valid, self.difference * valid, self.guides * valid
-        )
+        light, guides = self.light.copy(), self.guides.copy()
+        light[invalid], guides[invalid] = 0.0, 0.0
+        return Noise(light, guides)
 
     def within(self, share: Array, others: Array, place: slice = slice(None)) -> Noise:
         """Return the noise of a mean in which these samples have a `share` (H W).
@@ -66,17 +83,13 @@ class Noise:
         Both are of the pixels of a `place`; elsewhere the noise stays.
         """
         rest = np.nan_to_num(others, posinf=0.0, neginf=0.0)
-        old = self.brightness[place].astype(np.float32)
+        light, guides = self.light.copy(), self.guides.copy()
+        old = light[place].astype(np.float32)
         root = np.sqrt(share)
-        parts = (
-            rest + (old - rest) * share,
-            self.difference[place].astype(np.float32) * root,
-            self.guides[place].astype(np.float32) * root,
-        )
-        found = [x.copy() for x in (self.brightness, self.difference, self.guides)]
-        for whole, part in zip(found, parts, strict=True):
-            whole[place] = _packed(part, whole.dtype)
-        return Noise(*found)
+        light[place, 0] = _packed(rest + (old[:, 0] - rest) * share)
+        light[place, 1] = _packed(old[:, 1] * root)
+        guides[place] = _packed(guides[place].astype(np.float32) * root)
+        return Noise(light, guides)
 
 
 def brightness(radiance: Array) -> Array:
@@ -105,9 +118,7 @@ def guides_of(passes: Array) -> Array:
     return guides
 
 
-def noise_of(
-    light: Halves | Array, guides: Array, samples: float, dtype: DTypeLike
-) -> Noise:
+def noise_of(light: Halves | Array, guides: Array, samples: float) -> Noise:
     """Return the noise of a frame of `samples` per pixel; finite everywhere.
 
     `light` is the half buffers or, where there are none, radiance (H, W, 3). `guides`
@@ -118,8 +129,7 @@ def noise_of(
             parts = _apart_from_around(light, guides[..., :3], samples)
         else:
             parts = _apart_in_halves(light)
-        found = (*parts, noise_of_guides(guides_of(guides), samples))
-    return Noise(*(_packed(x, dtype) for x in found))
+        return Noise.of(*parts, noise_of_guides(guides_of(guides), samples))
 
 
 def noise_of_guides(guides: Array, samples: float) -> Array:
@@ -181,7 +191,7 @@ def _least_difference(x: Array) -> Array:
     return np.asarray(np.sqrt(squares * np.float32(2 / 3)))
 
 
-def _packed(x: Array, dtype: DTypeLike) -> NDArray[Any]:
-    largest = float(np.finfo(np.dtype(dtype).name).max)
-    finite = np.nan_to_num(x.ravel(), nan=0.0, posinf=largest, neginf=-largest)
-    return np.clip(finite, -largest, largest).astype(dtype)
+def _packed(x: Array) -> NDArray[np.float16]:
+    """Return half floats (n,), the largest ones for infinities, 0 for NaN."""
+    finite = np.nan_to_num(x.ravel(), nan=0.0)
+    return np.clip(finite, -LARGEST_HALF, LARGEST_HALF).astype(np.float16)

@@ -39,6 +39,34 @@ class PanoramaReprojection:
             across, down = _pixels(self.there, seen / length)
             return across, down, inverse_depth / length
 
+    def directions(self, shape: tuple[int, int]) -> tuple[Array, Array]:
+        """Return sine and cosine of the longitude of each column (W, 2) of `here`, and
+        of the latitude of each row (H, 2).
+        """
+        half = np.float32(0.5)
+        x, y = (np.arange(n, dtype=np.float32) + half for n in shape[::-1])
+        longitude, latitude = _angles(self.here, x, y)
+        columns, rows = (
+            np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+            for angle in (longitude, latitude)
+        )
+        return columns, rows
+
+    @property
+    def first(self) -> tuple[float, float]:
+        """Longitude and latitude of the top left corner of the whole frame `there`."""
+        sphere = self.there.sphere
+        assert sphere is not None
+        return sphere.longitude[0], sphere.latitude[1]
+
+    @property
+    def density(self) -> tuple[float, float]:
+        """Pixels per radian `there`, across and down."""
+        sphere, (width, height) = self.there.sphere, self.there.size
+        assert sphere is not None
+        (left, right), (low, high) = sphere.longitude, sphere.latitude
+        return width / (right - left), height / (high - low)
+
 
 def panorama_reprojection(here: Camera, there: Camera) -> PanoramaReprojection:
     """Return the reprojection between two panoramas."""
@@ -47,14 +75,20 @@ def panorama_reprojection(here: Camera, there: Camera) -> PanoramaReprojection:
 
 def _directions(camera: Camera, x: Array, y: Array) -> Array:
     """Return unit vectors (3, n) in camera space."""
+    longitude, latitude = _angles(camera, x, y)
+    level = np.cos(latitude)
+    ahead = -level * np.cos(longitude)
+    return np.stack([level * np.sin(longitude), np.sin(latitude), ahead])
+
+
+def _angles(camera: Camera, x: Array, y: Array) -> tuple[Array, Array]:
+    """Return longitude and latitude of columns and rows of pixels."""
     sphere, (width, height) = camera.sphere, camera.size
     assert sphere is not None
     (left, right), (low, high) = sphere.longitude, sphere.latitude
     longitude = left + (x + camera.window[0]) * np.float32((right - left) / width)
     latitude = high - (y + camera.window[1]) * np.float32((high - low) / height)
-    level = np.cos(latitude)
-    ahead = -level * np.cos(longitude)
-    return np.stack([level * np.sin(longitude), np.sin(latitude), ahead])
+    return longitude, latitude
 
 
 def _pixels(camera: Camera, ray: Array) -> tuple[Array, Array]:

@@ -14,7 +14,8 @@ import numpy as np
 from xrds_core.arrays import Array
 from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
-from xrds_core.temporal.frame import LARGEST_HALF, Frame
+from xrds_core.temporal.frame import Frame
+from xrds_core.temporal.half_floats import LARGEST_HALF
 
 from .. import packing
 from .stage import SIZE

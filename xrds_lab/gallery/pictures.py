@@ -94,7 +94,7 @@ class Clip:
     def _packed(self, number: int) -> dict[str, Stored]:
         if number not in self._stored:
             views = self.frames[number].items()
-            self._stored[number] = {v: store(frame, np.float16) for v, frame in views}
+            self._stored[number] = {v: store(frame) for v, frame in views}
         return self._stored[number]
 
     def around_middle(self) -> list[int] | None:

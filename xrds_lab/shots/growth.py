@@ -148,7 +148,7 @@ def _frame(run: Run) -> Iterator[tuple[str, Row]]:
 
     def stored(width: int, height: int, radius: int) -> tuple[Any, list[Any]]:
         shot = range(-radius, radius + 1)
-        packed = {n: store(frame(n, width, height), np.float16) for n in shot}
+        packed = {n: store(frame(n, width, height)) for n in shot}
         own = packed.pop(0)
         return own, sorted(packed.values(), key=lambda x: abs(x.number))
 

@@ -170,7 +170,7 @@ def _lamp(scene: Any) -> Any:
 
 def _judged(name: str, samples: int, made: _Rendered) -> list[Row]:
     """A row for each part of the middle frame, and one for each sum."""
-    stored = {n: store(frame, np.float16) for n, frame in made.frames.items()}
+    stored = {n: store(frame) for n, frame in made.frames.items()}
     own = stored.pop(MIDDLE)
     lenders = sorted(stored.values(), key=lambda x: abs(x.number - MIDDLE))
     denoiser, alone = Denoiser("high", "cpu"), accumulate(own, [])

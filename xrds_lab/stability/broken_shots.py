@@ -89,8 +89,7 @@ def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
             frame.samples,
             alpha=picture[:, 9].reshape(shape),
             vector=None if vector is None else vector.reshape(*shape, 4),
-        ),
-        np.float16,
+        )
     )
     noise = None if frame.noise is None else frame.noise.without(bad.ravel())
     return replace(spoilt, noise=noise, counts=frame.counts, image=frame.image)

@@ -212,7 +212,7 @@ def test_neighbours_of_another_format_and_size_of_samples(
 ) -> None:
     frames = shot(0.05, samples=4.0)
     target = store(frames[1], np.float32)
-    others = [store(replace(x, samples=9.0), np.float16) for x in frames[:3:2]]
+    others = [store(replace(x, samples=9.0)) for x in frames[:3:2]]
     check_alike(accumulate(target, others), accumulate(target, others, card=card))
 
 

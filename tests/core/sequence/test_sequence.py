@@ -54,7 +54,7 @@ def denoise(shot: Path, denoiser: Denoiser, out: str = "out", **more: Any) -> An
 
 def finished(numbers: Any, own: int, denoiser: Denoiser) -> Any:
     """What the same frames give without files."""
-    stored = {n: store(frame(n), np.float16) for n in numbers}
+    stored = {n: store(frame(n)) for n in numbers}
     near = sorted((n for n in numbers if n != own), key=lambda n: (abs(n - own), n))
     lenders = [stored[n] for n in near]
     return finish_frame(stored[own], lenders, denoiser, Accumulator()).picture
@@ -214,7 +214,7 @@ def test_usual_names_are_known(tmp_path: Path, names: dict[str, str]) -> None:
     world = own.normal * [1, 1, -1] @ own.camera.view[:3, :3]
     path = write(tmp_path, own, names, normal=world, position=point)
     told = read_frame(path, 1, Reading()).stored
-    expected = store(own, np.float16)
+    expected = store(own)
     np.testing.assert_allclose(told.picture, expected.picture, atol=1e-3)
     np.testing.assert_allclose(told.inverse_depth, expected.inverse_depth, rtol=1e-5)
 

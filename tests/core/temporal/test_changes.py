@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-
-from xrds_core.temporal.changes import Changes
+from specification.similarity import changes
 
 Array = NDArray[np.float32]
 SHAPE = (45, 62)
@@ -16,13 +15,13 @@ SIZES = 4  # of areas, whose errors add up
 
 def error(lights: list[Array], noise: float, weight: float = 4.0) -> Array:
     rng = np.random.default_rng(1)
-    changes = Changes(SHAPE)
+    neighbours = []
     for light in lights:
         grain, other = noise * rng.standard_normal((2, *SHAPE))
         weights = np.full(SHAPE, weight, np.float32)
         # what the halves of a frame tell of its noise is as noisy as it is
-        changes.add(np.float32(light + grain), np.float32(other), weights)
-    return changes.error()
+        neighbours.append((np.float32(light + grain), np.float32(other), weights))
+    return changes(neighbours, SHAPE)
 
 
 def test_noise_alone_is_no_change() -> None:

@@ -21,17 +21,10 @@ from shots import (
     project,
     view,
 )
+from specification.places import Places, places, still_places
 
 from xrds_core.temporal.frame import store
-from xrds_core.temporal.motion import (
-    Places,
-    grid,
-    pair,
-    places,
-    reproject,
-    reprojection,
-    still_places,
-)
+from xrds_core.temporal.motion import grid, pair, reproject, reprojection
 
 CAMERAS = [
     camera(x=0.37),
@@ -43,7 +36,7 @@ CAMERAS = [
 
 
 def found(here: View, there: View) -> Places:
-    return places(pair(store(here.frame), store(there.frame)), grid(here.name.shape))
+    return places(pair(store(here.frame), store(there.frame)))
 
 
 @pytest.mark.parametrize("eye", CAMERAS)
@@ -125,8 +118,7 @@ def test_pixels_beside_a_nearer_thing_that_moves_otherwise_count_as_farther(
     world = World(card=(0.0, 0.0), card_z=card_z)
     here, there = view(0, camera(), world), view(1, eye, world)
     two = pair(store(here.frame), store(there.frame))
-    own = grid(two.here.shape)
-    result, (plain, _) = places(two, own), still_places(two, own)
+    result, (plain, _) = places(two), still_places(two)
     mixed = beside_card(here).ravel() | beside_card(there).ravel()[result.pixel]
     mixed &= result.seen
     assert mixed.sum() > 40

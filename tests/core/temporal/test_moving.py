@@ -10,10 +10,11 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from shots import CARD, PIXEL, WALL, View, World, camera, project, vector, view
+from specification.places import Places, places
 
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import Stored, store
-from xrds_core.temporal.motion import Places, grid, pair, places
+from xrds_core.temporal.motion import pair
 from xrds_core.temporal.vectors import Movement
 
 STEP = 3.3 * 5 * PIXEL  # of the card in a frame: 3.3 pixels
@@ -42,7 +43,7 @@ def find(stored: list[Stored], here: int, there: int) -> Places:
     object_motions = Movement().object_motions(stored[here], others)
     at = others.index(stored[there])
     together = pair(stored[here], stored[there], object_motions[at])
-    return places(together, grid(stored[here].shape))
+    return places(together)
 
 
 @pytest.mark.parametrize("pan", [0.0, 0.21])

@@ -48,7 +48,7 @@ def noise_of_light(radiance: NDArray[np.float32], albedo: NDArray[np.float32]) -
     guides = np.zeros((*SHAPE, 6), np.float32)
     guides[..., :3] = albedo[..., None]
     light = np.repeat(radiance[..., None], 3, axis=-1)
-    found = noise_of(light, guides, 16.0, np.float32).difference
+    found = noise_of(light, guides, 16.0).difference
     inner = found.reshape(SHAPE)[4:-4, 4:-4]
     return float(np.sqrt(np.square(inner).mean()))
 

@@ -35,8 +35,8 @@ def test_parts_add_up_to_the_whole() -> None:
     assert list(found.parts) == ["lamp", "sky"]
     assert found.samples.mean() > 2.0
     light = found.radiance
-    assert np.allclose(found.parts["lamp"] + found.parts["sky"], light, atol=1e-5)
-    assert np.allclose(found.parts["lamp"], 0.25 * light, atol=1e-5)
+    assert np.allclose(found.parts["lamp"] + found.parts["sky"], light, atol=2e-3)
+    assert np.allclose(found.parts["lamp"], 0.25 * light, atol=2e-3)
 
 
 def test_the_whole_is_the_same_with_and_without_parts() -> None:
@@ -46,22 +46,22 @@ def test_the_whole_is_the_same_with_and_without_parts() -> None:
     assert np.array_equal(found.samples, plain.samples)
 
 
-def test_a_frame_alone_has_its_own_parts_to_the_bit() -> None:
+def test_a_frame_alone_has_its_own_parts_as_they_are_stored() -> None:
     frame = in_parts(0, 0.0, lamp=0.4)
     found = accumulate(store(frame), [])
-    assert np.array_equal(found.parts["lamp"], frame.parts["lamp"])
+    assert np.array_equal(found.parts["lamp"], frame.parts["lamp"].astype(np.float16))
 
 
 def test_bad_pixels_of_a_part_are_dark_in_it_alone() -> None:
     frame = in_parts(0, 0.0, lamp=0.4, sky=0.6)
     bad = frame.parts["lamp"].copy()
     bad[5, 6] = np.nan, np.inf, -np.inf
-    stored = store(replace(frame, parts={**frame.parts, "lamp": bad}), np.float16)
+    stored = store(replace(frame, parts={**frame.parts, "lamp": bad}))
     found = accumulate(stored, [])
     assert not found.parts["lamp"][5, 6].any()
     assert found.parts["sky"][5, 6].any()
     assert np.array_equal(
-        found.radiance, accumulate(store(frame, np.float16), []).radiance
+        found.radiance, accumulate(store(frame), []).radiance
     )
 
 

@@ -105,7 +105,7 @@ def test_memory_is_foretold() -> None:
     frame = view(0, camera()).frame
     parts = (np.stack((x, x)) for x in (frame.radiance, frame.albedo, frame.normal))
     frame = replace(frame, halves=Halves(*parts))
-    assert taken(store(frame, np.float16)) == bytes_needed(WIDTH, HEIGHT, 1)
+    assert taken(store(frame)) == bytes_needed(WIDTH, HEIGHT, 1)
     assert bytes_needed(1920, 1080, 9) < 530e6
-    guides = store(replace(frame, radiance=None), np.float16)
+    guides = store(replace(frame, radiance=None))
     assert taken(guides) == bytes_needed(WIDTH, HEIGHT, 1, light=False)

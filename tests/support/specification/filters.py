@@ -1,0 +1,33 @@
+"""Means and extremes over squares."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def extreme(x, function, reach):
+    """`np.fmin` or `np.fmax` of the pixels up to `reach` away, (H, W)."""
+    height, width = x.shape
+    wide = np.pad(x, reach, "edge")
+    steps = range(2 * reach + 1)
+    shifted = [wide[i : i + height, j : j + width] for i in steps for j in steps]
+    return function.reduce(shifted)
+
+
+def total(x, before, after):
+    """The sum over those `before` and `after` each of (H, W), in both directions."""
+    height, width = x.shape
+    wide = np.pad(x, (before, after))
+    steps = range(before + after + 1)
+    return sum(wide[i : i + height, j : j + width] for i in steps for j in steps)
+
+
+def box(x, size):
+    """The mean over `size` x `size` pixels, as far as they are in the picture."""
+    reach = size // 2
+    return total(x, reach, reach) / total(np.ones_like(x), reach, reach)
+
+
+def mean(x, valid, size):
+    """The same of those `valid` (0 or 1)."""
+    return box(x * valid, size) / np.maximum(box(valid, size), np.float32(1e-9))

@@ -1,0 +1,42 @@
+"""Sums of G(x) - G(x + d), from the weighted sums of the powers of d."""
+
+from __future__ import annotations
+
+
+import numpy as np
+
+SLOPE = np.array([1, -8, 0, 8, -1], np.float32) / 12
+BEND = np.array([-1, 16, -30, 16, -1], np.float32) / 24
+
+
+def moments(x, y, weight):
+    """Those of offsets, times their weights: (n,) -> (5, n)."""
+    return np.stack([x, y, x * x, x * y, y * y]) * weight
+
+
+def changes(guess, summed):
+    """What offsets change, (n, H W), of a guess (n, H, W) and moments (5, H W)."""
+    result = np.zeros((len(guess), summed.shape[1]), np.float32)
+    for plane, change in zip(guess.astype(np.float32), result, strict=True):
+        with np.errstate(invalid="ignore"):
+            for power, moment in zip(_powers(plane), summed, strict=True):
+                change -= moment * power.ravel()
+    result[~np.isfinite(result)] = 0.0  # beside pixels without samples
+    return result
+
+
+def _powers(plane):
+    """Coefficients of the polynomial around each pixel (H, W), as moments are."""
+    across = _filtered(plane, SLOPE, 1)
+    yield across
+    yield _filtered(plane, SLOPE, 0)
+    yield _filtered(plane, BEND, 1)
+    yield _filtered(across, SLOPE, 0)
+    yield _filtered(plane, BEND, 0)
+
+
+def _filtered(x, kernel, axis):
+    wide = np.pad(x, [(2, 2) if k == axis else (0, 0) for k in range(2)], "edge")
+    shifted = (np.roll(wide, 2 - k, axis) for k in range(5))
+    found = sum(w * part for w, part in zip(kernel, shifted, strict=True) if w)
+    return np.take(found, range(2, 2 + x.shape[axis]), axis)

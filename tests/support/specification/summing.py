@@ -1,0 +1,174 @@
+"""The means over a frame's own samples and those of its neighbours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from xrds_core.temporal.noise import brightness as root_of_luminance
+from xrds_core.temporal.sums import Means
+
+from .filters import extreme
+from .places import places, rims
+from .registration import changes, moments
+from .similarity import GuideSimilarity, LightSimilarity
+
+AS_DISTANCE = 0.25  # of offsets that are taken out
+TILE = 64
+LARGEST_HALF = 65504.0
+TINY = np.float32(1e-9)
+
+
+def floats(x):
+    return x.astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Work:
+    """As `temporal.sums.Work`, which it takes the place of."""
+
+    target: object
+    images: object
+    usual: float
+    lit: tuple
+    threads: object
+
+    def guess(self, neighbours):
+        means = self.means([neighbours])
+        light = root_of_luminance(means.passes[0]) if self.target.has_light else 0
+        planes = [each.reshape(-1, each.shape[-1]) for each in means.passes]
+        planes += [each.reshape(-1, 3) for each in means.parts]
+        light = np.broadcast_to(light, self.target.shape).reshape(-1, 1)
+        guess = np.clip(np.hstack([*planes, light]), -LARGEST_HALF, LARGEST_HALF)
+        return guess.T.reshape(-1, *self.target.shape).astype(np.float16)
+
+    def means(self, groups, guess=None):
+        frame = self.target
+        own = np.hstack([floats(frame.picture), *(self.part(frame, x) for x in self.lit)])
+        known = np.ones(len(own), bool) if frame.invalid is None else ~frame.invalid
+        judge = self.judge(known)
+        sums = [self.sums(group, judge, guess) for group in groups]
+        clear = np.ones(len(own), bool)
+        if frame.picture.shape[1] % 3:
+            alpha = floats(frame.picture[:, -1]).reshape(frame.shape)
+            clear = extreme(alpha, np.fmin, 1).ravel() != 0.0
+        total = np.where(known, counts(frame, slice(None)), np.float32(0))
+        mine, added, reused = total, np.zeros_like(own), 0.0
+        for values, bright, weights, shares in sums:
+            mean = values / np.maximum(weights, TINY)[:, None]
+            passes = mean[:, : frame.picture.shape[1]].reshape(*frame.shape, -1)
+            passes = passes[..., 3:] if frame.has_light else passes
+            root = (bright / np.maximum(weights, TINY)).reshape(frame.shape)
+            like = judge.weights(passes, root, (weights > 0).reshape(frame.shape))
+            like = floats(like.ravel() * clear)
+            added += values * like[:, None]
+            total = total + weights * like
+            reused += float((shares * like).sum(dtype=np.float64))
+        with np.errstate(invalid="ignore"):  # NaN where no frame has samples
+            found = own + (added - own * (total - mine)[:, None]) / total[:, None]
+        planes = [found[:, k : k + 3] for k in range(0, found.shape[1], 3)]
+        channels = frame.picture.shape[1]
+        if channels % 3:
+            passes = [found[:, k : min(k + 3, channels)] for k in range(0, channels, 3)]
+            planes = passes + [found[:, k : k + 3] for k in range(channels, found.shape[1], 3)]
+        planes = [np.ascontiguousarray(x).reshape(*frame.shape, -1) for x in planes]
+        count = -(-channels // 3)
+        return Means(planes[:count], planes[count:], total.reshape(frame.shape), reused)
+
+    def judge(self, known):
+        frame, shape = self.target, self.target.shape
+        picture = floats(frame.picture).reshape(*shape, -1)
+        known = known.reshape(shape)
+        if not frame.has_light:
+            return GuideSimilarity(picture, known)
+        noise = frame.noise
+        planes = noise.brightness, noise.difference, np.square(floats(noise.guides))
+        noise = [floats(x).reshape(shape) for x in planes]
+        return LightSimilarity(frame, picture, noise, known, np.float32(self.usual))
+
+    def sums(self, group, judge, guess):
+        """Weighted values, brightness, weights, and samples taken of a group."""
+        frame = self.target
+        channels = frame.picture.shape[1] + 3 * len(self.lit)
+        count = len(frame.picture)
+        values, (bright, weights, shares) = np.zeros((count, channels)), np.zeros((3, count))
+        summed = np.zeros((5, count), np.float32)
+        for found in group:
+            if found.pair and not found.is_reused:
+                continue
+            taken, share, weight, offsets = self.taken(found, guess is not None)
+            picture, light = self.picture(found, taken)
+            summed += moments(*offsets, weight)
+            values += picture * weight[:, None]
+            weights, shares = weights + weight, shares + share
+            if light:
+                bright = bright + light[0] * weight
+                shaped = picture[:, : frame.picture.shape[1]].reshape(*frame.shape, -1)
+                judge.add(shaped, *(x.reshape(frame.shape) for x in (*light, weight)))
+        if guess is not None:
+            change = changes(guess, summed)
+            values, bright = values + change[:-1].T, bright + change[-1]
+        return floats(values), floats(bright), floats(weights), floats(shares)
+
+    def taken(self, found, registers):
+        """Pixels taken of a neighbour, samples of each, weights, and offsets."""
+        other, count = found.other, len(self.target.picture)
+        nothing = np.zeros((2, count), np.float32)
+        if not found.pair:
+            pixel, seen, apart, share = np.arange(count), np.ones(count, bool), 0, 1
+            offsets, fall = nothing, 0
+        else:
+            at = places(found.pair, self.images)
+            pixel, seen, apart, fall = at.pixel, at.seen, at.apart, found.fall
+            share = self.tiles(found)
+            inner = seen & ~(rims(self.target) | rims(other)[pixel])
+            offsets = np.stack([at.x, at.y]) * inner if registers else nothing
+        if other.invalid is not None:
+            seen = seen & ~other.invalid[pixel]
+        share = floats(share * seen) * counts(other, pixel)
+        apart = apart - (1 - AS_DISTANCE) * np.square(offsets).sum(0)
+        return pixel, share, floats(share * np.exp(apart * np.float32(fall))), offsets
+
+    def tiles(self, found):
+        """The weights of a neighbour's pixels by coarse rejection."""
+        share = tile_shares(found.tiles, self.target.shape).ravel()
+        if self.images is not None:
+            share[self.images.positions(found.pair)[0]] = found.tiles.max()
+        return floats(share)
+
+    def picture(self, found, pixel):
+        """Values (n, C) of pixels taken, and brightness and difference, if any."""
+        other = found.other
+        picture = floats(other.picture[pixel])
+        if found.pair and found.pair.turn is not None:
+            picture[:, other.normals] = picture[:, other.normals] @ found.pair.turn.T
+        parts = [self.part(other, name)[pixel] for name in self.lit]
+        light = ()
+        if other.noise is not None and self.target.has_light:
+            light = floats(other.noise.brightness[pixel]), floats(other.noise.difference[pixel])
+        return np.hstack([picture, *parts]), light
+
+    def part(self, frame, name):
+        part = frame.parts[name]
+        dark = np.zeros((len(frame.picture), 3), np.float32)
+        return dark if part is None else floats(part)
+
+
+def tile_shares(tiles, shape):
+    """The weights (H, W) of tiles, linear between their centres."""
+    places = (
+        np.clip((np.arange(n) + 0.5) / TILE - 0.5, 0, k - 1)
+        for n, k in zip(shape, tiles.shape, strict=True)
+    )
+    down, across = (
+        np.maximum(1 - np.abs(place - np.arange(k)[:, None]), 0)
+        for place, k in zip(places, tiles.shape, strict=True)
+    )
+    return floats(down.T @ tiles @ across)
+
+
+def counts(frame, pixels):
+    if frame.counts is None:
+        return np.full(len(frame.picture), frame.samples, np.float32)[pixels]
+    return floats(frame.counts[pixels])

@@ -1,0 +1,1 @@
+"""What is compiled: the loops over all pixels of all neighbours of a frame."""

@@ -1,0 +1,120 @@
+"""Loads the compiled library of this platform."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from ctypes import CDLL, POINTER, c_double, c_float, c_int32, c_int64, c_void_p, sizeof
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import XRDSError
+from .structures import IN_ORDER, Area, Neighbour, Target
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import DTypeLike, NDArray
+
+FOLDER = Path(__file__).parent / "lib"
+_SYSTEMS = {
+    "linux": ("linux", ".so"),
+    "win32": ("windows", ".dll"),
+    "darwin": ("macos", ".dylib"),
+}
+_MACHINES = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
+_FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "level": (c_int32, ()),
+    "limit_level": (None, (c_int32,)),
+    "struct_size": (c_int64, (c_int32,)),
+    "scratch_bytes": (c_int64, (POINTER(Target), Area)),
+    "accumulate": (c_double, (POINTER(Target), Area, c_void_p)),
+    "find_rims": (None, (c_void_p, c_void_p, *(c_int32,) * 5)),
+    "find_ranges": (None, (*(c_void_p,) * 3, *(c_int32,) * 4, c_void_p)),
+    "find_spots": (
+        None,
+        (POINTER(Target), POINTER(Neighbour), c_int32, *(c_void_p,) * 4),
+    ),
+}
+
+
+class LibraryError(XRDSError):
+    """The compiled library is missing, or cannot be loaded here."""
+
+
+def file_name() -> str:
+    """Return the name of this platform's library. Raises LibraryError for others."""
+    system, machine = sys.platform, platform.machine().lower()
+    if system not in _SYSTEMS or machine not in _MACHINES:
+        raise LibraryError(
+            f"XRDS has no compiled library for {system} on {machine}: Linux, Windows "
+            "and macOS on x86-64, Linux and macOS on ARM are supported"
+        )
+    name, suffix = _SYSTEMS[system]
+    return f"{name}-{_MACHINES[machine]}{suffix}"
+
+
+@cache
+def library() -> CDLL:
+    """Return the library of this platform, loaded once in a process.
+
+    Raises LibraryError where it is missing, does not load, or is of another version.
+    """
+    path = FOLDER / file_name()
+    try:
+        found = CDLL(str(path))
+    except OSError as error:
+        raise LibraryError(
+            f"the compiled library {path} cannot be loaded ({error}): install XRDS "
+            "again, or in a checkout run make native"
+        ) from error
+    for name, (result, arguments) in _FUNCTIONS.items():
+        function = getattr(found, name, None)
+        if function is None:
+            raise LibraryError(_other_version(path))
+        function.restype, function.argtypes = result, arguments
+    sizes = [found.struct_size(number) for number in range(len(IN_ORDER))]
+    if sizes != [sizeof(each) for each in IN_ORDER]:
+        raise LibraryError(_other_version(path))
+    return found
+
+
+def _other_version(path: Path) -> str:
+    return (
+        f"the compiled library {path} is of another version of XRDS: install XRDS "
+        "again, or in a checkout run make native"
+    )
+
+
+class Arrays:
+    """Gives arrays to the library, and keeps them as long as it may use them."""
+
+    def __init__(self) -> None:
+        self._kept: list[Any] = []
+
+    def at(self, x: NDArray[Any] | None, dtype: DTypeLike, count: int) -> int | None:
+        """Return the address of `count` numbers, None of no array.
+
+        They are copied where they do not lie one after the other. Raises ValueError
+        where there are more or fewer, or of another type: the library would read what
+        is no number.
+        """
+        if x is None:
+            return None
+        if x.dtype != dtype or x.size != count:
+            raise ValueError(
+                f"{x.size} numbers of {x.dtype} where {count} of {np.dtype(dtype)} are "
+                "needed"
+            )
+        x = np.ascontiguousarray(x)
+        self._kept.append(x)
+        return x.ctypes.data
+
+    def addresses(self, addresses: Sequence[int | None]) -> Any:
+        """Return a C array of addresses."""
+        array = (c_void_p * max(len(addresses), 1))(*addresses)
+        self._kept.append(array)
+        return array

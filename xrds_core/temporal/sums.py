@@ -1,0 +1,320 @@
+"""Has the compiled library sum the samples of neighbours: hands over all it needs.
+
+The steps, for each pixel of each neighbour: where it was (`motion`, `panorama`), what
+it weighs there, the offset of the nearest pixel (`registration`), then for all
+neighbours together `similarity` and `changes`. The sources lie in `native`.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..native import structures
+from ..native.library import Arrays, library
+from ..native.threads import bands, in_threads
+from .panorama import PanoramaReprojection
+from .similarity import guide_area, penalties
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from ..arrays import Array
+    from .candidates import Images
+    from .frame import Stored
+    from .motion import Pair, Reprojection
+
+    Mask = NDArray[np.bool_]
+    Guess = NDArray[np.float16]
+
+_COLUMNS = 512  # of an area: what it needs beside the pictures stays small
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """A neighbour that shows the same in every pixel: no reprojection is needed."""
+
+    other: Stored
+    pair = None
+
+
+@dataclass(frozen=True)
+class Reprojected:
+    """A neighbour whose pixels are found by reprojection and weighted.
+
+    `tiles` are its weights by coarse rejection; `fall` times the squared distance is
+    the logarithm of a weight.
+    """
+
+    pair: Pair
+    tiles: Array
+    fall: float
+
+    @property
+    def other(self) -> Stored:
+        """The neighbour frame."""
+        return self.pair.there
+
+    @property
+    def is_reused(self) -> bool:
+        """Whether any of its tiles is."""
+        return bool(self.tiles.any())
+
+
+@dataclass(frozen=True)
+class Means:
+    """Means over a frame's own and the samples that it reuses.
+
+    `passes` of the picture, each (H, W, C), `parts` that are lit (H, W, 3), `samples`
+    (H, W), and how many samples were `reused` in all.
+    """
+
+    passes: list[Array]
+    parts: list[Array]
+    samples: Array
+    reused: float
+
+
+@dataclass(frozen=True)
+class Work:
+    """The means of one frame and any of its neighbours.
+
+    `images` are those that it shows, `usual` is `light_for_albedo`, `lit` are the names
+    of the parts with light in any frame.
+    """
+
+    target: Stored
+    images: Images | None
+    usual: float
+    lit: tuple[str, ...]
+    threads: int | None
+
+    def guess(self, neighbours: Sequence[Aligned | Reprojected]) -> Guess:
+        """Return what the means of some neighbours guess of the picture: planes
+        (n, H, W) of its passes and parts, and of brightness.
+        """
+        planes = self.target.picture.shape[1] + 3 * len(self.lit) + 1
+        guess = np.empty((planes, *self.target.shape), np.float16)
+        call = _Call(self, [(x, 0) for x in neighbours])
+        call.target.guess_out = guess.ctypes.data
+        call.run()
+        return guess
+
+    def means(
+        self,
+        groups: Sequence[Sequence[Aligned | Reprojected]],
+        guess: Guess | None = None,
+    ) -> Means:
+        """Return the means over two groups of neighbours, which are judged apart.
+
+        With a `guess` the offsets of the pixels taken are taken out.
+        """
+        (height, width), channels = self.target.shape, self.target.picture.shape[1]
+        means = np.empty((channels, height * width), np.float32)
+        parts = np.empty((3 * len(self.lit), height * width), np.float32)
+        samples = np.empty((height, width), np.float32)
+        call = _Call(self, [(x, n) for n, group in enumerate(groups) for x in group])
+        if guess is not None:
+            call.target.guess = guess.ctypes.data
+        call.target.means, call.target.part_means = means.ctypes.data, parts.ctypes.data
+        call.target.samples = samples.ctypes.data
+        reused = call.run()
+
+        def pictures(planes: Array) -> list[Array]:
+            return [
+                planes[first : first + 3].reshape(height, width, -1)
+                for first in range(0, len(planes), 3)
+            ]
+
+        return Means(pictures(means), pictures(parts), samples, reused)
+
+
+def find_spots(pair: Pair, step: int) -> tuple[NDArray[np.int32], Mask, Mask]:
+    """Return where every `step`th pixel was, as if only the camera moved, (n,) each.
+
+    The flat pixel of `pair.there`; whether it shows the same; whether it is in the
+    frame at all. In both directions the first one is pixel `step` // 2.
+    """
+    height, width = pair.here.shape
+    start = step // 2
+    across = len(range(start, width, step))
+    count = len(range(start, height, step)) * across
+    pixel = np.empty(count, np.int32)
+    seen, in_frame = np.empty((2, count), np.bool_)
+    call = _Call(Work(pair.here, None, 0.0, (), 1), [])
+    neighbour = call.reprojected(pair)
+    scratch = np.empty(8 * across, np.float32)
+    library().find_spots(
+        call.target,
+        neighbour,
+        step,
+        *(x.ctypes.data for x in (pixel, seen, in_frame, scratch)),
+    )
+    return pixel, seen, in_frame
+
+
+class _Call:
+    """One call of the library, and the arrays that it reads."""
+
+    def __init__(
+        self, work: Work, neighbours: Sequence[tuple[Aligned | Reprojected, int]]
+    ) -> None:
+        self._work, self._arrays = work, Arrays()
+        used = [(x, n) for x, n in neighbours if not x.pair or x.is_reused]
+        pairs = [x.pair for x, _ in used if x.pair]
+        frame, pixels = work.target, work.target.picture.shape[0]
+        guide_penalty, change_penalty = penalties(frame.samples)
+        self.target = structures.Target(
+            frame=self._frame(frame, bool(pairs)),
+            channels=frame.picture.shape[1],
+            parts=len(work.lit),
+            neighbours=len(used),
+            guide_area=guide_area(frame.samples),
+            usual=work.usual,
+            guide_penalty=guide_penalty,
+            change_penalty=change_penalty,
+        )
+        if frame.noise is not None:
+            noise = frame.noise.guides
+            self.target.guide_noise = self._arrays.at(noise, np.float16, pixels)
+        if pairs:
+            self._extent(pairs[0])
+        self._all = (structures.Neighbour * max(len(used), 1))(
+            *(self._neighbour(x, group) for x, group in used)
+        )
+        self.target.all = ctypes.cast(
+            self._all, ctypes.POINTER(structures.Neighbour)
+        )
+
+    def run(self) -> float:
+        """Accumulate the whole frame; returns how many samples were reused."""
+        height, width = self._work.target.shape
+        lefts = range(0, width, _COLUMNS)
+        areas = [
+            structures.Area(top, bottom, left, min(left + _COLUMNS, width))
+            for (top, bottom), left in product(bands(height), lefts)
+        ]
+        needed = library().scratch_bytes(self.target, areas[0])
+        scratches: list[NDArray[np.uint8]] = []  # one of each thread
+
+        def work(area: structures.Area) -> float:
+            scratch = scratches.pop() if scratches else np.empty(needed, np.uint8)
+            reused = library().accumulate(self.target, area, scratch.ctypes.data)
+            scratches.append(scratch)
+            return float(reused)
+
+        return sum(in_threads(work, areas, self._work.threads))
+
+    def reprojected(self, pair: Pair) -> structures.Neighbour:
+        """The structure of a neighbour without motion of its own."""
+        self._extent(pair)
+        self.target.frame = self._frame(pair.here, True)
+        turn = np.eye(3) if pair.turn is None else pair.turn
+        result = structures.Neighbour(
+            frame=self._frame(pair.there, True),
+            forth=self._reprojection(pair.forth, pair.here.shape),
+            back=self._reprojection(pair.back, pair.there.shape),
+            jitters=pair.jitters,
+            whole=pair.whole_motion,
+        )
+        result.turn[:] = turn.ravel().tolist()
+        return result
+
+    def _neighbour(
+        self, found: Aligned | Reprojected, group: int
+    ) -> structures.Neighbour:
+        if isinstance(found, Aligned):
+            result = structures.Neighbour(aligned=True)
+            result.frame = self._frame(found.other, False)
+            result.turn[:] = np.eye(3).ravel().tolist()
+        else:
+            pair = found.pair
+            result = self.reprojected(pair)
+            self._moving(result, pair)
+            result.fall, result.most = found.fall, found.tiles.max()
+            result.tile_rows, result.tile_columns = found.tiles.shape
+            if not (found.tiles == 1.0).all():
+                result.tiles = self._arrays.at(
+                    found.tiles, np.float32, found.tiles.size
+                )
+            if self._work.images is not None:
+                result.images = self._places(*self._work.images.positions(pair))
+        result.group = group
+        return result
+
+    def _moving(self, result: structures.Neighbour, pair: Pair) -> None:
+        motion = pair.object_motion
+        if motion is None:
+            return
+        there, here = (len(x.picture) for x in (pair.there, pair.here))
+        result.moving = self._arrays.at(motion.moving, np.bool_, there)
+        result.beside = self._arrays.at(motion.beside, np.bool_, here)
+        result.moved = self._places(motion.pixels, motion.x, motion.y)
+
+    def _places(
+        self, pixels: NDArray[np.integer], x: Array, y: Array
+    ) -> structures.Places:
+        count, at = len(pixels), self._arrays.at
+        flat = pixels.astype(np.int64, copy=False)
+        return structures.Places(
+            at(flat, np.int64, count),
+            at(x.astype(np.float32, copy=False), np.float32, count),
+            at(y.astype(np.float32, copy=False), np.float32, count),
+            count,
+        )
+
+    def _extent(self, pair: Pair) -> None:
+        least, most = (
+            self._arrays.at(x, np.float32, len(pair.here.picture)) for x in pair.extent
+        )
+        self.target.least, self.target.most = least, most
+
+    def _frame(self, frame: Stored, is_reprojected: bool) -> structures.Frame:
+        (height, width), at = frame.shape, self._arrays.at
+        count = height * width
+        channels = frame.picture.shape[1]
+        found = structures.Frame(
+            picture=at(frame.picture, np.float16, count * channels),
+            depth=at(frame.inverse_depth, np.float32, count),
+            counts=at(frame.counts, np.float16, count),
+            invalid=at(frame.invalid, np.bool_, count),
+            parts=self._parts(frame),
+            width=width,
+            height=height,
+            number=frame.number % (1 << 31),
+            samples=frame.samples,
+        )
+        if frame.noise is not None:
+            found.noise = at(frame.noise.light, np.float16, 2 * count)
+        if is_reprojected:
+            found.rims = at(frame.rims, np.uint8, count)
+        return found
+
+    def _parts(self, frame: Stored) -> Any:
+        parts = [frame.parts[name] for name in self._work.lit]
+        count = 3 * len(frame.picture)
+        at = self._arrays.at
+        return self._arrays.addresses([at(part, np.float16, count) for part in parts])
+
+    def _reprojection(
+        self, transform: Reprojection, shape: tuple[int, int]
+    ) -> structures.Reprojection:
+        """`shape` is that of the frame whose pixels are reprojected."""
+        result = structures.Reprojection()
+        if not isinstance(transform, PanoramaReprojection):
+            result.matrix[:] = transform.ravel().tolist()
+            return result
+        result.matrix[:] = transform.turn.astype(np.float32).ravel().tolist()
+        columns, rows = transform.directions(shape)
+        result.columns = self._arrays.at(columns, np.float32, columns.size)
+        result.rows = self._arrays.at(rows, np.float32, rows.size)
+        result.left, result.top = transform.first
+        result.across, result.down = transform.density
+        result.window_x, result.window_y = transform.there.window
+        return result
