@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
     Mask = NDArray[np.bool_]
 
-PROCESSOR = "cpu"
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 # Standard deviation, in pixels, of the weight by distance where frames have one sample
@@ -61,7 +60,7 @@ class Accumulated:
     `rejected` is the share of the neighbours' samples that were left out: of pixels
     that a neighbour does not show, or shows in other light. `frames` are the numbers of
     the frames that were considered, the frame itself included: those of its shot,
-    between two shot cuts. `device` accumulated them: a graphics card's name, or `cpu`.
+    between two shot cuts.
     """
 
     radiance: Array | None
@@ -72,7 +71,6 @@ class Accumulated:
     rejected: float
     frames: tuple[int, ...]
     parts: Mapping[str, Array] = field(default_factory=dict)
-    device: str = PROCESSOR
 
 
 def accumulate(
@@ -80,15 +78,13 @@ def accumulate(
     others: Sequence[Stored],
     movement: Movement | None = None,
     threads: int | None = None,
-    card: OnCard | None = None,
 ) -> Accumulated:
     """Return `target` with the samples of `others`.
 
     `movement` caches the object motion of this shot; without it each call computes it
     again. No samples are reused across a shot cut. Without others the result is
     bit-identical to the target. `threads`: all processors by default; the result does
-    not depend on it. `card` accumulates what it can, in the processor's place. Raises
-    PictureError where the frames hold different passes.
+    not depend on it. Raises PictureError where the frames hold different passes.
     """
     others = same_shot(target, others)
     groups = _neighbours(target, others, movement or Movement(), threads)
@@ -96,50 +92,21 @@ def accumulate(
     pairs = [x.pair for group in groups for x in group if x.pair and x.is_reused]
     images = find_images(target, pairs, partial(_in_threads, threads=threads))
     lit = _lit(target, others)
-    means, device = None, PROCESSOR
     # G's own noise counts more than texture where samples are few
     registers = bool(pairs) and target.samples > FEW_SAMPLES
-    # a card's kernels take no offsets out
-    if card is not None and not registers and card.takes(target, others):
-        means = card.means(target, [x for x in groups if x], images, usual, lit)
-        device = card.name
-    if means is None:
-        gather = partial(
-            _by_rows, target, images=images, usual=usual, lit=lit, threads=threads
-        )
-        guess = None
-        if registers:
-            near = gather(groups[:1])
-            guess = Guess([*near.passes, *near.parts], target.has_light)
-        means = gather(groups, guess=guess)
-        device = PROCESSOR
+    gather = partial(
+        _by_rows, target, images=images, usual=usual, lit=lit, threads=threads
+    )
+    guess = None
+    if registers:
+        near = gather(groups[:1])
+        guess = Guess([*near.passes, *near.parts], target.has_light)
+    means = gather(groups, guess=guess)
     height, width = target.shape
     requested = sum(x.samples for x in others) * height * width
     rejected = 1.0 - means.reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(x.number for x in others)}))
-    found = _unpacked(target, means, lit, rejected, frames)
-    return replace(found, device=device)
-
-
-class OnCard(Protocol):
-    """What accumulates on a graphics card."""
-
-    @property
-    def name(self) -> str:
-        """The card's."""
-
-    def takes(self, target: Stored, others: Sequence[Stored]) -> bool:
-        """Whether it can accumulate these frames."""
-
-    def means(
-        self,
-        target: Stored,
-        groups: Sequence[Sequence[Aligned | Reprojected]],
-        images: Images | None,
-        usual: float,
-        lit: Sequence[str],
-    ) -> Means | None:
-        """The means of a frame, its neighbours and parts; None where it fails."""
+    return _unpacked(target, means, lit, rejected, frames)
 
 
 @dataclass(frozen=True)
@@ -165,7 +132,7 @@ def _by_rows(
     threads: int | None,
     guess: Guess | None = None,
 ) -> Means:
-    """Accumulate block by block, on the processor."""
+    """Accumulate block by block."""
     height, width = target.shape
     means = np.empty((height * width, target.picture.shape[1]), np.float32)
     parts = np.empty((height * width, 3 * len(lit)), np.float32)
