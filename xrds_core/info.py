@@ -9,7 +9,6 @@ from typing import Any
 
 from .denoising import oidn_device
 from .errors import GET_NETWORK, WeightsError, XRDSError
-from .gpu.card import card_names
 from .superres.weights_header import DIRECTORY, available, guide_filter_record
 from .version import package_version
 
@@ -76,7 +75,6 @@ def info(
         "blender": blender,
         **_network(),
         "denoiser": denoiser_devices(),
-        "accumulation": [*card_names(), "cpu"],
         **shipped_costs(),
         "weights": available(weights),
         "guide_filter": guide_filter_record(weights),
@@ -86,7 +84,6 @@ def info(
 def lines(result: dict[str, Any]) -> Iterator[str]:
     """The result of `info` for people to read."""
     yield f"XRDS {result['version']}, Blender {result['blender'] or 'not found'}"
-    yield f"accumulation: {', '.join(result['accumulation'])}"
     yield f"denoiser: {', '.join(result['denoiser']) or 'not found'}"
     if result["torch"] is None:
         yield f"network: none ({result['torch_error']}); {GET_NETWORK} brings it"

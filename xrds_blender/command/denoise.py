@@ -13,7 +13,7 @@ from xrds_core.sequence.names import PASSES, PassNames
 
 from ..planning.settings import QUALITIES
 from . import arguments
-from .options import add_accumulate_on, add_light, add_read_limit
+from .options import add_light, add_read_limit
 
 SPACES = ("camera", "world")
 
@@ -97,7 +97,6 @@ def _add_machine(command: argparse.ArgumentParser) -> None:
     """Add what the denoiser runs on."""
     add = command.add_argument
     add("--device", default="auto", help="of the denoiser: auto, cpu, cuda, metal")
-    add_accumulate_on(command)
     add("--threads", type=arguments.positive, help="of the denoiser (default: all)")
     add(
         "--memory-limit",
@@ -146,7 +145,6 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
     from xrds_core.exr import limits
     from xrds_core.light_parts.find import Wanted
     from xrds_core.light_parts.table import read_renderers
-    from xrds_core.sequence.accumulator import Accumulator
     from xrds_core.sequence.cameras import read_cameras
     from xrds_core.sequence.denoise import Files, denoise_sequence
     from xrds_core.sequence.reading import Reading
@@ -186,7 +184,6 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
         frames=options.frames,
         radius=options.temporal_radius,
         reading=reading,
-        accumulate=Accumulator(options.accumulate_on),
         resume=options.resume,
         say=warn,
     )

@@ -74,7 +74,6 @@ def add_request(command: argparse.ArgumentParser) -> None:
     )
     add_light(command)
     add_network(command, _RENDER_DEVICE_HELP)
-    add_accumulate_on(command)
 
 
 def add_light(command: argparse.ArgumentParser) -> None:
@@ -199,17 +198,6 @@ def add_network(
         help="memory for the network, such as 500M or 4G",
     )
     add("--weights", type=Path, help="weights file, or a folder of them")
-
-
-def add_accumulate_on(command: argparse.ArgumentParser) -> None:
-    """Add what neighbours' samples are accumulated on."""
-    command.add_argument(
-        "--accumulate-on",
-        default="auto",
-        metavar="DEVICE",
-        help="where neighbours' samples are accumulated: auto (a graphics card where "
-        "one is), cpu, gpu, or a part of a card's name",
-    )
 
 
 def add_output(command: argparse.ArgumentParser, **how: Any) -> None:

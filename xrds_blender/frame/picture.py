@@ -36,14 +36,13 @@ class Temporal:
 
     `frames`: the numbers of those whose samples went in, its own too; `mean_samples`
     per pixel after accumulation; `rejected`: the share of the neighbours' samples that
-    were left out; `device`: what accumulated them, a graphics card's name or `cpu`.
+    were left out.
     """
 
     radius: int
     frames: tuple[int, ...]
     mean_samples: float
     rejected: float
-    device: str
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,6 @@ def fields(picture: Picture, settings: Settings, samples: int) -> dict[str, str]
     if picture.temporal is not None:
         frames = picture.temporal.frames
         entries["frames"] = f"{frames[0]} to {frames[-1]}"
-        entries["accumulated_on"] = picture.temporal.device
     if picture.device:
         entries["device"] = picture.device
     entries["seconds"] = f"{picture.seconds.get('total', 0.0):.1f}"

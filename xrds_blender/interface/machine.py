@@ -29,8 +29,6 @@ class Machine:
     """Whether a render that the user stops leaves the picture so far, denoised."""
     torch: Path | None = None
     """Folder that PyTorch is taken from; None means the one that Python finds."""
-    accumulate_on: str = "auto"
-    """What neighbours' samples are accumulated on; as in `Accumulator`."""
 
 
 def machine() -> Machine:
@@ -41,7 +39,6 @@ def machine() -> Machine:
         return Machine()
     return Machine(
         device=stored.device or "auto",
-        accumulate_on=stored.accumulate_on,
         memory_limit=stored.memory_limit * MEBIBYTE or None,
         weights=folder(stored.weights),
         threads=stored.threads or None,

@@ -64,7 +64,6 @@ def _apply_torch(preferences: Any, _: Any = None) -> None:
 
 
 _NAMES = (
-    "accumulate_on",
     "device",
     "threads",
     "memory_limit",
@@ -84,16 +83,6 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
         items=_devices,
         description="Where the network of super-resolution runs; Cycles' own device "
         "is in the render properties",
-    )
-    accumulate_on: bpy.props.EnumProperty(
-        name="Accumulate On",
-        items=(
-            ("auto", "Automatic", "A graphics card where one is fit, else the CPU"),
-            ("cpu", "CPU", "The CPU, where the card's memory is all for Cycles"),
-            ("gpu", "Graphics Card", "The fastest card; an error where there is none"),
-        ),
-        description="Where the samples of neighbouring frames are added up",
-        default="auto",
     )
     threads: bpy.props.IntProperty(
         name="Threads (0: Automatic)",

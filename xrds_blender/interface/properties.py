@@ -273,7 +273,6 @@ def request_of(settings: XRDSSettings) -> Request:
         preset=settings.preset,
         denoise=settings.denoise,
         device=here.device,
-        accumulate_on=here.accumulate_on,
         exposure=settings.exposure if settings.use_exposure else None,
         time_budget=settings.time_budget if settings.is_timed else None,
         memory_limit=here.memory_limit,

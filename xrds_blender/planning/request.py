@@ -45,8 +45,7 @@ class Goal:
 class Machine:
     """What the network and our denoiser run on.
 
-    `device` as `xrds info` lists them, or auto; `accumulate_on` as in `Accumulator`;
-    `memory_limit` in bytes; `weights` is a
+    `device` as `xrds info` lists them, or auto; `memory_limit` in bytes; `weights` is a
     folder of weights files or one file, in the place of the shipped ones. Raises
     UsageError for a device that has no such name.
     """
@@ -55,7 +54,6 @@ class Machine:
     memory_limit: int | None = None
     threads: int | None = None
     weights: str | Path | None = None
-    accumulate_on: str = "auto"
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"auto|cpu|metal|(cuda|xpu)(:\d+)?", self.device):

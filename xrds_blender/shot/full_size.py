@@ -12,10 +12,10 @@ from xrds_core.light_parts.find import LightPart
 from xrds_core.light_parts.light import passes_by_name
 from xrds_core.light_parts.sums import added_up, light_in
 from xrds_core.notices import warn
-from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.finishing import finish_frame
-from xrds_core.temporal.accumulate import Accumulated
+from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.equal_noise import IndependentFrames
+from xrds_core.temporal.vectors import Movement
 
 from ..cycles.layer_session import LayerSession
 from ..cycles.samples import Samples
@@ -49,10 +49,8 @@ class FullSize(Method):
         self._on_sampled, self._denoise_in_time = on_sampled, denoise_in_time
         self._quality = self.settings.quality
         self._denoiser = load_denoiser(self._quality, request.machine)
-        self._accumulate = Accumulator(request.machine.accumulate_on)
+        self._movement = Movement()
         self._independent = IndependentFrames(warn)
-        if self.settings.temporal_radius:
-            self._accumulate.prepare()
 
     def sample(
         self,
@@ -106,7 +104,7 @@ class FullSize(Method):
     ) -> Accumulated:
         """One view with the samples of its neighbours."""
         neighbours = self._neighbours(own, others, view)
-        return self._accumulate(own.views[view], neighbours)
+        return accumulate(own.views[view], neighbours, self._movement)
 
     def radiance(
         self,
@@ -120,7 +118,7 @@ class FullSize(Method):
             own.views[view],
             self._neighbours(own, others, view),
             self._denoiser,
-            self._accumulate,
+            self._movement,
             region=region,
             accumulated=own.gathered.get(view),
         )
@@ -149,7 +147,7 @@ class FullSize(Method):
             own,
             neighbours,
             self._denoiser,
-            self._accumulate,
+            self._movement,
             report,
             accumulated=gathered,
             light=light,
@@ -224,9 +222,7 @@ def temporal(settings: Settings, accumulated: Accumulated) -> Temporal:
     """What neighbours added to a picture, as it reports."""
     samples = float(accumulated.samples.mean())
     radius = settings.temporal_radius
-    return Temporal(
-        radius, accumulated.frames, samples, accumulated.rejected, accumulated.device
-    )
+    return Temporal(radius, accumulated.frames, samples, accumulated.rejected)
 
 
 def accumulation(accumulated: Accumulated) -> Decision:

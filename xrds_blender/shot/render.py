@@ -168,13 +168,10 @@ def _described(
 
 
 def _devices(picture: Picture) -> dict[str, str]:
-    """What the stages of a picture ran on."""
+    """What the last stage of a picture ran on."""
     assert picture.settings is not None
     stage = "network" if picture.settings.is_enlarged else "denoise"
-    found = {stage: picture.device}
-    if picture.temporal is not None:
-        found["accumulate"] = picture.temporal.device
-    return found
+    return {stage: picture.device}
 
 
 def _finish(

@@ -15,11 +15,11 @@ import numpy as np
 
 from xrds_core.arrays import Array
 from xrds_core.errors import Cancelled
-from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.frame import Camera, Frame, Stored, store
 from xrds_core.temporal.placeholder import reprojected_placeholder
 from xrds_core.temporal.shot_cuts import same_shot
+from xrds_core.temporal.vectors import Movement
 
 from ..choosing.plan_facts import find_facts
 from ..cycles import live
@@ -115,9 +115,7 @@ class SuperResolution(Method):
         # of light that neighbours add to; a still's is denoised as it is rendered
         radius, quality = settings.temporal_radius, settings.quality
         self._denoiser = load_denoiser(quality, machine) if radius else None
-        self._accumulate = Accumulator(machine.accumulate_on)
-        if radius:
-            self._accumulate.prepare()
+        self._movement = Movement()
 
     def sample(
         self,
@@ -164,7 +162,7 @@ class SuperResolution(Method):
             assert self._denoiser is not None
             neighbours = own.neighbours(view, others)
             inputs = accumulated_inputs(
-                inputs, neighbours, self.settings, self._denoiser, self._accumulate
+                inputs, neighbours, self.settings, self._denoiser, self._movement
             )
         started = time.perf_counter()
         try:
@@ -445,12 +443,13 @@ def accumulated_inputs(
     others: Sequence[View],
     settings: Settings,
     denoiser: Denoiser,
-    accumulate: Accumulator,
+    movement: Movement,
 ) -> Inputs:
     """What the network takes of a view, with the samples of its neighbours."""
     started = time.perf_counter()
-    accumulated = accumulate(own.light, [each.light for each in others])
-    guides = accumulated_guides(own, others, accumulate)
+    light = [each.light for each in others]
+    accumulated = accumulate(own.light, light, movement)
+    guides = accumulated_guides(own, others, movement)
     done = time.perf_counter()
     beauty = _denoised(own, accumulated, denoiser)
     seconds = {
@@ -477,9 +476,7 @@ def _denoised(own: View, accumulated: Accumulated, denoiser: Denoiser) -> Beauty
     return own.place.beauty(denoised.radiance, accumulated.radiance)
 
 
-def accumulated_guides(
-    own: View, others: Sequence[View], accumulate: Accumulator
-) -> Guides:
+def accumulated_guides(own: View, others: Sequence[View], movement: Movement) -> Guides:
     """Guides with the samples of other frames; the richest of those of one name."""
     others = [each for each in others if each.guides is not None]
     if own.guide_name is not None:
@@ -493,7 +490,7 @@ def accumulated_guides(
         number = own.light.number
         beside = sorted(neighbours, key=lambda each: abs(each.number - number))[:2]
         target = reprojected_placeholder(number, own.camera, beside)
-    found = accumulate(target, neighbours)
+    found = accumulate(target, neighbours, movement)
     assert found.alpha is not None
     # their own number: where nothing is accumulated there are no more
     samples = max(1, int(target.samples))

@@ -24,10 +24,10 @@ from ..frames import (
     misnamed,
 )
 from ..light_parts.light import passes_of
+from ..temporal.vectors import Movement
 from ..temporal.window import Neighbourhood, Shot, Window
 from ..time_left import Clock
 from ..version import package_version
-from .accumulator import Accumulator
 from .finishing import AROUND, Finished, finish_frame
 from .loading import Loader
 from .made_of import MADE_OF, Recipe, is_complete, is_made_of, states_of
@@ -157,7 +157,6 @@ def denoise_sequence(
     frames: Iterable[int] | None = None,
     radius: int | None = None,
     reading: Reading | None = None,
-    accumulate: Accumulator | None = None,
     resume: bool = False,
     say: Say = lambda _: None,
 ) -> dict[str, Any]:
@@ -169,7 +168,6 @@ def denoise_sequence(
             frames, between these or next to them, are reused, too.
         radius: how many frames before and after are neighbours; by default what the
             files recommend, or 4.
-        accumulate: by default on a graphics card where there is one.
         resume: skip outputs that are complete and made of these settings and of the
             inputs as they are now.
         say: takes a line about a frame that is finished, left out, or not reusable.
@@ -199,13 +197,11 @@ def denoise_sequence(
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
-    work = files, denoiser, (accumulate := accumulate or Accumulator()), shot, loader
-    entries = list(_entries(*work, recipe, resume, say))
+    entries = list(_entries(files, denoiser, shot, loader, recipe, resume, say))
     return {
         "output": files.output,
         "temporal_radius": radius,
         "device": denoiser.device,
-        "accumulated_on": accumulate.device,
         "frames": entries,
         "kept": sorted(done),
         "left_out": _left_out(loader, [n for n in numbers if n not in done]),
@@ -215,7 +211,6 @@ def denoise_sequence(
 def _entries(
     files: Files,
     denoiser: Denoiser,
-    accumulate: Accumulator,
     shot: Shot,
     loader: Loader,
     recipe: Recipe,
@@ -228,7 +223,7 @@ def _entries(
     error.
     """
     selection, fails = NeighbourSelection(say), False
-    clock = Clock()
+    movement, clock = Movement(), Clock()
     for found in Window(shot, loader.load):
         number, own = found.number, found.own
         near = sorted((number, *shot.neighbours(number)))
@@ -244,7 +239,7 @@ def _entries(
                     each.stored,
                     others[view],
                     denoiser,
-                    accumulate,
+                    movement,
                     region=region,
                     light=each.light,
                 )

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..light_parts.adding_up import completed
 from ..light_parts.sums import added_up, light_in
-from ..temporal.accumulate import Accumulated
+from ..temporal.accumulate import Accumulated, accumulate
 from ..temporal.local_filters import box, extreme
 from .rectangles import rectangles
 from .same_picture import BLOCK, block_means
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..denoising import Denoised, Denoiser
     from ..light_parts.find import LightPart
     from ..temporal.frame import Stored
-    from .accumulator import Accumulator
+    from ..temporal.vectors import Movement
     from .rectangles import Rectangle
 
 
@@ -78,7 +78,7 @@ def finish_frame(
     own: Stored,
     neighbours: Sequence[Stored],
     denoiser: Denoiser,
-    accumulate: Accumulator,
+    movement: Movement,
     progress: Callable[[float], bool] | None = None,
     *,
     region: tuple[slice, slice] | None = None,
@@ -92,17 +92,17 @@ def finish_frame(
     of few for detail. Where that is a small part of the picture, that part alone is
     denoised again.
     `region`, rows and columns, is the part to denoise: black around a crop would give
-    the denoiser a wrong exposure. `accumulated` is the frame with its neighbours if it
-    is known already; `light` are the parts that are denoised as well. Raises Cancelled
-    if `progress` requests it.
+    the denoiser a wrong exposure. `movement` is that of the shot; `accumulated` is the
+    frame with its neighbours if it is known already; `light` are the parts that are
+    denoised as well. Raises Cancelled if `progress` requests it.
     """
     started = time.perf_counter()
     if accumulated is None:
-        accumulated = accumulate(own, neighbours)
+        accumulated = accumulate(own, neighbours, movement)
     region = region or (slice(None), slice(None))
     areas: list[_Area] = []
     if neighbours and own.samples < _DENOISED_ONCE:
-        alone = accumulate(own)
+        alone = accumulate(own, [])
         share = _share(accumulated, alone, own.samples)[region]
         areas = _lacking(share)
     denoise_started = time.perf_counter()

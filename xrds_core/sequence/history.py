@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..temporal.accumulate import sample_counts
+from ..temporal.accumulate import accumulate, sample_counts
 from ..temporal.frame import pack, pack_counts, pack_parts
 from ..temporal.half_floats import floats
+from ..temporal.vectors import Movement
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from ..temporal.frame import Stored
-    from .accumulator import Accumulator
 
 LONGEST = 32
 """Frames that a history counts as at most: older ones fade, as light drifts."""
@@ -30,8 +30,8 @@ LONGEST = 32
 class History:
     """What is left of the frames before those in a window, by view."""
 
-    def __init__(self, accumulate: Accumulator) -> None:
-        self._accumulate = accumulate
+    def __init__(self) -> None:
+        self._movement = Movement()
         self._window: dict[int, Mapping[str, Stored]] = {}
         self.views: dict[str, Stored] = {}
 
@@ -49,15 +49,15 @@ class History:
         for number in sorted(n for n in self._window if n < first):
             for view, frame in self._window[number].items():
                 older = self.views.get(view)
-                self.views[view] = extended(older, frame, self._accumulate)
+                self.views[view] = extended(older, frame, self._movement)
         self._window = dict(window)
 
 
-def extended(history: Stored | None, frame: Stored, accumulate: Accumulator) -> Stored:
+def extended(history: Stored | None, frame: Stored, movement: Movement) -> Stored:
     """Return a history with the samples of a frame that comes after it."""
     if history is None:
         return frame
-    found = accumulate(frame, [history])
+    found = accumulate(frame, [history], movement)
     own = sample_counts(frame, slice(None), len(frame.picture))
     total = found.samples.ravel()
     counts = np.minimum(total, own * LONGEST)

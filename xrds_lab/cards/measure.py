@@ -19,7 +19,7 @@ from ..gallery.judge import compare
 from .cycles import memory_in_use, render_on
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
     from xrds_core.arrays import Array
@@ -40,8 +40,7 @@ class Case:
     """A shot of the gallery at a size and some samples per pixel.
 
     Stages are timed where it `is_timed`: what follows sampling takes as long whatever
-    the samples. `cycles` is the kind of Cycles' card, or CPU; `card` is what
-    accumulates beside the processor, or None.
+    the samples. `cycles` is the kind of Cycles' card, or CPU.
     """
 
     shot: str
@@ -50,7 +49,6 @@ class Case:
     radii: tuple[int, ...]
     is_timed: bool
     cycles: str
-    card: str | None
     reference_samples: int = 512
     rounds: int = 3
 
@@ -161,12 +159,12 @@ def _cycles(scene: Any, case: Case, number: int) -> dict[str, Row]:
 
 
 def _ours(case: Case, own: Stored, lenders: Sequence[Stored]) -> Row:
-    """A frame finished on the processor and on the card; radiance of the latter."""
-    ways = {
-        "cpu": {"device": CPU, "accumulate_on": CPU},
-        "card": {"device": "auto", "accumulate_on": case.card or CPU},
-    }
-    finish = {way: _finishing(case, devices) for way, devices in ways.items()}
+    """A frame denoised on the processor and on the card; radiance of the latter.
+
+    The processor accumulates it both times.
+    """
+    ways = {"cpu": CPU, "card": "auto"}
+    finish = {way: _finishing(case, device) for way, device in ways.items()}
     row: Row = {}
     pictures: dict[str, Array] = {}
     for way in ways:
@@ -184,8 +182,11 @@ def _ours(case: Case, own: Stored, lenders: Sequence[Stored]) -> Row:
         f"{way}_{stage}": statistics.median(run[stage] for run in found)
         for way, found in runs.items()
         if found
-        for stage in ("total", "accumulate", "denoise")
+        for stage in ("total", "denoise")
     }
+    if case.is_timed:
+        every = [run["accumulate"] for found in runs.values() for run in found]
+        row["accumulate"] = statistics.median(every)
     apart = np.abs(pictures["cpu"] - pictures["card"]).max(axis=-1)
     apart /= max(float(pictures["cpu"].mean()), 1e-9)
     return row | {
@@ -200,12 +201,7 @@ def _whole_shot(scene: Any, case: Case) -> Row:
     from xrds_blender.planning.request import render_request
     from xrds_blender.shot import shot
 
-    job = render_request(
-        scale=1,
-        samples=case.samples,
-        temporal_radius=REACH,
-        accumulate_on=case.card or CPU,
-    )
+    job = render_request(scale=1, samples=case.samples, temporal_radius=REACH)
     found = {}
     for name, is_on in (("in_turn", False), ("overlapped", case.cycles != "CPU")):
         with patch.object(shot, "samples_on_card", lambda _, is_on=is_on: is_on):
@@ -215,12 +211,12 @@ def _whole_shot(scene: Any, case: Case) -> Row:
     return {"radiance": radiance, **found}
 
 
-def _finishing(case: Case, devices: Mapping[str, str]) -> Callable[..., Any]:
+def _finishing(case: Case, device: str) -> Callable[..., Any]:
     from xrds_blender.planning.request import render_request
     from xrds_blender.shot.full_size import FullSize
 
     job = render_request(
-        scale=1, samples=case.samples, temporal_radius=REACH, **devices
+        scale=1, samples=case.samples, temporal_radius=REACH, device=device
     )
     return FullSize(job).finish_stored
 

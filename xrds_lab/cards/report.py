@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 from xrds_blender.command import streams
 from xrds_core.atomic import read_json, write_json
-from xrds_core.sequence.accumulator import device_of, open_card
 
 from ..bench import machine
 from ..bench.journal import Journal
 from ..csv_table import write_table
 from ..progress import report_line
 from .cycles import find_card
-from .measure import CPU, Case, measure
+from .measure import Case, measure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -46,15 +45,13 @@ def bench_devices(
     minutes: float = MINUTES,
     rounds: int = 3,
     reference_samples: int = 512,
-    accumulate_on: str = "auto",
 ) -> dict[str, Any]:
     """Measure what is missing within `minutes`, write the report and return it.
 
     `shots` are of the gallery; at further sizes the first of them is measured.
     Times are of a whole frame, medians of `rounds`; `cpu` and `card` take turns. The
     first of `samples` is timed by stage, the others give their pictures alone. Without
-    a card `card` is the processor, too. Raises UsageError for a card asked for that is
-    not here.
+    a card `card` is the processor, too, which always accumulates.
     """
     out.mkdir(parents=True, exist_ok=True)
     kept = out / "cache"
@@ -62,15 +59,11 @@ def bench_devices(
     journal = Journal(kept / "journal.json", report_line)
     ends = time.monotonic() + 60.0 * minutes
     with streams.stdout_to(kept / "blender.log"):
-        cycles, card = find_card(), device_of(open_card(accumulate_on))
-        about = {
-            **machine.describe(),
-            "cycles_device": cycles,
-            "accumulated_on": card,
-        }
-        report_line(f"Cycles on {cycles}, accumulation on {card}")
+        cycles = find_card()
+        about = {**machine.describe(), "cycles_device": cycles}
+        report_line(f"Cycles on {cycles}")
         known: list[Row] = []
-        for case in _cases(shots, sizes, samples, radii, cycles, card):
+        for case in _cases(shots, sizes, samples, radii, cycles):
             one = replace(case, rounds=rounds, reference_samples=reference_samples)
             path = kept / f"{one.label}.json"
             if not path.is_file():
@@ -101,7 +94,6 @@ def _cases(
     samples: Sequence[int],
     radii: Sequence[int],
     cycles: str,
-    card: str,
 ) -> list[Case]:
     """Every shot at the first size; the first one at larger sizes, which take long."""
     return [
@@ -112,7 +104,6 @@ def _cases(
             tuple(radii),
             is_timed=count == samples[0],
             cycles=cycles,
-            card=None if card == CPU else card,
         )
         for size in sizes
         for shot in (shots if size == sizes[0] else shots[:1])

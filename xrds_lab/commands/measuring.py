@@ -8,7 +8,7 @@ from typing import Any
 
 from xrds_blender.command import arguments
 from xrds_blender.command.deferred import need_blender, no_lines
-from xrds_blender.command.options import DEVICE_HELP, add_accumulate_on
+from xrds_blender.command.options import DEVICE_HELP
 from xrds_core.errors import UsageError, XRDSError
 from xrds_core.superres.weights_header import PRESETS
 
@@ -380,7 +380,6 @@ def _add_device_report(group: Any) -> None:
         default=20.0,
         help="after which nothing more is begun; a second run goes on (default: 20)",
     )
-    add_accumulate_on(group)
 
 
 def _bench(options: argparse.Namespace) -> dict[str, Any]:
@@ -434,7 +433,6 @@ def _device_report(options: argparse.Namespace) -> dict[str, Any]:
         minutes=options.minutes,
         rounds=options.rounds,
         reference_samples=options.reference_samples or 512,
-        accumulate_on=options.accumulate_on,
     )
 
 

@@ -240,12 +240,7 @@ def low_budgets(results: Results) -> Table:
 def card(results: Results) -> Table:
     """Seconds on a card and on the cores beside it."""
     found = results.card
-    accumulation = found["accumulation"]
     table = [["1920 x 1080", "card", f"{found['machine']['cores']} cores"]]
-    on_card = median(accumulation["card"]["then"])
-    on_cores = median(accumulation["processor"])
-    label = f"accumulation of {accumulation['neighbours']} neighbours"
-    table.append([label, f"{on_card:.2f}", f"{on_cores:.2f}"])
     high = only(found["denoiser"], size=[1920, 1080])
     seconds = {x["device"]: median(x["seconds"]) for x in high}
     cells = [f"{seconds[x]:.2f}" for x in ("cuda", "cpu")]

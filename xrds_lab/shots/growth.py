@@ -140,9 +140,10 @@ def _frame(run: Run) -> Iterator[tuple[str, Row]]:
     import numpy as np
 
     from xrds_core.denoising import Denoiser
-    from xrds_core.sequence.accumulator import Accumulator
     from xrds_core.sequence.finishing import finish_frame
+    from xrds_core.temporal.accumulate import accumulate
     from xrds_core.temporal.frame import store
+    from xrds_core.temporal.vectors import Movement
 
     from .synthetic import frame
 
@@ -152,15 +153,15 @@ def _frame(run: Run) -> Iterator[tuple[str, Row]]:
         own = packed.pop(0)
         return own, sorted(packed.values(), key=lambda x: abs(x.number))
 
-    denoiser, accumulate = Denoiser("high", "cpu"), Accumulator("cpu")
-    finish_frame(*stored(64, 48, 1), denoiser, accumulate)  # loads what it needs
+    denoiser = Denoiser("high", "cpu")
+    finish_frame(*stored(64, 48, 1), denoiser, Movement())  # loads what it needs
     own, others = stored(*run.size, run.radius)
-    accumulate = Accumulator("cpu")
-    together, figures = _clocked(lambda: accumulate(own, others))
+    movement = Movement()
+    together, figures = _clocked(lambda: accumulate(own, others, movement))
     reused = float((together.samples / own.samples).mean())
     yield "accumulate", figures | {"samples_reused": round(reused, 2)}
     _, figures = _clocked(
-        lambda: finish_frame(own, others, denoiser, accumulate, accumulated=together)
+        lambda: finish_frame(own, others, denoiser, movement, accumulated=together)
     )
     yield "denoise", figures
 

@@ -16,10 +16,10 @@ import numpy as np
 from xrds_blender.command import streams
 from xrds_core.atomic import read_json, write_json
 from xrds_core.denoising import Denoiser
-from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import store
+from xrds_core.temporal.vectors import Movement
 
 from .. import metrics
 from ..bench import machine
@@ -187,7 +187,7 @@ def _judged(name: str, samples: int, made: _Rendered) -> list[Row]:
     seconds[ONE_BY_ONE] = time.perf_counter() - started
     for method, others in ((STILL, []), (SHOT, lenders)):
         started = time.perf_counter()
-        finished = finish_frame(own, others, denoiser, Accumulator(), light=made.parts)
+        finished = finish_frame(own, others, denoiser, Movement(), light=made.parts)
         seconds[method] = time.perf_counter() - started
         found[method] = finished.parts
         pictures[method] = finished.picture[..., :3]

@@ -152,8 +152,6 @@ def _load() -> None:
     from xrds_core.denoising import denoiser, oidn_device  # noqa: F401
     from xrds_core.sequence import denoise  # noqa: F401
 
-    with contextlib.suppress(ImportError):
-        import wgpu.backends.wgpu_native  # noqa: F401
     with contextlib.suppress(PictureError):
         exr.attributes(os.devnull)
 

@@ -36,7 +36,7 @@ _SETTINGS = (
     *("--crop=8x8+3+2", "--crop=24x18+0+0", "--crop=0x0+0+0"),
     *("--frames=1-3", "--frames=2", "--frames=2-9", "--frames=-1-2"),
     *("--normal-space=camera", "--position-space=camera", "--threads=1"),
-    *("--motion-scale=1,-1", "--memory-limit=1M", "--accumulate-on=cpu"),
+    *("--motion-scale=1,-1", "--memory-limit=1M"),
     *("--albedo=V.Normal", "--beauty=V.Combined", "--depth=Z", "--json"),
     *("--camera=cameras.json", "--light-aovs=motion", "--vector=motion"),
 )

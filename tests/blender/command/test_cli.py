@@ -367,13 +367,11 @@ def test_info_json_fields() -> None:
         "torch",
         "blender",
         "devices",
-        "accumulation",
         "paper_table",
         "presets",
         "weights",
     }
     assert result["devices"][0] == "cpu"
-    assert result["accumulation"][-1] == "cpu"
     assert result["paper_table"][0]["parameters"] == 9357857
     assert set(result["presets"]["fast"]["2"]) == {
         "parameters",

@@ -14,7 +14,6 @@ import xrds_core.denoising
 import xrds_core.exr.limits
 import xrds_core.info
 import xrds_core.light_parts.table
-import xrds_core.sequence.accumulator
 import xrds_core.sequence.cameras
 import xrds_core.sequence.denoise
 from xrds_blender.command import cameras, main, render, render_file, scene_file
@@ -33,7 +32,6 @@ BASE = {
     "info": "info",
 }
 VALUES = {
-    "--accumulate-on": "cpu",
     "--albedo": "other",
     "--also": "c.####.exr",
     "--beauty": "other",
@@ -120,7 +118,6 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         (xrds_core.denoising, "Denoiser"),
         (xrds_core.exr.limits, "allow"),
         (xrds_core.light_parts.table, "read_renderers"),
-        (xrds_core.sequence.accumulator, "Accumulator"),
         (xrds_core.sequence.cameras, "read_cameras"),
         (xrds_core.sequence.denoise, "denoise_sequence"),
         (xrds_core.info, "info"),

@@ -342,13 +342,13 @@ def test_the_last_render_tells_its_card() -> None:
     request = properties.request_of(scene.xrds)
     layer = history.Layer(scene.name, "ViewLayer", 64, history.scene_settings(scene))
     seconds = {"beauty": 1.0, "accumulate": 0.3, "denoise": 2.0, "total": 3.3}
-    devices = {"accumulate": "Card of Tests", "denoise": "cpu"}
+    devices = {"denoise": "Card of Tests"}
     history.remember(layer, request.settings, seconds, devices)
     last = history.last(scene)
     assert last is not None
     rows = dict(summary.last_render(last))
-    assert rows["Neighbouring Frames"] == "0.3 s, Card of Tests"
-    assert rows["Denoising"] == "2.0 s"
+    assert rows["Neighbouring Frames"] == "0.3 s"
+    assert rows["Denoising"] == "2.0 s, Card of Tests"
     FILE.end()
 
 
@@ -427,11 +427,10 @@ def test_machine_without_add_on_has_defaults() -> None:
 
 
 def test_job_takes_the_preferences(monkeypatch: pytest.MonkeyPatch) -> None:
-    here = machine.Machine("cuda:1", 1 << 30, Path("folder"), accumulate_on="Radeon")
+    here = machine.Machine("cuda:1", 1 << 30, Path("folder"))
     monkeypatch.setattr(properties, "machine", lambda: here)
     settings = bpy.context.scene.xrds
     found = properties.request_of(settings).machine
-    assert found.accumulate_on == "Radeon"
     assert (found.device, found.memory_limit, found.weights) == (
         here.device,
         here.memory_limit,

@@ -75,7 +75,7 @@ def test_without_a_card_nothing_overlaps(life: Any) -> None:
 def test_a_shot_is_the_same_and_finished_while_the_next_is_sampled(
     life: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    job = render_request(scale=1, samples=2, temporal_radius=1, accumulate_on="cpu")
+    job = render_request(scale=1, samples=2, temporal_radius=1)
     expected = dict(shots.render_shot(life, job, FRAMES))
     threads: list[str] = []
     finish = FullSize.finish

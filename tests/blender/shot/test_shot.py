@@ -25,7 +25,8 @@ from xrds_blender.shot import full_size, shot
 from xrds_blender.shot import render as engine_shots
 from xrds_blender.shot.sampling import noisy_frame
 from xrds_core import exr
-from xrds_core.sequence import accumulator
+from xrds_core.sequence import finishing
+from xrds_core.temporal.accumulate import accumulate
 from xrds_core.temporal.frame import SKY_DEPTH
 
 FRAMES = [1, 2, 3, 4, 5]
@@ -175,14 +176,13 @@ def test_under_a_still_camera_frames_continue_one_sequence(
     scene.camera.animation_data_clear()
     scene.cycles.use_adaptive_sampling = False
     accumulated = []
-    accumulate = accumulator.accumulate
 
     def keep(own: Any, others: Any, *more: Any, **how: Any) -> Any:
         found = accumulate(own, others, *more, **how)
         accumulated.extend([found] if others else [])
         return found
 
-    monkeypatch.setattr(accumulator, "accumulate", keep)
+    monkeypatch.setattr(finishing, "accumulate", keep)
     job = render_request(scale=1, temporal_radius=2, seed=4)
     assert len(list(shot.render_shot(scene, job, FRAMES))) == 5
     whole = run_job(scene, lambda p: p.beauty(1, 5, denoise=False, seed=4))
@@ -445,7 +445,6 @@ def test_equirectangular_frames_lend_by_direction(blend: Path) -> None:
         call_engine(scene, method.sample).views[""]
         for _ in map(scene.frame_set, (1, 4))
     )
-    accumulate = accumulator.accumulate
     alone, both = accumulate(here, []), accumulate(here, [there])
     assert both.rejected < 0.45
     hit = np.abs(alone.normal).sum(-1) > 0.5
@@ -561,14 +560,13 @@ def test_views_of_a_pair_lend_to_each_other(
 ) -> None:
     """They see the same floor from two places, each with its own camera."""
     accumulated = []
-    accumulate = accumulator.accumulate
 
     def keep(own: Any, lenders: Any, *more: Any, **how: Any) -> Any:
         found = accumulate(own, lenders, *more, **how)
         accumulated.extend([(own, list(lenders), found)] if lenders else [])
         return found
 
-    monkeypatch.setattr(accumulator, "accumulate", keep)
+    monkeypatch.setattr(finishing, "accumulate", keep)
     animation.render.use_multiview = True
     animation.render.views_format = "STEREO_3D"
     animation.camera.data.stereo.interocular_distance = 0.3

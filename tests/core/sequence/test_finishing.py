@@ -14,9 +14,9 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_core.denoising import Denoiser
 from xrds_core.sequence import finishing
-from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.temporal.frame import Frame, store
+from xrds_core.temporal.vectors import Movement
 
 SHAPE = (320, 480)
 CAMERA = replace(camera(), size=SHAPE[::-1])
@@ -55,7 +55,7 @@ def test_only_the_part_that_lacks_neighbours_is_denoised_again(
         told.append(done)
         return True
 
-    parts = finish_frame(own, others, counting, Accumulator(), keep).picture
+    parts = finish_frame(own, others, counting, Movement(), keep).picture
     assert counting.sizes[0] == SHAPE
     assert len(counting.sizes) == 2
     assert np.prod(counting.sizes[1]) < 0.6 * np.prod(SHAPE)
@@ -63,8 +63,8 @@ def test_only_the_part_that_lacks_neighbours_is_denoised_again(
     assert told[-1] == 1.0
 
     monkeypatch.setattr(finishing, "_PART", 0.0)
-    whole = finish_frame(own, others, Counting(), Accumulator()).picture
-    alone = finish_frame(own, [], Counting(), Accumulator()).picture
+    whole = finish_frame(own, others, Counting(), Movement()).picture
+    alone = finish_frame(own, [], Counting(), Movement()).picture
     rows, columns = PART
     inside = slice(rows.start + 8, rows.stop - 8), slice(columns.start + 8, 462)
     np.testing.assert_array_equal(whole[inside], alone[inside])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from shots import World, camera, view
 
-from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.history import LONGEST, History
 from xrds_core.temporal.frame import Stored, store
 
@@ -19,7 +18,7 @@ def frame(number: int, world: World = STILL) -> Stored:
 
 def run(worlds: list[World]) -> History:
     """The history beside the last of some frames, with a radius."""
-    history = History(Accumulator())
+    history = History()
     frames = [frame(n, world) for n, world in enumerate(worlds)]
     for middle in range(len(frames)):
         around = frames[max(0, middle - RADIUS) : middle + RADIUS + 1]

@@ -21,12 +21,12 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import NotReusable, PictureError, Unfit, UsageError
-from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.denoise import Files, denoise_sequence
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.sequence.names import PassNames
 from xrds_core.sequence.reading import Reading, read_frame
 from xrds_core.temporal.frame import store
+from xrds_core.temporal.vectors import Movement
 
 NUMBERS = range(1, 6)
 
@@ -57,7 +57,7 @@ def finished(numbers: Any, own: int, denoiser: Denoiser) -> Any:
     stored = {n: store(frame(n)) for n in numbers}
     near = sorted((n for n in numbers if n != own), key=lambda n: (abs(n - own), n))
     lenders = [stored[n] for n in near]
-    return finish_frame(stored[own], lenders, denoiser, Accumulator()).picture
+    return finish_frame(stored[own], lenders, denoiser, Movement()).picture
 
 
 def test_files_give_the_picture_that_frames_in_memory_give(
@@ -119,9 +119,9 @@ def test_beside_many_samples_the_picture_of_few_is_that_of_the_frame_alone(
         radiance = other.radiance.copy()
         radiance[:, half:] = np.nan
         lacking.append(store(replace(other, radiance=radiance)))
-    alone = finish_frame(store(own), [], denoiser, Accumulator()).picture
+    alone = finish_frame(store(own), [], denoiser, Movement()).picture
     counting, told = Counting(denoiser), []
-    shot = finish_frame(store(own), lacking, counting, Accumulator(), told.append)
+    shot = finish_frame(store(own), lacking, counting, Movement(), told.append)
     assert len(counting.pictures) == 2
     assert told == [0.0, 0.5, 0.5, 1.0]
     lent = shot.accumulated.samples > 4.0
@@ -136,7 +136,7 @@ def test_where_little_is_reused_everywhere_all_of_it_counts(
 ) -> None:
     own, other = (replace(noisy(n), samples=16 // n**2) for n in (1, 2))
     counting = Counting(denoiser)
-    shot = finish_frame(store(own), [store(other)], counting, Accumulator())
+    shot = finish_frame(store(own), [store(other)], counting, Movement())
     assert 16.5 < shot.accumulated.samples.mean() < 20.5
     assert len(counting.pictures) == 1
     whole = shot.accumulated
@@ -153,7 +153,7 @@ def test_what_is_lent_everywhere_or_nowhere_is_denoised_once(
     for own, *others in (still, (frame(1), nothing)):
         counting = Counting(denoiser)
         lenders = [store(other) for other in others]
-        finish_frame(store(own), lenders, counting, Accumulator())
+        finish_frame(store(own), lenders, counting, Movement())
         assert len(counting.pictures) == 1
 
 
@@ -164,7 +164,7 @@ def test_pixels_without_samples_are_no_holes_in_the_frame_alone(
     own.radiance[10:14, 20:24] = np.nan
     other.radiance[:, 50:] = np.nan  # so that both pictures are made
     counting = Counting(denoiser)
-    finish_frame(store(own), [store(other)], counting, Accumulator())
+    finish_frame(store(own), [store(other)], counting, Movement())
     assert len(counting.pictures) == 2
     assert all(np.isfinite(x[:20, :40]).all() for x in counting.pictures)
 
@@ -356,7 +356,7 @@ def test_data_windows(
     assert part.display_window == sequences.WINDOW
     stored = {n: store(frame(n, window=window, shape=shape)) for n in NUMBERS}
     others = [stored[n] for n in (2, 4, 1, 5)]
-    expected = finish_frame(stored[3], others, denoiser, Accumulator())
+    expected = finish_frame(stored[3], others, denoiser, Movement())
     assert told["frames"][2]["temporal"]["mean_samples"] > 1.5
     inside = (slice(8, -8), slice(8, -8))  # the denoiser looks beyond a crop's edges
     difference = np.abs(picture(path) - expected.picture)[inside]

@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xrds_core.arrays import Array
-from xrds_core.sequence.accumulator import Accumulator
 from xrds_core.sequence.extra_samples import ExtraSamples
 from xrds_core.sequence.history import History
 from xrds_core.sequence.rectangles import rectangles
@@ -85,9 +84,7 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     """
     if not can_save(scene, request, frames):
         return None
-    history = None
-    if can_continue(scene, request):
-        history = History(Accumulator(request.machine.accumulate_on))
+    history = History() if can_continue(scene, request) else None
     least = None
     if not is_even(scene, request):
         _, least = stops_at(scene.cycles, scene.cycles.samples)

@@ -1,1 +1,0 @@
-"""Accumulation on a graphics card of any vendor, by WebGPU."""
