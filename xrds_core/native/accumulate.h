@@ -62,5 +62,26 @@ typedef struct {
     float *samples;              // (H W)
 } Target;
 
+// A pass as a renderer or a file has it: floats, so many of them from row to row, from
+// pixel to pixel and from channel to channel.
+typedef struct {
+    const float *first;
+    int64_t row, column, channel;
+    int32_t channels;
+} Pass;
+
+// A frame to pack: `passes` are radiance (if any), albedo, normal and alpha (if any).
+typedef struct {
+    Pass passes[4];
+    Pass halves[2];              // radiance of both half buffers; first is NULL without any
+    const float *shares;         // (H W): of the first half's samples, or NULL
+    float share;                 // where there are no `shares`
+    float guide_factor;          // of the noise of guides, for the number of samples
+    int32_t count, width, height, has_light;
+    half *picture;               // (H W, channels)
+    uint8_t *invalid;            // (H W)
+    half *noise, *guide_noise;   // as in a Frame, or NULL
+} Packing;
+
 // Rows and columns of a picture, the last ones excluded. The first ones are even.
 typedef struct { int32_t top, bottom, left, right; } Area;

@@ -10,10 +10,6 @@ enum {
     PAD = 4,            // tiles of 2 x 2 pixels around those of a block
     LEVEL_SUMS = 6
 };
-// Beyond this albedo is a lamp, which must not dominate the pixels around it; normals
-// change where nothing else does, so they weigh less.
-static const float BRIGHTEST = 4.0f, NORMAL_SHARE = 0.31622776f;
-
 typedef struct {
     float *values[MOST_CHANNELS], *weights, *reused, *brightness, *moments[MOMENTS];
     float *parts;                                 // planes, `stride` apart

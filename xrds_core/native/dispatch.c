@@ -19,7 +19,13 @@
        (depth, least, most, w, h, top, bottom, scratch)) \
     DO(void, find_spots, (const Target *t, const Neighbour *o, int32_t step, int32_t *pixel, \
                           uint8_t *seen, uint8_t *in_frame, float *scratch), \
-       (t, o, step, pixel, seen, in_frame, scratch))
+       (t, o, step, pixel, seen, in_frame, scratch)) \
+    DO(int64_t, packing_bytes, (const Packing *p, int32_t rows), (p, rows)) \
+    DO(int32_t, pack, (const Packing *p, int32_t top, int32_t bottom, float *scratch), \
+       (p, top, bottom, scratch)) \
+    DO(int32_t, to_halves, (const Pass *p, int32_t width, int32_t top, int32_t bottom, \
+                            int32_t keeps_infinities, half *out), \
+       (p, width, top, bottom, keeps_infinities, out))
 
 #ifdef __x86_64__
 #include <cpuid.h>
@@ -66,8 +72,9 @@ API void limit_level(int32_t most) { most_level = most; }
 // another version would read beyond them.
 API int64_t struct_size(int32_t which) {
     const int64_t sizes[] = {sizeof(Frame), sizeof(Reprojection), sizeof(Places),
-                             sizeof(Neighbour), sizeof(Target)};
-    return which >= 0 && which < 5 ? sizes[which] : -1;
+                             sizeof(Neighbour), sizeof(Target), sizeof(Pass),
+                             sizeof(Packing)};
+    return which >= 0 && which < 7 ? sizes[which] : -1;
 }
 
 KERNELS(EXPORT)

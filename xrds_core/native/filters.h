@@ -45,15 +45,16 @@ INLINE float least_difference(const float *up, const float *at, const float *dow
     return at_most(at_most(level, upright), at_most(falling, rising));
 }
 
-// The standard deviation (h, w) of the noise in guides: their smallest differences, added
-// up over `count` planes.
+// The standard deviation of the noise in guides, of the rows `first` to `last` of planes
+// (h, w): their smallest differences, added up over `count` planes.
 static void noise_of_guides(Row out, float *const *guides, int count, float factor, int h,
-                            int w) {
-    memset(out, 0, (size_t)h * w * sizeof(float));
-    EACH(c, count) EACH(y, h) {
+                            int w, int first, int last) {
+    const size_t n = (size_t)(last - first) * w;
+    memset(out, 0, n * sizeof(float));
+    EACH(c, count) for (int y = first; y < last; y++) {
         const float *at = guides[c] + (size_t)y * w;
         const float *up = y ? at - w : at, *down = y < h - 1 ? at + w : at;
-        Row to = out + (size_t)y * w;
+        Row to = out + (size_t)(y - first) * w;
         LANES(k, w - 2) {
             const float least = least_difference(up, at, down, k, k + 1, k + 2);
             to[k + 1] += least * least;
@@ -65,5 +66,5 @@ static void noise_of_guides(Row out, float *const *guides, int count, float fact
             to[i] += least * least;
         }
     }
-    LANES(i, (size_t)h * w) out[i] = sqrtf(out[i] * (2.0f / 3.0f)) * factor;
+    LANES(i, n) out[i] = sqrtf(out[i] * (2.0f / 3.0f)) * factor;
 }

@@ -11,6 +11,7 @@
 #include "changes.h"
 #include "similarity.h"
 #include "registration.h"
+#include "packing.h"
 
 // ---- what an area of a frame becomes ----
 
@@ -221,4 +222,38 @@ void NAME(find_spots)(const Target *t, const Neighbour *o, int32_t step, int32_t
         }
         pixel += count, seen += count, in_frame += count;
     }
+}
+
+int64_t NAME(packing_bytes)(const Packing *p, int32_t rows) {
+    return (int64_t)(packing_floats(p, rows) * sizeof(float));
+}
+
+int32_t NAME(pack)(const Packing *p, int32_t top, int32_t bottom, float *scratch) {
+    int32_t any = 0;
+    for (int y = top; y < bottom; y++) {
+        uint8_t *invalid = p->invalid + (size_t)y * p->width;
+        mark_invalid(p, y, invalid);
+        pack_row(p, y, invalid);
+        if (p->noise && p->halves[0].first) pack_noise(p, y, invalid);
+        EACH(i, p->width) any |= invalid[i];
+    }
+    if (p->guide_noise) pack_guide_noise(p, top, bottom, scratch);
+    return any;
+}
+
+int32_t NAME(to_halves)(const Pass *p, int32_t width, int32_t top, int32_t bottom,
+                        int32_t keeps_infinities, half *out) {
+    int32_t any = 0;
+    for (int y = top; y < bottom; y++) EACH(c, p->channels) {
+        const float *from = channel_of(p, y, c);
+        half *restrict to = out + (size_t)y * width * p->channels + c;
+        const int64_t step = p->column, deep = p->channels;
+        LANES(i, width) {
+            const float x = from[i * step];
+            const half kept = to_half(x), zeroed = finite_half(is_finite(x) ? x : 0.0f);
+            to[i * deep] = keeps_infinities ? kept : zeroed;
+            any |= to[i * deep] & 0x7fff;
+        }
+    }
+    return any;
 }

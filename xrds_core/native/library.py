@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from ctypes import CDLL, POINTER, c_double, c_float, c_int32, c_int64, c_void_p, sizeof
+from ctypes import CDLL, POINTER, c_double, c_int32, c_int64, c_void_p, sizeof
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import XRDSError
-from .structures import IN_ORDER, Area, Neighbour, Target
+from .structures import IN_ORDER, Area, Neighbour, Packing, Pass, Target
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,6 +34,9 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "accumulate": (c_double, (POINTER(Target), Area, c_void_p)),
     "find_rims": (None, (c_void_p, c_void_p, *(c_int32,) * 5)),
     "find_ranges": (None, (*(c_void_p,) * 3, *(c_int32,) * 4, c_void_p)),
+    "packing_bytes": (c_int64, (POINTER(Packing), c_int32)),
+    "pack": (c_int32, (POINTER(Packing), c_int32, c_int32, c_void_p)),
+    "to_halves": (c_int32, (POINTER(Pass), *(c_int32,) * 4, c_void_p)),
     "find_spots": (
         None,
         (POINTER(Target), POINTER(Neighbour), c_int32, *(c_void_p,) * 4),
@@ -112,6 +115,16 @@ class Arrays:
         x = np.ascontiguousarray(x)
         self._kept.append(x)
         return x.ctypes.data
+
+    def strided(self, x: NDArray[Any]) -> tuple[int, tuple[int, ...]]:
+        """Return the address of the first float32, and how many lie between the first
+        ones along each axis.
+        """
+        x = x.astype(np.float32, copy=False)
+        if any(step % x.itemsize for step in x.strides) or x.ctypes.data % x.itemsize:
+            x = np.ascontiguousarray(x)
+        self._kept.append(x)
+        return x.ctypes.data, tuple(step // x.itemsize for step in x.strides)
 
     def addresses(self, addresses: Sequence[int | None]) -> Any:
         """Return a C array of addresses."""

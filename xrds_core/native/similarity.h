@@ -12,8 +12,6 @@ static const float BEARABLE = 0.03f;   // guides alone: the error at which neigh
 static const float GUIDES_FACTOR = 2.0493902f;  // the root of 1.2 (1 + 2.5)
 enum { SMOOTH = 3, NOISE_AREA = 7, MEAN = 3, LIGHT_AREA = 5 };  // pixels across
 
-INLINE float limited(float x) { return at_most(at_least(x, -BRIGHTEST), BRIGHTEST); }
-
 INLINE float discounted(float error, float unsure) {
     error = at_least(error, 0.0f);
     return error * error / (error + unsure + TINY);
@@ -119,7 +117,8 @@ static void prepare_guides(Block *b) {
         Row to = scaled[c] = b->sums[0].values[c];
         LANES(i, n) to[i] = limited(own[i] * scale);
     }
-    noise_of_guides(b->b, scaled, t->channels, GUIDES_FACTOR, b->rows, b->width);
+    noise_of_guides(b->b, scaled, t->channels, GUIDES_FACTOR, b->rows, b->width,
+                    0, b->rows);
     LANES(i, n) b->b[i] *= b->b[i];
     mean_of(b, b->variance, b->b, b->a, NOISE_AREA);
 }

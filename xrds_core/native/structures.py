@@ -6,6 +6,8 @@ from ctypes import POINTER, Structure, c_float, c_int32, c_int64, c_void_p
 
 
 class Frame(Structure):
+    """One frame of a shot."""
+
     _fields_ = (
         ("picture", c_void_p),
         ("noise", c_void_p),
@@ -22,6 +24,8 @@ class Frame(Structure):
 
 
 class Reprojection(Structure):
+    """From the pixels of one frame to those of another."""
+
     _fields_ = (
         ("matrix", c_float * 16),
         ("columns", c_void_p),
@@ -36,6 +40,8 @@ class Reprojection(Structure):
 
 
 class Places(Structure):
+    """Places of some pixels that replace those of the surface."""
+
     _fields_ = (
         ("pixels", c_void_p),
         ("x", c_void_p),
@@ -45,6 +51,8 @@ class Places(Structure):
 
 
 class Neighbour(Structure):
+    """A neighbour, and how it is reused."""
+
     _fields_ = (
         ("frame", Frame),
         ("forth", Reprojection),
@@ -67,6 +75,8 @@ class Neighbour(Structure):
 
 
 class Target(Structure):
+    """The frame that samples are gathered for, and where results go."""
+
     _fields_ = (
         ("frame", Frame),
         ("guide_noise", c_void_p),
@@ -88,6 +98,38 @@ class Target(Structure):
     )
 
 
+class Pass(Structure):
+    """A pass: floats, with steps between rows, pixels and channels."""
+
+    _fields_ = (
+        ("first", c_void_p),
+        ("row", c_int64),
+        ("column", c_int64),
+        ("channel", c_int64),
+        ("channels", c_int32),
+    )
+
+
+class Packing(Structure):
+    """A frame to pack."""
+
+    _fields_ = (
+        ("passes", Pass * 4),
+        ("halves", Pass * 2),
+        ("shares", c_void_p),
+        ("share", c_float),
+        ("guide_factor", c_float),
+        ("count", c_int32),
+        ("width", c_int32),
+        ("height", c_int32),
+        ("has_light", c_int32),
+        ("picture", c_void_p),
+        ("invalid", c_void_p),
+        ("noise", c_void_p),
+        ("guide_noise", c_void_p),
+    )
+
+
 class Area(Structure):
     """Rows and columns of a picture, the last ones excluded; the first ones even."""
 
@@ -99,5 +141,5 @@ class Area(Structure):
     )
 
 
-IN_ORDER = (Frame, Reprojection, Places, Neighbour, Target)
+IN_ORDER = (Frame, Reprojection, Places, Neighbour, Target, Pass, Packing)
 """As `struct_size` of the library counts them."""

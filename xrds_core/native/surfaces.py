@@ -1,4 +1,4 @@
-"""What depths tell of surfaces: where one is beside a nearer one, how deep they reach."""
+"""What depths tell of surfaces: which lie beside nearer ones, how deep they reach."""
 
 from __future__ import annotations
 

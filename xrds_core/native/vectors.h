@@ -82,6 +82,12 @@ INLINE float arc_tangent(float y, float x) {  // atan2 (Cephes' atanf)
     return copysignf(x < 0.0f ? PI - angle : angle, y);
 }
 
+// Beyond this albedo is a lamp, which must not dominate the pixels around it; normals
+// change where nothing else does, so they weigh less.
+static const float BRIGHTEST = 4.0f, NORMAL_SHARE = 0.31622776f;
+
+INLINE float limited(float x) { return at_most(at_least(x, -BRIGHTEST), BRIGHTEST); }
+
 // The square root of luminance (Rec.709).
 INLINE float root_of_luminance(float r, float g, float b) {
     return sqrtf(at_least(r * 0.2126f + g * 0.7152f + b * 0.0722f, 0.0f));

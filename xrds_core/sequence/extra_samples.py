@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..temporal.frame import pack, pack_counts, pack_parts
+from ..temporal.packing import pack, pack_counts, pack_parts
 from ..temporal.noise import brightness
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..temporal.accumulate import accumulate, sample_counts
-from ..temporal.frame import pack, pack_counts, pack_parts
+from ..temporal.packing import pack, pack_counts, pack_parts
 from ..temporal.half_floats import floats
 from ..temporal.vectors import Movement
 

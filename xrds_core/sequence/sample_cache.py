@@ -14,7 +14,7 @@ import numpy as np
 
 from .. import exr
 from ..exr.openexr_io import Part
-from ..temporal.frame import noise_in, pack_counts
+from ..temporal.packing import pack_counts, pack_frame
 from ..temporal.half_floats import LARGEST_HALF
 from .cameras import to_header
 from .names import CAMERA_NORMAL, COUNTS, NOISE, NOISY, PATH_LENGTH
@@ -70,7 +70,7 @@ def write_cached_frame(path: Path, frame: Frame, origin: Origin) -> None:
 
 def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
     assert frame.radiance is not None
-    passes: list[tuple[str, str, Array]] = [
+    passes: list[tuple[str, str, NDArray[Any]]] = [
         (NOISY, "RGB", frame.radiance),
         ("Denoising Albedo", "RGB", frame.albedo),
         (CAMERA_NORMAL, "XYZ", frame.normal),
@@ -97,7 +97,8 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
 
 def _noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
-    noise = noise_in(frame)
+    noise = pack_frame(frame)[2]
+    assert noise is not None
     parts = (noise.brightness, noise.difference, noise.guides)
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 

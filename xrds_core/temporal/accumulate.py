@@ -181,5 +181,3 @@ def _unpacked(
         frames,
         {name: light.get(name, dark) for name in target.parts},
     )
-
-

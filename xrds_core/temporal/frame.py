@@ -16,10 +16,9 @@ import numpy as np
 
 from ..errors import PictureError
 from ..native.surfaces import find_rims
-from .half_floats import LARGEST_HALF
 from .halves import Halves
 from .local_filters import extreme
-from .noise import Noise, noise_of
+from .packing import pack_counts, pack_frame, pack_parts, pack_vectors
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..arrays import Array
+    from .noise import Noise
 
     Matrix = NDArray[np.float64]
 
@@ -188,7 +188,7 @@ class Stored:
     1 / depth, 0 without a hit; the depth itself for an orthographic camera; NaN where
     unknown. `invalid` (H W) is the validity mask, negated: pixels that held NaN or
     infinities and are 0 now; None if there were none. `counts` (H W): samples of each
-    pixel where they differ. `noise` is that of `noise_in`, None in a frame of guides
+    pixel where they differ. `noise` is None in a frame of guides
     alone. `image` (H W) is as `inverse_depth`, of the image that a mirror or glass
     shows, NaN where there is none; None if there is none anywhere. `parts` (H W, 3), by
     name, are light that the radiance is made of; None for one that is dark everywhere.
@@ -241,9 +241,7 @@ def store(frame: Frame) -> Stored:
 
     Values beyond +-65504, the largest half float, are clipped.
     """
-    passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
-    picture, invalid = pack(*passes)
-    noise = None if frame.radiance is None else noise_in(frame)
+    picture, invalid, noise = pack_frame(frame)
     return Stored(
         number=frame.number,
         camera=frame.camera,
@@ -252,62 +250,13 @@ def store(frame: Frame) -> Stored:
         picture=picture,
         inverse_depth=_inverse_depth(frame),
         invalid=invalid if invalid.any() else None,
-        vector=_half(frame.vector),
+        vector=None if frame.vector is None else pack_vectors(frame.vector),
         still=frame.still,
         counts=None if frame.counts is None else pack_counts(frame.counts),
-        noise=None if noise is None else noise.without(invalid),
+        noise=noise,
         image=_image(frame),
         parts=pack_parts(frame.parts),
     )
-
-
-def pack(
-    radiance: Array | None,
-    albedo: Array,
-    normal: Array,
-    alpha: Array | None,
-) -> tuple[NDArray[np.float16], NDArray[np.bool_]]:
-    """Return `Stored.picture` of passes as in `Frame`, and its invalid pixels (H W)."""
-    parts = [albedo, normal]
-    if radiance is not None:
-        parts.insert(0, radiance)
-    if alpha is not None:
-        parts.append(alpha[..., None])
-    picture = np.concatenate(parts, axis=-1, dtype=np.float32)
-    picture = picture.reshape(-1, picture.shape[-1])
-    invalid = ~np.isfinite(picture).all(axis=-1)
-    picture[invalid] = 0.0
-    np.clip(picture, -LARGEST_HALF, LARGEST_HALF, out=picture)
-    return picture.astype(np.float16), invalid
-
-
-def pack_parts(parts: Mapping[str, Array]) -> dict[str, NDArray[np.float16] | None]:
-    """Return `Stored.parts`; a part is 0 where it is not finite, the picture stays."""
-    return {name: _packed_part(part) for name, part in parts.items()}
-
-
-def _packed_part(part: Array) -> NDArray[np.float16] | None:
-    if not part.any():
-        return None
-    finite = np.nan_to_num(part.reshape(-1, 3), posinf=0.0, neginf=0.0)
-    np.clip(finite, -LARGEST_HALF, LARGEST_HALF, out=finite)
-    return finite.astype(np.float16)
-
-
-def noise_in(frame: Frame) -> Noise:
-    """Return the noise of a frame with radiance."""
-    assert frame.radiance is not None
-    parts = [frame.albedo, frame.normal]
-    if frame.alpha is not None:
-        parts.append(frame.alpha[..., None])
-    guides = np.concatenate(parts, axis=-1)
-    return noise_of(frame.halves or frame.radiance, guides, frame.samples)
-
-
-def pack_counts(counts: Array) -> NDArray[np.float16]:
-    """Flat, in half floats; what is no count becomes 0."""
-    counts = np.nan_to_num(counts.ravel(), posinf=0.0, neginf=0.0)
-    return np.clip(counts, 0.0, LARGEST_HALF).astype(np.float16)
 
 
 def _inverse_depth(frame: Frame) -> Array:
@@ -338,10 +287,3 @@ def _image(frame: Frame) -> Array | None:
         return None
     image = np.where(behind, end, np.float32(np.nan)).ravel()
     return image if frame.camera.orthographic else np.float32(1.0) / image
-
-
-def _half(vector: Array | None) -> NDArray[np.float16] | None:
-    if vector is None:
-        return None
-    with np.errstate(over="ignore"):  # vectors beyond half's range are useless
-        return vector.reshape(-1, 4).astype(np.float16)

@@ -193,9 +193,8 @@ def pair(
         object_motion = None
     if object_motion is not None:
         object_motion = _with_rims(object_motion, here, there)
-    return Pair(
-        here, there, forth, back, extent or find_ranges(here.inverse_depth, here.shape), object_motion
-    )
+    extent = extent or find_ranges(here.inverse_depth, here.shape)
+    return Pair(here, there, forth, back, extent, object_motion)
 
 
 def _with_rims(

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..arrays import Array
-    from .halves import Halves
 
 # Albedo beyond this is a lamp; it must not dominate the pixels around it.
 _BRIGHTEST = 4.0
@@ -118,37 +117,12 @@ def guides_of(passes: Array) -> Array:
     return guides
 
 
-def noise_of(light: Halves | Array, guides: Array, samples: float) -> Noise:
-    """Return the noise of a frame of `samples` per pixel; finite everywhere.
-
-    `light` is the half buffers or, where there are none, radiance (H, W, 3). `guides`
-    (H, W, 6 or 7) are albedo, normal and alpha, which may be missing.
-    """
-    with np.errstate(all="ignore"):  # of infinities
-        if isinstance(light, np.ndarray):
-            parts = _apart_from_around(light, guides[..., :3], samples)
-        else:
-            parts = _apart_in_halves(light)
-        return Noise.of(*parts, noise_of_guides(guides_of(guides), samples))
+def guide_factor(samples: float) -> float:
+    """Return the standard deviation of guides to their smallest difference."""
+    return (_LEAST * (1.0 + _OF_ONE_SAMPLE / samples)) ** 0.5
 
 
-def noise_of_guides(guides: Array, samples: float) -> Array:
-    """Return the standard deviation (H, W) of `guides_of` a frame, of all channels."""
-    least = _least_difference(guides)
-    least *= np.float32((_LEAST * (1.0 + _OF_ONE_SAMPLE / samples)) ** 0.5)
-    return least
-
-
-def _apart_in_halves(halves: Halves) -> tuple[Array, Array]:
-    """Return the mean of both halves' square roots of luminance, and the difference."""
-    roots = brightness(halves.radiance)
-    share = halves.share()
-    # the standard deviation of the mean: half the difference of equal halves
-    spread = np.sqrt(share * (np.float32(1.0) - share))
-    return (roots[0] + roots[1]) / 2, (roots[0] - roots[1]) * spread
-
-
-def _apart_from_around(
+def apart_from_around(
     radiance: Array, albedo: Array, samples: float
 ) -> tuple[Array, Array]:
     """Return the square root of luminance, and an estimate of the halves' difference.
@@ -167,28 +141,6 @@ def _apart_from_around(
     apart = np.where(less, plain, even) * np.float32(more**0.5)
     signs = np.random.default_rng(_SEED).integers(0, 2, apart.shape, np.int8)
     return root, np.where(signs > 0, apart, -apart)
-
-
-def _least_difference(x: Array) -> Array:
-    """Return (H, W): the smallest second difference of (H, W, C), over its channels.
-
-    In four directions, scaled so that each has the variance of the noise.
-    """
-    height, width = x.shape[:2]
-    half = np.pad(x, ((1, 1), (1, 1), (0, 0)), "edge") * np.float32(0.5)
-    least = None
-    for row, column in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        pair = [
-            half[1 + i * row : 1 + i * row + height, 1 + i * column :][:, :width]
-            for i in (1, -1)
-        ]
-        apart = x - pair[0]
-        apart -= pair[1]
-        np.abs(apart, out=apart)
-        least = apart if least is None else np.minimum(least, apart, out=least)
-    assert least is not None
-    squares = np.einsum("ijk,ijk->ij", least, least)
-    return np.asarray(np.sqrt(squares * np.float32(2 / 3)))
 
 
 def _packed(x: Array) -> NDArray[np.float16]:

@@ -188,9 +188,7 @@ class _Call:
         self._all = (structures.Neighbour * max(len(used), 1))(
             *(self._neighbour(x, group) for x, group in used)
         )
-        self.target.all = ctypes.cast(
-            self._all, ctypes.POINTER(structures.Neighbour)
-        )
+        self.target.all = ctypes.cast(self._all, ctypes.POINTER(structures.Neighbour))
 
     def run(self) -> float:
         """Accumulate the whole frame; returns how many samples were reused."""

@@ -137,7 +137,6 @@ def measured(run: Run) -> Iterator[Row]:
 
 def _frame(run: Run) -> Iterator[tuple[str, Row]]:
     """Accumulate and denoise the middle frame of a shot of synthetic samples."""
-    import numpy as np
 
     from xrds_core.denoising import Denoiser
     from xrds_core.sequence.finishing import finish_frame

@@ -15,6 +15,7 @@ from shots import World, camera, view
 from xrds_blender.shot.pace.threshold import Threshold, counts_of_file, learn
 from xrds_core.sequence.same_picture import BLOCK
 from xrds_core.temporal.frame import Stored, store
+from xrds_core.temporal.noise import Noise
 
 SHAPE = (64, 192)
 LEAST, MOST = 48, 4096
@@ -24,8 +25,10 @@ def stored(noise: NDArray[np.float32]) -> Stored:
     """A frame whose halves' roots of luminance differ by so much."""
     frame = store(view(1, camera(), World(), shape=SHAPE).frame)
     assert frame.noise is not None
-    apart = noise.ravel().astype(frame.noise.difference.dtype)
-    return replace(frame, noise=replace(frame.noise, difference=apart))
+    light, guides = (
+        x.astype(np.float32) for x in (frame.noise.brightness, frame.noise.guides)
+    )
+    return replace(frame, noise=Noise.of(light, noise.ravel(), guides))
 
 
 @pytest.mark.parametrize(

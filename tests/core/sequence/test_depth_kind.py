@@ -35,9 +35,7 @@ def told(change: Change, make: Callable[[int], Frame] = turned) -> list[str]:
     said: list[str] = []
     kind = DepthKind(said.append)
     frames = [make(n) for n in (1, 2, 3)]
-    stored = [
-        store(replace(x, depth=np.float32(1.0) * change(x))) for x in frames
-    ]
+    stored = [store(replace(x, depth=np.float32(1.0) * change(x))) for x in frames]
     for own in stored:
         kind.look(own, [x for x in stored if x is not own])
     return said

@@ -20,6 +20,7 @@ from xrds_core.sequence.worth import Ratio
 from xrds_core.temporal.accumulate import Accumulated, accumulate
 from xrds_core.temporal.frame import Stored, store
 from xrds_core.temporal.halves import Halves
+from xrds_core.temporal.noise import Noise
 
 Array = NDArray[np.float32]
 SHAPE = (192, 256)
@@ -114,7 +115,8 @@ def test_blocks_whose_noise_nobody_sees_lack_nothing() -> None:
     root = noise.brightness.astype(np.float32).reshape(found[1].shape)
     apart = root * np.float32(0.01)
     apart[: BLOCK + 4] = root[: BLOCK + 4] * np.float32(0.0005)  # noise is smoothed
-    noise = replace(noise, difference=apart.ravel().astype(noise.difference.dtype))
+    guides = noise.guides.astype(np.float32)
+    noise = Noise.of(root.ravel(), apart.ravel(), guides)
     own = replace(found[1], noise=noise)
     blocks = gain(accumulate(own, []), own).blocks
     assert np.isinf(blocks[0]).all()

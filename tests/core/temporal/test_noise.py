@@ -5,19 +5,32 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from shots import camera
 
-from xrds_core.temporal.noise import noise_of, noise_of_guides
+from xrds_core.temporal.frame import Frame
+from xrds_core.temporal.noise import Noise
+from xrds_core.temporal.packing import pack_frame
 
 SHAPE = 64, 96
 RNG = np.random.default_rng(5)
 
 
+def noise_of(
+    radiance: NDArray[np.float32], albedo: NDArray[np.float32], samples: float
+) -> Noise:
+    """The noise told of a frame without halves, whose passes are grey (H, W)."""
+    light, guide = (np.repeat(x[..., None], 3, axis=-1) for x in (radiance, albedo))
+    flat, depth = np.zeros((*SHAPE, 3), np.float32), np.ones(SHAPE, np.float32)
+    frame = Frame(1, camera(), light, guide, flat, depth, samples)
+    noise = pack_frame(frame)[2]
+    assert noise is not None
+    return noise
+
+
 def found_in(albedo: NDArray[np.float32], samples: float) -> float:
     """The root of the mean variance found of an albedo (H, W), away from its rim."""
-    guides = np.zeros((*SHAPE, 6), np.float32)
-    guides[..., :3] = albedo[..., None]
-    found = noise_of_guides(guides, samples)
-    inner = found[1:-1, 1:-1]
+    found = noise_of(np.ones(SHAPE, np.float32), albedo, samples).guides
+    inner = found.astype(np.float32).reshape(SHAPE)[1:-1, 1:-1]
     return float(np.sqrt(np.square(inner).mean()))
 
 
@@ -45,10 +58,7 @@ def test_edges_and_lines_are_no_noise(slope: tuple[int, int]) -> None:
 
 def noise_of_light(radiance: NDArray[np.float32], albedo: NDArray[np.float32]) -> float:
     """The same of the light of a frame of 16 samples without halves."""
-    guides = np.zeros((*SHAPE, 6), np.float32)
-    guides[..., :3] = albedo[..., None]
-    light = np.repeat(radiance[..., None], 3, axis=-1)
-    found = noise_of(light, guides, 16.0).difference
+    found = noise_of(radiance, albedo, 16.0).difference.astype(np.float32)
     inner = found.reshape(SHAPE)[4:-4, 4:-4]
     return float(np.sqrt(np.square(inner).mean()))
 

@@ -60,9 +60,7 @@ def test_bad_pixels_of_a_part_are_dark_in_it_alone() -> None:
     found = accumulate(stored, [])
     assert not found.parts["lamp"][5, 6].any()
     assert found.parts["sky"][5, 6].any()
-    assert np.array_equal(
-        found.radiance, accumulate(store(frame), []).radiance
-    )
+    assert np.array_equal(found.radiance, accumulate(store(frame), []).radiance)
 
 
 def test_frames_of_other_parts_are_refused() -> None:

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from shots import camera
 
 from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import Frame, Stored, noise_in, store
+from xrds_core.temporal.frame import Frame, Stored, store
 from xrds_core.temporal.halves import Halves
 from xrds_core.temporal.local_filters import box
+from xrds_core.temporal.packing import pack_frame
 
 Array = NDArray[np.float32]
 SHAPE = (48, 64)
@@ -172,7 +173,8 @@ def test_noise_is_finite_whatever_the_halves_hold(bad: float) -> None:
     noisy.halves.radiance[0, 3, 4] = bad
     noisy.albedo[5, 6] = bad
     with np.errstate(all="raise"):
-        noise = noise_in(noisy)
+        noise = pack_frame(noisy)[2]
+    assert noise is not None
     for array in (noise.brightness, noise.difference, noise.guides):
         assert np.isfinite(array).all()
 

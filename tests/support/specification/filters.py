@@ -31,3 +31,17 @@ def box(x, size):
 def mean(x, valid, size):
     """The same of those `valid` (0 or 1)."""
     return box(x * valid, size) / np.maximum(box(valid, size), np.float32(1e-9))
+
+
+def least_difference(x):
+    """The smallest second difference of (H, W, C), in four directions."""
+    height, width = x.shape[:2]
+    wide = np.pad(x, ((1, 1), (1, 1), (0, 0)), "edge")
+
+    def shifted(row, column):
+        return wide[1 + row : 1 + row + height, 1 + column : 1 + column + width]
+
+    steps = ((0, 1), (1, 0), (1, 1), (1, -1))
+    return np.minimum.reduce(
+        [np.abs(x - (shifted(i, j) + shifted(-i, -j)) / 2) for i, j in steps]
+    )

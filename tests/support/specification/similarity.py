@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from xrds_core.temporal.noise import brightness as root_of_luminance
-from xrds_core.temporal.noise import guides_of, noise_of_guides
+from xrds_core.temporal.noise import guide_factor, guides_of
 from xrds_core.temporal.similarity import guide_area, penalties
 
-from .filters import box, mean, total
+from .filters import box, least_difference, mean, total
 
 UNSURE = 6.0
 SMOOTH, NOISE_AREA, MEAN, LIGHT_AREA, LIGHT = 3, 7, 3, 5, 4.0
@@ -16,6 +16,12 @@ DARKEST_ALBEDO, DARKEST_ROOT, EVEN_NOISE = 0.02, 0.1, 0.1
 BEARABLE = 0.03
 TILE, AREAS, NEAR, CHANCE = 2, (1, 2, 4, 8), 1, 10.0
 TINY = np.float32(1e-9)
+
+
+def noise_of_guides(guides, samples):
+    """The standard deviation (H, W) of `guides_of` a frame, of all channels."""
+    square = np.square(least_difference(guides)).sum(axis=-1)
+    return np.sqrt(square * np.float32(2 / 3)) * np.float32(guide_factor(samples))
 
 
 def discounted(error, unsure):

@@ -45,7 +45,9 @@ class Work:
 
     def means(self, groups, guess=None):
         frame = self.target
-        own = np.hstack([floats(frame.picture), *(self.part(frame, x) for x in self.lit)])
+        own = np.hstack(
+            [floats(frame.picture), *(self.part(frame, x) for x in self.lit)]
+        )
         known = np.ones(len(own), bool) if frame.invalid is None else ~frame.invalid
         judge = self.judge(known)
         sums = [self.sums(group, judge, guess) for group in groups]
@@ -71,7 +73,9 @@ class Work:
         channels = frame.picture.shape[1]
         if channels % 3:
             passes = [found[:, k : min(k + 3, channels)] for k in range(0, channels, 3)]
-            planes = passes + [found[:, k : k + 3] for k in range(channels, found.shape[1], 3)]
+            planes = passes + [
+                found[:, k : k + 3] for k in range(channels, found.shape[1], 3)
+            ]
         planes = [np.ascontiguousarray(x).reshape(*frame.shape, -1) for x in planes]
         count = -(-channels // 3)
         return Means(planes[:count], planes[count:], total.reshape(frame.shape), reused)
@@ -92,7 +96,10 @@ class Work:
         frame = self.target
         channels = frame.picture.shape[1] + 3 * len(self.lit)
         count = len(frame.picture)
-        values, (bright, weights, shares) = np.zeros((count, channels)), np.zeros((3, count))
+        values, (bright, weights, shares) = (
+            np.zeros((count, channels)),
+            np.zeros((3, count)),
+        )
         summed = np.zeros((5, count), np.float32)
         for found in group:
             if found.pair and not found.is_reused:
@@ -146,7 +153,10 @@ class Work:
         parts = [self.part(other, name)[pixel] for name in self.lit]
         light = ()
         if other.noise is not None and self.target.has_light:
-            light = floats(other.noise.brightness[pixel]), floats(other.noise.difference[pixel])
+            light = (
+                floats(other.noise.brightness[pixel]),
+                floats(other.noise.difference[pixel]),
+            )
         return np.hstack([picture, *parts]), light
 
     def part(self, frame, name):
