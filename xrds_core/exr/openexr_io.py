@@ -145,6 +145,15 @@ def _is_shadowed() -> bool:
     return sys.platform == "linux" and hasattr(ctypes.CDLL(None), "exr_start_read")
 
 
+@cache
+def _library() -> Any:
+    """OpenEXR, on all processors: by itself it reads and writes on one."""
+    import OpenEXR
+
+    OpenEXR.set_global_thread_count(os.cpu_count() or 1)
+    return OpenEXR
+
+
 def _read(path: str | Path, limit: int) -> list[Part]:
     parts = _opened(path, limit).parts
     return [
@@ -177,24 +186,22 @@ def _part(part: Any, channels: dict[str, Pixels]) -> Part:
 
 
 def _headers(path: str | Path, limit: float = math.inf) -> Any:
-    import OpenEXR
-
+    openexr = _library()
     with readable(path) as there:
-        headers = OpenEXR.File(str(there), header_only=True).parts
+        headers = openexr.File(str(there), header_only=True).parts
     check_claims(path, [part.header for part in headers], limit)
     return headers
 
 
 def _opened(path: str | Path, limit: int) -> Any:
     """Return the library's file with all its pixels; PictureError if not whole."""
-    import OpenEXR
-
+    openexr = _library()
     try:
         # OpenEXR leaves out a part that it cannot read and says why on stdout
         with _silent_library(), redirect_stdout(StringIO()) as output:
             headers = _headers(path, limit)
             with readable(path) as there:
-                file = OpenEXR.File(str(there), separate_channels=True)
+                file = openexr.File(str(there), separate_channels=True)
     except _FAULTS as error:
         raise _incomplete(path, error) from error
     if not file.parts or len(file.parts) != len(headers):
@@ -206,11 +213,10 @@ def _opened(path: str | Path, limit: int) -> Any:
 
 def _bound_ringing(part: Any) -> None:
     """Bound what DWA decodes as infinite: it rings near the largest half."""
-    import OpenEXR
-
+    openexr = _library()
     if part.header["compression"] in (
-        OpenEXR.DWAA_COMPRESSION,
-        OpenEXR.DWAB_COMPRESSION,
+        openexr.DWAA_COMPRESSION,
+        openexr.DWAB_COMPRESSION,
     ):
         for channel in part.channels.values():
             if channel.pixels.dtype == np.float16:
@@ -258,12 +264,11 @@ def _silent_library() -> Iterator[None]:
 
 
 def _write(path: str | Path, part: Part, codec: str) -> None:
-    import OpenEXR
-
+    openexr = _library()
     compression = "NO" if codec == "none" else codec.upper()
     header = {
-        "compression": getattr(OpenEXR, f"{compression}_COMPRESSION"),
-        "type": OpenEXR.scanlineimage,
+        "compression": getattr(openexr, f"{compression}_COMPRESSION"),
+        "type": openexr.scanlineimage,
     }
     for name, value in part.attributes.items():
         matrix = isinstance(value, list)
@@ -277,7 +282,7 @@ def _write(path: str | Path, part: Part, codec: str) -> None:
             _write_dwa(path, header, planes)
             return
         with _silent_library():
-            OpenEXR.File(header, planes).write(str(path))
+            openexr.File(header, planes).write(str(path))
     except (OSError, RuntimeError, ValueError) as error:
         raise PictureError(str(error)) from error
 
@@ -290,15 +295,14 @@ def _write_dwa(
     DWA stores infinity as 0, and light near the largest half may be decoded as
     infinity: what is, is bounded lower.
     """
-    import OpenEXR
-
+    openexr = _library()
     halves = [name for name, x in planes.items() if x.dtype == np.float16]
     most = dict.fromkeys(planes, math.inf) | dict.fromkeys(halves, LARGEST_HALF)
     while True:
         bounded = {name: _bounded(x, most[name]) for name, x in planes.items()}
         with _silent_library():
-            OpenEXR.File(dict(header), dict(bounded)).write(str(path))
-            (read,) = OpenEXR.File(str(path), separate_channels=True).parts
+            openexr.File(dict(header), dict(bounded)).write(str(path))
+            (read,) = openexr.File(str(path), separate_channels=True).parts
         over = [
             name
             for name, channel in read.channels.items()
@@ -324,14 +328,13 @@ def _copy(
     metadata: Mapping[str, str],
     limit: int,
 ) -> None:
-    import OpenEXR
-
+    openexr = _library()
     if alone:
         ((number, only),) = planes.items()
         whole = _whole_headers(source)[number].header
         header = {k: v for k, v in whole.items() if k not in _OF_CHANNELS}
         header["compression"] = _lossless(header["compression"])
-        header["type"] = OpenEXR.scanlineimage
+        header["type"] = openexr.scanlineimage
         if window is not None:
             header["dataWindow"] = _corners(window)
         header |= metadata
@@ -346,7 +349,7 @@ def _copy(
             file.parts[number].header |= metadata
     try:
         if alone:
-            file = OpenEXR.File(header, channels)
+            file = openexr.File(header, channels)
         else:
             _make_writable(file.parts)
         with _silent_library():
@@ -383,14 +386,13 @@ def _corners(window: Window) -> tuple[Any, Any]:
 
 def _put(channels: dict[str, Any], planes: Mapping[str, Pixels]) -> None:
     """Replace or add channels of a part."""
-    import OpenEXR
-
+    openexr = _library()
     for name, pixels in planes.items():
         old = channels[name].pixels if name in channels else None
         if old is not None and old.dtype.kind == "f":
             old[...] = fitting(pixels, old.dtype)
         else:  # no integers, in which light would be cut to 0
-            channels[name] = OpenEXR.Channel(name, np.ascontiguousarray(pixels))
+            channels[name] = openexr.Channel(name, np.ascontiguousarray(pixels))
 
 
 def _make_writable(parts: Any) -> None:
@@ -400,29 +402,27 @@ def _make_writable(parts: Any) -> None:
     writes none; nor does it write channels of different sizes, so that their values are
     repeated.
     """
-    import OpenEXR
-
+    openexr = _library()
     for part in parts:
         part.header["compression"] = _lossless(part.header["compression"])
         if "tiles" in part.header:
             tiles = part.header["tiles"]
-            tiles.mode = OpenEXR.ONE_LEVEL
+            tiles.mode = openexr.ONE_LEVEL
             part.header["tiles"] = tiles
         for name, channel in part.channels.items():
             across, down = channel.xSampling, channel.ySampling
             if (across, down) != (1, 1):
-                part.channels[name] = OpenEXR.Channel(
+                part.channels[name] = openexr.Channel(
                     name, _repeated(channel.pixels, across, down, part)
                 )
 
 
 def _lossless(compression: Any) -> Any:
     """ZIP in place of what would lose some of all channels a second time."""
-    import OpenEXR
-
+    openexr = _library()
     lossy = ("B44", "B44A", "DWAA", "DWAB")
-    losses = [getattr(OpenEXR, f"{name}_COMPRESSION") for name in lossy]
-    return OpenEXR.ZIP_COMPRESSION if compression in losses else compression
+    losses = [getattr(openexr, f"{name}_COMPRESSION") for name in lossy]
+    return openexr.ZIP_COMPRESSION if compression in losses else compression
 
 
 def _repeated(pixels: Pixels, across: int, down: int, part: Any) -> Pixels:

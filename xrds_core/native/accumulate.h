@@ -75,7 +75,9 @@ typedef struct {
     Pass passes[4];
     Pass halves[2];              // radiance of both half buffers; first is NULL without any
     const float *shares;         // (H W): of the first half's samples, or NULL
+    const uint8_t *signs;        // (H W): of noise, 0 or 1; or NULL: noise is of halves
     float share;                 // where there are no `shares`
+    float light_factor;          // of the noise of light, without halves
     float guide_factor;          // of the noise of guides, for the number of samples
     int32_t count, width, height, has_light;
     half *picture;               // (H W, channels)

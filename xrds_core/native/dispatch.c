@@ -17,6 +17,10 @@
     DO(void, find_ranges, (const float *depth, float *least, float *most, int32_t w, int32_t h, \
                            int32_t top, int32_t bottom, float *scratch), \
        (depth, least, most, w, h, top, bottom, scratch)) \
+    DO(void, find_moving, (const float *depth, const half *vectors, const Reprojection *forth, \
+                           int32_t w, int32_t h, int32_t top, int32_t bottom, float steps, \
+                           float least, uint8_t *out, float *scratch), \
+       (depth, vectors, forth, w, h, top, bottom, steps, least, out, scratch)) \
     DO(void, find_spots, (const Target *t, const Neighbour *o, int32_t step, int32_t *pixel, \
                           uint8_t *seen, uint8_t *in_frame, float *scratch), \
        (t, o, step, pixel, seen, in_frame, scratch)) \

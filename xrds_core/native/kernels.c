@@ -6,6 +6,7 @@
 #include "filters.h"
 #include "reprojection.h"
 #include "gathering.h"
+#include "moving.h"
 #include "block.h"
 #include "summing.h"
 #include "changes.h"
@@ -197,6 +198,13 @@ void NAME(find_rims)(const float *depth, uint8_t *out, int32_t w, int32_t h, int
     rims_of(depth, out, w, h, top, bottom, nearer_is_less);
 }
 
+void NAME(find_moving)(const float *depth, const half *vectors, const Reprojection *forth,
+                       int32_t w, int32_t h, int32_t top, int32_t bottom, float steps,
+                       float least, uint8_t *out, float *scratch) {
+    if (forth->columns) moving_of(depth, vectors, forth, w, h, top, bottom, steps, least, out, scratch, 1);
+    else moving_of(depth, vectors, forth, w, h, top, bottom, steps, least, out, scratch, 0);
+}
+
 void NAME(find_ranges)(const float *depth, float *least, float *most, int32_t w, int32_t h,
                        int32_t top, int32_t bottom, float *scratch) {
     ranges_of(depth, least, most, w, h, top, bottom, scratch);
@@ -237,6 +245,7 @@ int32_t NAME(pack)(const Packing *p, int32_t top, int32_t bottom, float *scratch
         if (p->noise && p->halves[0].first) pack_noise(p, y, invalid);
         EACH(i, p->width) any |= invalid[i];
     }
+    if (p->noise && p->signs) pack_noise_around(p, top, bottom, scratch);
     if (p->guide_noise) pack_guide_noise(p, top, bottom, scratch);
     return any;
 }

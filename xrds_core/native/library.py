@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from ctypes import CDLL, POINTER, c_double, c_int32, c_int64, c_void_p, sizeof
+from ctypes import CDLL, POINTER, c_double, c_float, c_int32, c_int64, c_void_p, sizeof
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import XRDSError
-from .structures import IN_ORDER, Area, Neighbour, Packing, Pass, Target
+from .structures import IN_ORDER, Area, Neighbour, Packing, Pass, Reprojection, Target
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,6 +34,14 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "accumulate": (c_double, (POINTER(Target), Area, c_void_p)),
     "find_rims": (None, (c_void_p, c_void_p, *(c_int32,) * 5)),
     "find_ranges": (None, (*(c_void_p,) * 3, *(c_int32,) * 4, c_void_p)),
+    "find_moving": (
+        None,
+        (
+            *(c_void_p, c_void_p, POINTER(Reprojection)),
+            *(c_int32, c_int32, c_int32, c_int32),
+            *(c_float, c_float, c_void_p, c_void_p),
+        ),
+    ),
     "packing_bytes": (c_int64, (POINTER(Packing), c_int32)),
     "pack": (c_int32, (POINTER(Packing), c_int32, c_int32, c_void_p)),
     "to_halves": (c_int32, (POINTER(Pass), *(c_int32,) * 4, c_void_p)),

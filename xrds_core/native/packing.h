@@ -52,8 +52,58 @@ static void pack_noise(const Packing *p, int y, const uint8_t *invalid) {
     }
 }
 
+// Without halves noise is how far a pixel is from those around it, with albedo's texture
+// divided out where that leaves less: light divided by albedo is smooth in most places.
+enum { LIT = 5, AROUND_NOISE = 5 };  // pixels across; pixels on each side that count
+
+static void pack_noise_around(const Packing *p, int top, int bottom, float *scratch) {
+    const int w = p->width, first = whole_at_least(top - AROUND_NOISE, 0);
+    const int rows = whole_at_most(bottom + AROUND_NOISE, p->height) - first;
+    const size_t n = (size_t)rows * w;
+    float *planes[6];
+    EACH(k, 6) planes[k] = scratch + k * (n + 16);
+    Row root = planes[0], texture = planes[1], even = planes[2], plain = planes[3];
+    float *part = planes[4], *other = planes[5], *wide = scratch + 6 * (n + 16);
+    EACH(y, rows) {
+        const float *light[3], *albedo[3];
+        EACH(c, 3) light[c] = channel_of(p->passes, first + y, c);
+        EACH(c, 3) albedo[c] = channel_of(p->passes + 1, first + y, c);
+        const int64_t s = p->passes[0].column, t = p->passes[1].column;
+        Row to = root + (size_t)y * w, of = texture + (size_t)y * w;
+        LANES(i, w) {
+            const float one = root_of_luminance(light[0][i * s], light[1][i * s], light[2][i * s]);
+            const float two =
+                root_of_luminance(albedo[0][i * t], albedo[1][i * t], albedo[2][i * t]);
+            const int known = is_finite(one) & is_finite(two);  // means would spread the rest
+            to[i] = known ? one : 0.0f, of[i] = known ? two : 0.0f;
+        }
+    }
+    box(even, root, part, wide, rows, w, LIT);
+    box(plain, texture, part, wide, rows, w, LIT);
+    LANES(i, n) other[i] = root[i] - even[i] / (plain[i] + DARKEST_ROOT) * texture[i];
+    box(even, other, part, wide, rows, w, 3);
+    LANES(i, n) even[i] = other[i] - even[i];
+    box(plain, root, part, wide, rows, w, 3);
+    LANES(i, n) plain[i] = root[i] - plain[i];
+    LANES(i, n) other[i] = plain[i] * plain[i];
+    box(texture, other, part, wide, rows, w, LIT);
+    LANES(i, n) other[i] = even[i] * even[i];
+    float *squares = scratch + 6 * (n + 16) + w + 64;
+    box(squares, other, part, wide, rows, w, LIT);
+    const size_t start = (size_t)top * w, off = (size_t)(top - first) * w;
+    half *restrict to = p->noise + 2 * start;
+    const uint8_t *invalid = p->invalid + start, *signs = p->signs + start;
+    LANES(i, (size_t)(bottom - top) * w) {
+        const float apart = (texture[off + i] < squares[off + i] ? plain[off + i] : even[off + i])
+                            * p->light_factor;
+        to[2 * i] = finite_half(invalid[i] ? 0.0f : root[off + i]);
+        to[2 * i + 1] = finite_half(invalid[i] ? 0.0f : signs[i] ? apart : -apart);
+    }
+}
+
 static size_t packing_floats(const Packing *p, int rows) {
-    return ((size_t)(rows + 2) * p->width + 64) * (MOST_CHANNELS + 1);
+    const size_t planes = MOST_CHANNELS + 1;
+    return ((size_t)(rows + 2 * AROUND_NOISE) * p->width + 64) * planes + p->width + 128;
 }
 
 // The noise of guides of some rows; `scratch` holds `packing_floats`.

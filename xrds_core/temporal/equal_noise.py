@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from itertools import product
 from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -42,6 +43,7 @@ _SMALL = 0.25  # quantile of residuals
 # J. Immerkaer, Fast Noise Variance Estimation, 1996.
 _MASK = np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0]).astype(np.float32) / 6.0
 _AROUND = tuple(product((-1, 0, 1), repeat=2))
+_SEEN: WeakKeyDictionary[Stored, _Spots] = WeakKeyDictionary()
 
 
 class IndependentFrames:
@@ -91,15 +93,15 @@ def have_equal_noise(one: Stored, two: Stored) -> bool:
     """Whether two frames have the same noise; False where too little of it is seen."""
     if one.noise is None or two.noise is None or one.shape != two.shape:
         return False
-    spots = _spots(one.shape)
+    first, second = _spots_of(one), _spots_of(two)
+    spots, own, other = first.pixels, first.residual, second.residual
     x, y = centres(spots, one.shape[1])
     transform = reprojection(one.camera, two.camera)
     there = nearest(
         *reproject(transform, x, y, one.inverse_depth[spots])[:2], one.shape
     )
-    own, other = _residual(one, spots), _residual(two, spots)
     noisy = there.seen & (np.minimum(np.abs(own), np.abs(other)) > _NOISE)
-    even = noisy & _is_even(one, spots)
+    even = noisy & first.is_even
     moved = there.pixel != spots
     if (at := _chosen(even & moved, noisy & moved)) is not None:
         beside = _residual(two, _inner(there.pixel[at], one.shape))
@@ -122,6 +124,21 @@ def _inner(pixels: Pixels, shape: tuple[int, int]) -> Pixels:
     height, width = shape
     row, column = np.divmod(pixels, width)
     return np.clip(row, 1, height - 2) * width + np.clip(column, 1, width - 2)
+
+
+class _Spots:
+    """What some pixels of a frame show; a frame is compared with many others."""
+
+    def __init__(self, frame: Stored) -> None:
+        self.pixels = _spots(frame.shape)
+        self.residual = _residual(frame, self.pixels)
+        self.is_even = _is_even(frame, self.pixels)
+
+
+def _spots_of(frame: Stored) -> _Spots:
+    if frame not in _SEEN:
+        _SEEN[frame] = _Spots(frame)
+    return _SEEN[frame]
 
 
 def _residual(frame: Stored, pixels: Pixels) -> Array:

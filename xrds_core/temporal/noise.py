@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .half_floats import LARGEST_HALF
-from .local_filters import box
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,14 +27,10 @@ _NORMAL_SHARE = 0.1
 # Ratio of the variance of guides to the smallest difference, squared: 3.6 if guides
 # were pure noise. The more samples, the more of the difference is texture.
 _LEAST, _OF_ONE_SAMPLE = 1.2, 2.5
-# Without half buffers: pixels across that are assumed to be lit alike, and an offset to
-# the square root of albedo's luminance, so that black surfaces say nothing of light.
-_LIT, _DARKEST_ROOT = 5, 0.1
 # Variance that half buffers of few samples show beyond that of the surrounding pixels:
 # halves of one sequence complement each other, and noise that light shares with albedo
 # is left out.
 _HALVES_EXCESS = 1.0
-_SEED = 7
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
 
 
@@ -122,25 +117,11 @@ def guide_factor(samples: float) -> float:
     return (_LEAST * (1.0 + _OF_ONE_SAMPLE / samples)) ** 0.5
 
 
-def apart_from_around(
-    radiance: Array, albedo: Array, samples: float
-) -> tuple[Array, Array]:
-    """Return the square root of luminance, and an estimate of the halves' difference.
-
-    That is how far a pixel is from those around it, with albedo's texture divided out
-    where that leaves less. Its sign is random, as it would be between halves.
+def light_factor(samples: float) -> float:
+    """Return how much more the halves of a frame differ than its pixels from those
+    around, which make up eight ninths of what they are compared with.
     """
-    root, texture = brightness(radiance), brightness(albedo)
-    known = np.isfinite(root) & np.isfinite(texture)  # boxes would spread all else
-    root, texture = (np.where(known, x, np.float32(0.0)) for x in (root, texture))
-    lit = box(root, _LIT) / (box(texture, _LIT) + np.float32(_DARKEST_ROOT))
-    even, plain = (x - box(x, 3) for x in (root - lit * texture, root))
-    less = box(np.square(plain), _LIT) < box(np.square(even), _LIT)
-    # a pixel makes up a ninth of the mean it is compared with
-    more = 9 / 8 * (1.0 + _HALVES_EXCESS / samples)
-    apart = np.where(less, plain, even) * np.float32(more**0.5)
-    signs = np.random.default_rng(_SEED).integers(0, 2, apart.shape, np.int8)
-    return root, np.where(signs > 0, apart, -apart)
+    return (9 / 8 * (1.0 + _HALVES_EXCESS / samples)) ** 0.5
 
 
 def _packed(x: Array) -> NDArray[np.float16]:

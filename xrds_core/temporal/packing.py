@@ -10,7 +10,7 @@ from ..native import structures
 from ..native.library import Arrays, library
 from ..native.threads import bands, in_threads
 from .half_floats import LARGEST_HALF
-from .noise import Noise, apart_from_around, guide_factor
+from .noise import Noise, guide_factor, light_factor
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
     Passes = tuple[Array | None, Array, Array, Array | None]
     Mask = NDArray[np.bool_]
+
+
+_SEED = 7
 
 
 def pack(
@@ -43,12 +46,6 @@ def pack_frame(frame: Frame) -> tuple[NDArray[np.float16], Mask, Noise | None]:
     if frame.radiance is None:
         packing.run()
         return packing.picture, packing.invalid, None
-    if frame.halves is None:
-        with np.errstate(all="ignore"):  # of infinities
-            light = apart_from_around(frame.radiance, frame.albedo, frame.samples)
-        noise = packing.run_with_noise(frame.samples, None)
-        noise = Noise(Noise.of(*light, light[0]).light, noise.guides)
-        return packing.picture, packing.invalid, noise.without(packing.invalid)
     noise = packing.run_with_noise(frame.samples, frame.halves)
     return packing.picture, packing.invalid, noise
 
@@ -98,7 +95,7 @@ class _Packing:
         self._packing.passes[: len(given)] = [_pass(self._arrays, x) for x in given]
 
     def run_with_noise(self, samples: float, halves: Halves | None) -> Noise:
-        """Pack, and return the noise; that of light is not set without halves."""
+        """Pack, and return the noise: of halves, or of the pixels around each one."""
         count = len(self.invalid)
         noise = Noise(np.empty((count, 2), np.float16), np.empty(count, np.float16))
         self._packing.guide_factor = guide_factor(samples)
@@ -111,6 +108,11 @@ class _Packing:
                 self._packing.shares = self._arrays.at(share, np.float32, count)
             else:
                 self._packing.share = share
+        else:
+            # the sign of a difference is random, as it would be between halves
+            signs = np.random.default_rng(_SEED).integers(0, 2, count, np.uint8)
+            self._packing.signs = self._arrays.at(signs, np.uint8, count)
+            self._packing.light_factor = light_factor(samples)
         self.run()
         return noise
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from .half_floats import floats
 from .noise import guides_of
 
 if TYPE_CHECKING:
@@ -45,8 +46,8 @@ def light_for_albedo(frame: Stored) -> float:
     its square root. The mean over a frame.
     """
     assert frame.noise is not None
-    light = float(np.mean(frame.noise.brightness, dtype=np.float64)) ** 2 / 4
-    albedo = guides_of(frame.picture[::7, 3:].astype(np.float32))[:, :3]
+    light = float(floats(frame.noise.brightness[::7]).mean(dtype=np.float64)) ** 2 / 4
+    albedo = guides_of(floats(frame.picture[::7, 3:]))[:, :3]
     squares = float(np.square(albedo).sum(axis=-1).mean(dtype=np.float64))
     return light / (squares + _DARKEST_ALBEDO)
 

@@ -17,7 +17,7 @@ import numpy as np
 from ..native import structures
 from ..native.library import Arrays, library
 from ..native.threads import bands, in_threads
-from .panorama import PanoramaReprojection
+from .reprojections import for_library
 from .similarity import guide_area, penalties
 
 if TYPE_CHECKING:
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..arrays import Array
     from .candidates import Images
     from .frame import Stored
-    from .motion import Pair, Reprojection
+    from .motion import Pair
 
     Mask = NDArray[np.bool_]
     Guess = NDArray[np.float16]
@@ -216,8 +216,8 @@ class _Call:
         turn = np.eye(3) if pair.turn is None else pair.turn
         result = structures.Neighbour(
             frame=self._frame(pair.there, True),
-            forth=self._reprojection(pair.forth, pair.here.shape),
-            back=self._reprojection(pair.back, pair.there.shape),
+            forth=for_library(pair.forth, pair.here.shape, self._arrays),
+            back=for_library(pair.back, pair.there.shape, self._arrays),
             jitters=pair.jitters,
             whole=pair.whole_motion,
         )
@@ -299,20 +299,3 @@ class _Call:
         count = 3 * len(frame.picture)
         at = self._arrays.at
         return self._arrays.addresses([at(part, np.float16, count) for part in parts])
-
-    def _reprojection(
-        self, transform: Reprojection, shape: tuple[int, int]
-    ) -> structures.Reprojection:
-        """`shape` is that of the frame whose pixels are reprojected."""
-        result = structures.Reprojection()
-        if not isinstance(transform, PanoramaReprojection):
-            result.matrix[:] = transform.ravel().tolist()
-            return result
-        result.matrix[:] = transform.turn.astype(np.float32).ravel().tolist()
-        columns, rows = transform.directions(shape)
-        result.columns = self._arrays.at(columns, np.float32, columns.size)
-        result.rows = self._arrays.at(rows, np.float32, rows.size)
-        result.left, result.top = transform.first
-        result.across, result.down = transform.density
-        result.window_x, result.window_y = transform.there.window
-        return result

@@ -12,17 +12,17 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from .local_filters import extreme
+from ..native.library import Arrays, library
+from ..native.threads import bands, in_threads
 from .motion import (
     MOVING_TOLERANCE,
     ObjectMotion,
     centres,
-    grid,
     known,
     nearest,
-    reproject,
     reprojection,
 )
+from .reprojections import for_library
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -144,19 +144,23 @@ def _unexplained(frame: Stored, beside: Camera, steps: int) -> Mask:
     The pass is a mean over the pixel's samples, so it may have any value between the
     camera's motion vectors of the surrounding pixels.
     """
-    own = grid(frame.shape)
-    forth = reprojection(frame.camera, beside)
-    x, y, _ = reproject(forth, own.x, own.y, frame.inverse_depth)
-    flows = _flow(frame, slice(None), steps)
-    apart = np.zeros(frame.shape, np.float32)
-    for still, flow in ((x - own.x, flows[0]), (y - own.y, flows[1])):
-        explained, given = still.reshape(frame.shape), flow.reshape(frame.shape)
-        np.fmax(apart, extreme(explained, np.fmin) - given, out=apart)
-        np.fmax(apart, given - extreme(explained, np.fmax), out=apart)
-    hit = (frame.inverse_depth > 0.0) | (
-        frame.inverse_depth < 0.0
-    )  # neither sky nor NaN
-    return np.asarray((apart.ravel() > MOVING_TOLERANCE / 2) & hit)
+    assert frame.vector is not None
+    height, width = frame.shape
+    count = height * width
+    arrays = Arrays()
+    forth = for_library(reprojection(frame.camera, beside), frame.shape, arrays)
+    depth = arrays.at(frame.inverse_depth, np.float32, count)
+    vectors = arrays.at(frame.vector, np.float16, 4 * count)
+    moving = np.empty(count, np.bool_)
+
+    def work(rows: tuple[int, int]) -> None:
+        scratch = np.empty(6 * (width + 18), np.float32)
+        given = (*rows, steps, MOVING_TOLERANCE / 2)
+        places = moving.ctypes.data, scratch.ctypes.data
+        library().find_moving(depth, vectors, forth, width, height, *given, *places)
+
+    in_threads(work, bands(height))
+    return moving
 
 
 def _flow(
