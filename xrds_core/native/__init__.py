@@ -1,0 +1,1 @@
+"""Compiled kernels: C sources, how they are compiled, and the libraries."""
