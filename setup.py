@@ -2,6 +2,7 @@
 
 XRDS_PLATFORMS names the platforms that a wheel holds libraries for, as
 `linux-x64,windows-x64` or `all`; without it, it is the one that this runs on.
+XRDS_LIBRARIES names a folder where they lie already, and nothing is compiled.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from xrds_core.native.compile import (  # noqa: E402
     CompileError,
     chosen,
     compile_libraries,
+    library_name,
     sources,
 )
 
@@ -55,7 +57,12 @@ class Native(Command):
             folder = Path(self.build_lib or "") / LIBRARIES.relative_to(ROOT)
             # the folder of an earlier build, maybe for other platforms
             shutil.rmtree(folder, ignore_errors=True)
-        compile_libraries(wanted(), folder)
+        if made := os.environ.get("XRDS_LIBRARIES"):
+            self.mkpath(str(folder))
+            for name in map(library_name, wanted()):
+                shutil.copy(Path(made) / name, folder)
+        else:
+            compile_libraries(wanted(), folder)
 
     def get_source_files(self) -> list[str]:
         return [str(path.relative_to(ROOT)) for path in sources()]

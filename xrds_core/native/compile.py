@@ -16,9 +16,10 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -67,7 +68,7 @@ PLATFORMS = {
 # Results must not depend on whether a processor can multiply and add at once, so the
 # compiler may not join the two. Zig checks for undefined behaviour unless told not to.
 _FLAGS = shlex.split(
-    "-std=c11 -O3 -Wall -fvisibility=hidden -fno-math-errno -fno-trapping-math "
+    "-c -std=c11 -O3 -Wall -fvisibility=hidden -fno-math-errno -fno-trapping-math "
     "-ffp-contract=off -fno-sanitize=undefined"
 )
 # The kernels are compiled once for each level of processors that a platform has.
@@ -113,15 +114,18 @@ def sources() -> list[Path]:
 
 
 def compile_libraries(
-    platforms: Iterable[str], folder: Path = LIBRARIES, flags: Sequence[str] = ()
+    platforms: Iterable[str],
+    folder: Path = LIBRARIES,
+    flags: Sequence[str] = (),
+    compiler: str | None = None,
 ) -> list[Path]:
     """Compile a library for each platform into a folder; returns their paths.
 
-    `flags` come behind all others; with some, symbols stay in the library. An earlier
-    library is replaced as a whole, so that a process that has loaded it runs on.
-    Raises CompileError.
+    `flags` come behind all others; with some, symbols stay in the library. A `compiler`
+    takes the place of zig, for this platform. An earlier library is replaced as a
+    whole, so that a process that has loaded it runs on. Raises CompileError.
     """
-    if find_spec("ziglang") is None:
+    if compiler is None and find_spec("ziglang") is None:
         raise CompileError(f"zig is missing: run pip install '{ZIG}'")
     folder.mkdir(parents=True, exist_ok=True)
     with (
@@ -129,10 +133,10 @@ def compile_libraries(
         ThreadPoolExecutor(os.cpu_count()) as pool,
     ):
         work = Path(place)
-        cache = _cache(work)
+        run = partial(_run, compiler, _cache(work))
         jobs = {
             name: [
-                pool.submit(_zig, [*words, *flags, "-o", str(made)], cache)
+                pool.submit(run, [*words, *flags, "-o", str(made)])
                 for made, words in _objects(name, work).items()
             ]
             for name in platforms
@@ -140,7 +144,7 @@ def compile_libraries(
         for running in jobs.values():
             for job in running:
                 job.result()
-        return [_link(name, folder, flags, work, cache) for name in jobs]
+        return [_link(name, folder, flags, work, run) for name in jobs]
 
 
 def _objects(platform: str, work: Path) -> dict[Path, list[str]]:
@@ -157,7 +161,7 @@ def _objects(platform: str, work: Path) -> dict[Path, list[str]]:
     if windows:
         found["windows"] = ["windows.c", *_processor(levels["v1"])]
     return {
-        work / f"{platform}-{name}.o": [*base, *words, "-c", str(HERE / source)]
+        work / f"{platform}-{name}.o": [*base, *words, str(HERE / source)]
         for name, (source, *words) in found.items()
     }
 
@@ -167,7 +171,11 @@ def _processor(name: str) -> list[str]:
 
 
 def _link(
-    platform: str, folder: Path, flags: Sequence[str], work: Path, cache: Path
+    platform: str,
+    folder: Path,
+    flags: Sequence[str],
+    work: Path,
+    run: Callable[[list[str]], None],
 ) -> Path:
     target = PLATFORMS[platform].target
     made = work / library_name(platform)
@@ -180,7 +188,7 @@ def _link(
         objects += ["-nostdlib", "-lucrtbase"]
     if "macos" in target:  # else the temporary folder's name is kept in it
         words.append(f"-Wl,-install_name,@rpath/{made.name}")
-    _zig([*words, *objects], cache)
+    run([*words, *objects])
     part = folder / f"{made.name}.part"
     shutil.copyfile(made, part)
     return part.replace(folder / made.name)
@@ -203,10 +211,12 @@ def _cache(work: Path) -> Path:
         return work / "zig"
 
 
-def _zig(words: list[str], cache: Path) -> None:
-    """Run zig's C compiler; what it warns of goes on to stderr."""
-    # -P: nothing of the working folder is taken for zig
-    command = [sys.executable, "-P", "-m", "ziglang", "cc", *words]
+def _run(compiler: str | None, cache: Path, words: list[str]) -> None:
+    """Run a C compiler, zig's if it is None; what it warns of goes on to stderr."""
+    if compiler:
+        command = [*shlex.split(compiler), *_for_others(words)]
+    else:  # -P: nothing of the working folder is taken for zig
+        command = [sys.executable, "-P", "-m", "ziglang", "cc", *words]
     environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": str(cache)}
     done = subprocess.run(
         command,
@@ -219,10 +229,24 @@ def _zig(words: list[str], cache: Path) -> None:
         check=False,
     )
     if done.returncode:
-        told = f"zig cc {shlex.join(words)}"
-        raise CompileError(f"the C core does not compile\n{told}\n{done.stdout}")
+        told = f"{shlex.join(command)}\n{done.stdout}"
+        raise CompileError(f"the C core does not compile\n{told}")
     if done.stdout:
         print(done.stdout, file=sys.stderr, end="")
+
+
+def _for_others(words: list[str]) -> list[str]:
+    """Zig's options as GCC and Clang have them."""
+    kept = []
+    following = iter(words)
+    for word in following:
+        if word == "-target":
+            next(following)
+        else:
+            named = word.startswith("-mcpu=x86_64")
+            changed = word.replace("-mcpu", "-march").replace("_", "-")
+            kept.append(changed if named else word)
+    return kept
 
 
 def main() -> None:
@@ -231,12 +255,14 @@ def main() -> None:
     add = parser.add_argument
     add("--platform", nargs="+", default=[], help=f"all, {', '.join(PLATFORMS)}")
     add("--out", type=Path, default=LIBRARIES, help="folder for the libraries")
-    sanitized = "more flags, as --flags=-fsanitize=undefined"
-    add("--flags", type=shlex.split, default=[], help=sanitized)
+    add("--flags", type=shlex.split, default=[], help="more flags, behind all others")
+    add("--compiler", help="GCC or Clang in the place of zig, for this platform")
     options = parser.parse_args()
     try:
         platforms = chosen(" ".join(options.platform))
-        for path in compile_libraries(platforms, options.out, options.flags):
+        for path in compile_libraries(
+            platforms, options.out, options.flags, options.compiler
+        ):
             print(f"{path}  {path.stat().st_size / 1e3:.0f} kB")
     except (CompileError, OSError) as error:
         sys.exit(f"compile.py: {error}")
