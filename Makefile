@@ -1,4 +1,4 @@
-# make install | test | test-all | test-other | test-app | demo | extension | release | clean.  BPY=5.0.1 picks another Blender.
+# make install | native | test | test-all | test-other | test-app | demo | extension | release | clean.  BPY=5.0.1 picks another Blender.
 PYTHON ?= python3.11
 VENV   ?= .venv
 BPY    ?= 4.5.15
@@ -20,11 +20,21 @@ OTHER_RUN  := $(OTHER_VENV)/bin/python
 # Tests of what differs between Blenders: `make test` runs them on the second one, too.
 VERSIONS := interface/test_engine cycles/test_passes shot/test_features shot/test_full_size
 
-.PHONY: install test test-all test-other test-app demo extension release clean
+# The C core; what is installed anew compiles it, too.
+NATIVE  := xrds_core/native/lib/.compiled
+SOURCES := $(wildcard xrds_core/native/*.[ch]) xrds_core/native/compile.py
 
-install: $(STAMP)
+.PHONY: install native test test-all test-other test-app demo extension release clean
 
-$(STAMP): pyproject.toml xrds_lab/pyproject.toml
+install: $(STAMP) $(NATIVE)
+
+native: $(NATIVE)
+
+$(NATIVE): $(SOURCES) | $(STAMP)
+	$(RUN) xrds_core/native/compile.py
+	touch $@
+
+$(STAMP): pyproject.toml setup.py xrds_lab/pyproject.toml
 	test -x $(RUN) || $(PYTHON) -m venv $(VENV)
 	$(RUN) -m pip install --quiet "torch==$(TORCH)"
 	$(RUN) -m pip install --quiet --editable ".[blender,dev]" --editable ./xrds_lab "bpy==$(BPY)"
@@ -71,5 +81,5 @@ release: extension
 	$(RUN) extension/release.py --zips dist --out dist/release --website "$(WEBSITE)"
 
 clean:
-	rm -rf build dist demo *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf build dist demo xrds_core/native/lib *.egg-info .pytest_cache .mypy_cache .ruff_cache
 	find xrds_core xrds_blender xrds_lab tests -name __pycache__ -prune -exec rm -rf {} +

@@ -1,34 +1,39 @@
 """Build the extension's zips, for each platform and Python of Blender.
 
 Each holds a manifest, a root module and wheels. `light` zips render at full size: they
-hold the project's own wheel, Open Image Denoise, OpenEXR and wgpu. `full` zips hold
-PyTorch's CPU build and safetensors beside these, and the large network's weights. The
-`bare` zip, one for all, holds the project's own wheel alone, for pipelines that bring
-the libraries. Blender's own `extension build`, which comes with the bpy module, makes
-and checks them.
+hold the project's own wheel, Open Image Denoise and OpenEXR. `full` zips hold PyTorch's
+CPU build and safetensors beside these, and the large network's weights. The `bare` zip,
+one for all, holds the own wheel alone, for pipelines that bring the libraries. That
+wheel holds the compiled core of its zip's platform, in the `bare` zip those of all.
+Blender's own `extension build`, which comes with the bpy module, makes and checks them.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
 import tomllib
+from collections.abc import Callable
+from functools import cache, partial
 from pathlib import Path
 
 from wheels import PLATFORMS, NoCpuBuild, Target, download, resolve, targets
 
+from xrds_core.native.compile import chosen, compile_libraries
+
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = "blender_manifest.toml"
-PROJECT_FILES = ("pyproject.toml", "README.md", "LICENSE")
+PROJECT_FILES = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
 PACKAGES = ("xrds_core", "xrds_blender")
 SIZE_LIMIT = 300_000_000  # bytes; what the extension platform means to take
 # Python inside Blender, and the Blenders that have it: from, to (not included).
 PYTHONS = {"3.11": ("4.2.0", "5.1.0"), "3.13": ("5.1.0", None)}
-LIGHT = ("mitsuba-oidn", "OpenEXR", "wgpu")
+LIGHT = ("mitsuba-oidn", "OpenEXR")
 LARGE = "paper_*.safetensors"  # 29 MB of weights, in `full` zips alone
 
 
@@ -52,10 +57,16 @@ def build(
     return path
 
 
-def own_wheel(folder: Path, *left_out: str, website: str | None = None) -> Path:
+def own_wheel(
+    folder: Path,
+    *left_out: str,
+    website: str | None = None,
+    platform: str = "all",
+) -> Path:
     """Build a wheel of what renders, from a copy without the rest.
 
-    `left_out` are patterns of names; the `website` goes into its metadata.
+    `left_out` are patterns of names; the `website` goes into its metadata. The core is
+    compiled for the `platform`.
     """
     source = folder / "source"
     source.mkdir(parents=True)
@@ -68,7 +79,11 @@ def own_wheel(folder: Path, *left_out: str, website: str | None = None) -> Path:
         ignored = shutil.ignore_patterns("__pycache__", *left_out)
         shutil.copytree(ROOT / name, source / name, ignore=ignored)
     options = ["--quiet", "--no-deps", "--no-build-isolation", "--wheel-dir"]
-    _run("-P", "-m", "pip", "wheel", *options, str(folder), str(source))
+    words = ["-P", "-m", "pip", "wheel", *options, str(folder), str(source)]
+    # not from the copy: zig remembers what it compiled by the place of the sources
+    libraries = folder / "libraries"
+    compile_libraries(chosen(platform), libraries)
+    _run(*words, XRDS_PLATFORMS=platform, XRDS_LIBRARIES=str(libraries))
     (wheel,) = folder.glob("xrds-*.whl")
     return wheel
 
@@ -95,16 +110,25 @@ def blenders_tool(*words: str) -> None:
     _run(str(scripts / "addons_core" / "bl_pkg" / "cli" / "blender_ext.py"), *words)
 
 
-def _run(*words: str) -> None:
+def _run(*words: str, **variables: str) -> None:
     done = subprocess.run(
-        [sys.executable, *words], capture_output=True, text=True, check=False
+        [sys.executable, *words],
+        env=os.environ | variables,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     if done.returncode:
         sys.exit(f"{' '.join(words)} failed:\n{done.stdout}{done.stderr}")
 
 
-def _with_libraries(kind: str, options: argparse.Namespace, own: Path) -> None:
-    """One zip of a kind for each platform and Python that the index has wheels for."""
+def _with_libraries(
+    kind: str, options: argparse.Namespace, own: Callable[[str], Path]
+) -> None:
+    """One zip of a kind for each platform and Python that the index has wheels for.
+
+    `own` gives the own wheel for a platform.
+    """
     wanted = list(LIGHT)
     if kind == "full":
         wanted += [f"torch=={options.torch}", "safetensors"]
@@ -118,7 +142,8 @@ def _with_libraries(kind: str, options: argparse.Namespace, own: Path) -> None:
             continue
         lines = {"platforms": [target.platform]} | _versions(target, options)
         lines |= _website(options)
-        _print_size(build(options.out, name, [own, *wheels], lines))
+        wheels.insert(0, own(target.platform))
+        _print_size(build(options.out, name, wheels, lines))
 
 
 def _versions(target: Target, options: argparse.Namespace) -> dict[str, object]:
@@ -165,18 +190,21 @@ def main() -> None:
     if not options.any_blender and set(options.python) - set(PYTHONS):
         parser.error(f"Blenders have Python {', '.join(PYTHONS)}; see --any-blender")
     with tempfile.TemporaryDirectory() as folder:
-        built: dict[bool, Path] = {}  # the own wheel, by whether it holds all weights
+
+        @cache
+        def own(whole: bool, platform: str) -> Path:
+            left_out = () if whole else (LARGE,)
+            place = Path(folder) / ("whole" if whole else "light") / platform
+            return own_wheel(
+                place, *left_out, website=options.website, platform=platform
+            )
+
         for kind in options.kind:
-            whole = kind == "full"
-            if whole not in built:
-                left_out = () if whole else (LARGE,)
-                place, site = Path(folder) / kind, options.website
-                built[whole] = own_wheel(place, *left_out, website=site)
-            own = built[whole]
             if kind == "bare":
-                _print_size(build(options.out, kind, [own], _website(options)))
+                wheels = [own(False, "all")]
+                _print_size(build(options.out, kind, wheels, _website(options)))
             else:
-                _with_libraries(kind, options, own)
+                _with_libraries(kind, options, partial(own, kind == "full"))
 
 
 if __name__ == "__main__":

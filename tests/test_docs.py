@@ -95,7 +95,7 @@ OTHERS = """
 --extra-index-url --factory-startup --index-url --kind --online-mode
 --only-binary --platform --python --python-exit-code --python-expr --python-version
 --render-anim --render-frame --run-dependencies --step --sync --target --url --check
---draw --help --version
+--draw --help --version --compiler --flags --no-deps
 """
 
 

@@ -17,6 +17,8 @@ import build  # lies beside the add-on's root module
 import wheels
 from packaging.requirements import Requirement
 
+from xrds_core.native import compile as native
+
 ROOT = Path(__file__).resolve().parents[2]
 MANIFEST = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
 WHEEL = f"wheels/xrds-{MANIFEST['version']}-py3-none-any.whl"
@@ -78,6 +80,49 @@ def test_wheel_holds_core_and_add_on_alone(unpacked: Path) -> None:
     tops = {name.partition("/")[0] for name in wheel_names(unpacked)}
     metadata = f"xrds-{MANIFEST['version']}.dist-info"
     assert tops == {"xrds_core", "xrds_blender", metadata}
+
+
+def test_the_bare_zip_holds_the_core_of_every_platform(unpacked: Path) -> None:
+    folder = "xrds_core/native/lib/"
+    held = {name for name in wheel_names(unpacked) if name.startswith(folder)}
+    assert held == {folder + native.library_name(name) for name in native.PLATFORMS}
+
+
+def test_every_platform_of_a_zip_has_a_library() -> None:
+    assert set(wheels.PLATFORMS) == set(MANIFEST["platforms"])
+    for name, (tags, _) in wheels.PLATFORMS.items():
+        assert native.PLATFORMS[name].tag in tags
+
+
+def test_a_zip_with_libraries_holds_the_core_of_its_platform(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked, built = [], {}
+    monkeypatch.setattr(build, "resolve", lambda *_: ["oidn==1.0"])
+    monkeypatch.setattr(build, "download", lambda *_: [tmp_path / "oidn.whl"])
+    monkeypatch.setattr(build, "_print_size", lambda _: None)
+
+    def own_wheel(folder: Path, *left_out: str, **told: str | None) -> Path:
+        asked.append((left_out, told["platform"]))
+        return folder / "own.whl"
+
+    def zipped(_: Path, name: str, held: list[Path], *__: object) -> None:
+        built[name] = [path.parent.name for path in held if path.name == "own.whl"]
+
+    monkeypatch.setattr(build, "own_wheel", own_wheel)
+    monkeypatch.setattr(build, "build", zipped)
+    words = ["build.py", "--kind", "light", "full", "bare", "--python", "3.11"]
+    monkeypatch.setattr(sys, "argv", words)
+    build.main()
+    assert built == {"bare": ["all"]} | {
+        f"{kind}{name.replace('-', '_')}-cp311": [name]
+        for kind in ("light-", "")
+        for name in wheels.PLATFORMS
+    }
+    # once for each platform and kind
+    light = [((build.LARGE,), name) for name in (*wheels.PLATFORMS, "all")]
+    full = [((), name) for name in wheels.PLATFORMS]
+    assert sorted(asked) == sorted(light + full)
 
 
 def target(platform: str, python: str) -> wheels.Target:
