@@ -15,6 +15,13 @@ Result = TypeVar("Result")
 _ROWS = 128  # of a band
 
 
+def processors() -> int:
+    """Return how many this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
 def in_threads(
     work: Callable[[Item], Result], items: Sequence[Item], threads: int | None = None
 ) -> list[Result]:
@@ -22,7 +29,7 @@ def in_threads(
 
     `threads`: all processors by default.
     """
-    count = min(threads or os.cpu_count() or 1, len(items))
+    count = min(threads or processors(), len(items))
     if count <= 1:
         return [work(item) for item in items]
     with ThreadPoolExecutor(count) as pool:

@@ -276,6 +276,7 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     _add_shots(command.add_argument_group("shots, instead of single frames"))
     _add_gallery(command.add_argument_group("the gallery, instead of scenes"))
     _add_device_report(command.add_argument_group("graphics cards, instead of scenes"))
+    _add_own_seconds(command.add_argument_group("our own seconds, instead of scenes"))
     command.set_defaults(work=_bench, lines=_bench_lines)
     return command
 
@@ -382,14 +383,38 @@ def _add_device_report(group: Any) -> None:
     )
 
 
+def _add_own_seconds(group: Any) -> None:
+    group.add_argument(
+        "--own-seconds",
+        type=arguments.size,
+        metavar="WxH",
+        help="each part of finishing a frame of synthetic samples, on 1, 2, 4 cores",
+    )
+
+
+def _own_seconds(options: argparse.Namespace) -> dict[str, Any]:
+    from ..shots.own_seconds import bench_own_seconds
+
+    return bench_own_seconds(
+        options.out,
+        options.own_seconds,
+        samples=options.samples or (2, 16),
+        rounds=options.rounds,
+    )
+
+
 def _bench(options: argparse.Namespace) -> dict[str, Any]:
+    if options.own_seconds:
+        return _own_seconds(options)
     need_blender("bench")
     if options.gallery is not None:
         return _bench_gallery(options)
     if options.device_report:
         return _device_report(options)
     if not options.scenes:
-        raise UsageError("no scenes: give files, or --gallery, or --device-report")
+        raise UsageError(
+            "no scenes: give files, or --gallery, --device-report or --own-seconds"
+        )
     kinds = {
         "same_picture": _bench_same_picture,
         "light_parts": _bench_light_parts,

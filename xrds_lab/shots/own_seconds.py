@@ -1,0 +1,308 @@
+"""`xrds bench --own-seconds`: what finishing a frame of a shot costs, part by part.
+
+Frames of synthetic samples, without a renderer. All parts run once per round, on as
+many cores as asked for, so that a slow minute of the machine hits all; told are
+medians. Beside the seconds stand the bytes that a part has to read and write, and how long this
+machine's memory takes for them.
+"""
+
+from __future__ import annotations
+
+import statistics
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from unittest.mock import patch
+
+import numpy as np
+
+from xrds_core.atomic import replacing, write_json
+from xrds_core.denoising import Denoiser
+from xrds_core.exr import openexr_io
+from xrds_core.native.surfaces import find_ranges, find_rims
+from xrds_core.sequence.finishing import finish_frame
+from xrds_core.temporal import accumulate as accumulation
+from xrds_core.temporal.coarse_rejection import tile_weights
+from xrds_core.temporal.equal_noise import IndependentFrames
+from xrds_core.temporal.frame import Frame, Stored, store
+from xrds_core.temporal.motion import pair
+from xrds_core.temporal.sums import Work
+from xrds_core.temporal.vectors import Movement
+
+from ..bench import machine
+from ..progress import report_line
+from .synthetic import frame
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterable
+
+    Row = dict[str, Any]
+    Runs = dict[str, list[tuple[float, float]]]
+
+RADIUS = 4
+QUALITY = "high"
+PARTS = {
+    "read": "OpenEXR: reading a frame",
+    "store": "packing a frame, its noise",
+    "depths": "rims of a frame, ranges of depth",
+    "motion": "what moves by itself in a frame",
+    "noise": "whether a frame has noise of its own",
+    "tiles": "coarse rejection of all neighbours",
+    "guess": "the frame with its nearest neighbours",
+    "sums": "all neighbours: gathered, judged, mean",
+    "accumulate": "the whole of accumulation, object motion known",
+    "denoise": f"one denoising, {QUALITY}",
+    "alone": "finishing a frame alone",
+    "shot": "finishing a frame of a shot",
+    "write": "OpenEXR: writing a frame",
+}
+
+
+def bench_own_seconds(
+    out: Path,
+    size: tuple[int, int],
+    *,
+    samples: tuple[int, ...] = (2, 16),
+    rounds: int = 3,
+    cores: tuple[int, ...] | None = None,
+) -> Row:
+    """Measure and write own-seconds.json and own-seconds.md into `out`; returns it.
+
+    `size` is (width, height); `cores` are as many as are used, by default one, two and
+    so on, doubled.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    counts = cores or _doubled(machine.cores())
+    bandwidth = _bandwidth()
+    points = [
+        row
+        for each in samples
+        for row in _points(size, each, counts, rounds, bandwidth)
+    ]
+    results = {
+        "settings": {
+            "size": list(size),
+            "radius": RADIUS,
+            "quality": QUALITY,
+            "rounds": rounds,
+        },
+        "machine": machine.describe(),
+        "bandwidth": bandwidth,
+        "points": points,
+        "ratios": ratios(points),
+        "failures": {},
+    }
+    write_json(out / "own-seconds.json", results)
+    with replacing(out / "own-seconds.md") as part:
+        part.write_text(page(results), "utf-8")
+    return results
+
+
+def ratios(points: Iterable[Row]) -> list[Row]:
+    """Of each number of samples and cores: what accumulation and a shot's frame cost,
+    in denoisings, and what more cores bring.
+    """
+    found: dict[tuple[int, int], dict[str, float]] = {}
+    for row in points:
+        seconds = found.setdefault((row["samples"], row["cores"]), {})
+        seconds[row["part"]] = row["seconds"]
+    return [
+        {
+            "samples": samples,
+            "cores": cores,
+            "accumulate": seconds["accumulate"] / seconds["denoise"],
+            "shot_over_alone": (seconds["shot"] - seconds["alone"])
+            / seconds["denoise"],
+            "efficiency": found[samples, 1]["sums"] / seconds["sums"] / cores
+            if (samples, 1) in found
+            else None,
+        }
+        for (samples, cores), seconds in found.items()
+    ]
+
+
+def _points(
+    size: tuple[int, int],
+    samples: int,
+    counts: tuple[int, ...],
+    rounds: int,
+    bandwidth: float,
+) -> list[Row]:
+    numbers = range(1, 2 * RADIUS + 2)
+    frames = {n: replace(frame(n, *size), samples=float(samples)) for n in numbers}
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for cores in counts:
+            report_line(f"{samples} samples, {cores} cores")
+            bench = _Bench(frames, Path(folder) / "frame.exr", cores)
+            with machine.only_cores(cores):
+                for _ in range(rounds):
+                    bench.round()
+            rows += [
+                {"samples": samples, "cores": cores, **row}
+                for row in bench.rows(bandwidth)
+            ]
+    return rows
+
+
+class _Bench:
+    """All parts of finishing a frame on some cores, run once by each `round`."""
+
+    def __init__(self, frames: dict[int, Frame], path: Path, cores: int) -> None:
+        self._frames, self._path, self._cores = frames, path, cores
+        self._middle = sorted(frames)[len(frames) // 2]
+        self._stored = {n: store(x) for n, x in frames.items()}
+        self._denoiser = Denoiser(QUALITY, "cpu", threads=cores)
+        self._runs: Runs = {}
+        self._bytes: dict[str, int] = {}
+
+    def rows(self, bandwidth: float) -> list[Row]:
+        """Medians, in the order of `PARTS`."""
+        return [
+            {
+                "part": part,
+                "seconds": statistics.median(x for x, _ in self._runs[part]),
+                "processor_seconds": statistics.median(x for _, x in self._runs[part]),
+                "bytes": self._bytes.get(part),
+                "least_seconds": self._bytes[part] / bandwidth
+                if part in self._bytes
+                else None,
+            }
+            for part in PARTS
+            if part in self._runs
+        ]
+
+    def round(self) -> None:
+        """Run all parts once."""
+        own = self._stored[self._middle]
+        others = [x for n, x in self._stored.items() if n != self._middle]
+        last = self._frames[max(self._frames)]
+        packed = self._timed("store", lambda: store(last))
+        self._bytes["store"] = _bytes(last) + _bytes(packed)
+        self._files(last)
+        self._timed("depths", lambda: self._depths(own))
+        self._bytes["depths"] = own.inverse_depth.nbytes * 3 + own.inverse_depth.size
+        near = {x.number: x for x in (own, others[0])}
+        self._timed("motion", lambda: Movement().moving(own, near))
+        assert own.vector is not None
+        self._bytes["motion"] = own.inverse_depth.nbytes + own.vector.nbytes
+        known = IndependentFrames(lambda _: None)
+        known.of(own, others[:-1])
+        self._timed("noise", lambda: known.of(replace(own), others))
+        pairs = [pair(own, x) for x in others]
+        self._timed("tiles", lambda: [tile_weights(x) for x in pairs])
+        self._finishing(own, others)
+
+    def _finishing(self, own: Stored, others: list[Stored]) -> None:
+        movement = Movement()
+        accumulation.accumulate(own, others, movement)  # finds what moves
+        guess, means = Work.guess, Work.means
+        timed = self._timed
+        with (
+            patch.object(
+                Work, "guess", lambda *given: timed("guess", lambda: guess(*given))
+            ),
+            patch.object(
+                Work, "means", lambda *given: timed("sums", lambda: means(*given))
+            ),
+        ):
+            found = timed(
+                "accumulate",
+                lambda: accumulation.accumulate(own, others, movement),
+            )
+        results = [found.radiance, found.albedo, found.normal, found.samples]
+        written = sum(x.nbytes for x in results if x is not None)
+        self._bytes["sums"] = sum(map(_bytes, (own, *others))) + written
+        passes = found.radiance, found.albedo, found.normal
+        timed("denoise", lambda: self._denoiser(*passes))
+        timed("alone", lambda: finish_frame(own, [], self._denoiser, movement))
+        timed("shot", lambda: finish_frame(own, others, self._denoiser, movement))
+
+    def _depths(self, own: Stored) -> None:
+        given = own.inverse_depth, own.shape
+        find_rims(*given, own.camera.orthographic)
+        find_ranges(*given)
+
+    def _files(self, last: Frame) -> None:
+        assert last.radiance is not None
+        passes = {"C": last.radiance, "A": last.albedo, "N": last.normal}
+        planes = {
+            f"{name}.{letter}": np.ascontiguousarray(x[..., i])
+            for name, x in passes.items()
+            for i, letter in enumerate("RGB")
+        }
+        self._timed("write", lambda: openexr_io.write(self._path, planes))
+        self._timed("read", lambda: openexr_io.read(self._path))
+        size = sum(x.nbytes for x in planes.values())
+        self._bytes["write"] = self._bytes["read"] = size + self._path.stat().st_size
+
+    def _timed(self, part: str, work: Callable[[], Any]) -> Any:
+        clock, processor = time.perf_counter(), time.process_time()
+        found = work()
+        run = time.perf_counter() - clock, time.process_time() - processor
+        self._runs.setdefault(part, []).append(run)
+        return found
+
+
+def _bytes(frame: Frame | Stored) -> int:
+    """Of all arrays that a frame holds, those of its noise or halves included."""
+    held = {**vars(frame)}
+    for name in ("noise", "halves"):
+        held |= vars(held.get(name)) if held.get(name) else {}
+    return sum(x.nbytes for x in held.values() if isinstance(x, np.ndarray))
+
+
+def _bandwidth() -> float:
+    """Bytes per second that one core reads and writes, of arrays beyond its caches."""
+    source = np.ones(1 << 25, np.float32)
+    target = np.empty_like(source)
+    taken = []
+    for _ in range(5):
+        started = time.perf_counter()
+        np.copyto(target, source)
+        taken.append(time.perf_counter() - started)
+    return 2 * source.nbytes / min(taken)
+
+
+def _doubled(most: int) -> tuple[int, ...]:
+    return tuple(2**k for k in range(most.bit_length()) if 2**k <= most)
+
+
+def page(results: Row) -> str:
+    """The report as Markdown."""
+    width, height = results["settings"]["size"]
+    lines = [
+        "# Our own seconds",
+        "",
+        "Written by `xrds bench --own-seconds`: a frame of synthetic samples, "
+        f"{width}x{height}, radius {RADIUS}, by the clock and of the processors; least "
+        "is what the bytes that a part has to move take at the "
+        f"{results['bandwidth'] / 1e9:.1f} GB/s of one core.",
+        "",
+        "| samples | cores | part | s | processor s | MB | least s |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for row in results["points"]:
+        moved, least = row["bytes"], row["least_seconds"]
+        cells = [row["samples"], row["cores"], PARTS[row["part"]]]
+        cells += [f"{row['seconds']:.3f}", f"{row['processor_seconds']:.3f}"]
+        cells += ["-" if moved is None else f"{moved / 1e6:.0f}"]
+        cells += ["-" if least is None else f"{least:.3f}"]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    lines += [
+        "",
+        "In denoisings: accumulation, and what a frame of a shot takes more than one "
+        "alone; then what cores bring, 1 where twice as many take half.",
+        "",
+        "| samples | cores | accumulation | shot over alone | efficiency |",
+        "|---|---|---|---|---|",
+    ]
+    for row in results["ratios"]:
+        brings = row["efficiency"]
+        cells = [row["samples"], row["cores"], f"{row['accumulate']:.3f}"]
+        cells += [f"{row['shot_over_alone']:.2f}"]
+        cells += ["-" if brings is None else f"{brings:.2f}"]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(lines) + "\n"
