@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..temporal.packing import pack, pack_counts, pack_parts
 from ..temporal.noise import brightness
+from ..temporal.packing import pack, pack_counts, pack_parts
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..temporal.accumulate import accumulate, sample_counts
-from ..temporal.packing import pack, pack_counts, pack_parts
 from ..temporal.half_floats import floats
+from ..temporal.packing import pack, pack_counts, pack_parts
 from ..temporal.vectors import Movement
 
 if TYPE_CHECKING:
