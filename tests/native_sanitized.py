@@ -4,7 +4,7 @@ python tests/native_sanitized.py undefined      what C leaves undefined; by Zig
 python tests/native_sanitized.py address        reads and writes outside of arrays; by
                                                 Clang with its compiler-rt, Linux only
 
-`--seconds` for random shots, all sizes and packings come first.
+`--seconds` for random shots; packing, surfaces and shots of all sizes come first.
 """
 
 from __future__ import annotations
@@ -102,12 +102,17 @@ def exercise(folder: Path, seconds: float, first: int) -> None:
     sys.path[:0] = [str(TESTS.parent), str(TESTS / "support")]
     import native_shots as shots
     import numpy as np
+    import pytest
 
     from xrds_core.native import library as module
     from xrds_core.temporal.accumulate import accumulate
 
     np.seterr(all="ignore")
     module.FOLDER = folder
+    tests = str(TESTS / "core" / "native" / "test_agreement.py")
+    chosen = ["-k", "spots or surfaces or pack or half", "-p", "no:cacheprovider"]
+    if pytest.main(["--noconftest", *chosen, tests]):
+        sys.exit("tests failed")
     kinds = [
         shots.Kind(name, shape, light=light, alpha=alpha, parts=alpha)
         for shape in shots.SHAPES[:-1]
