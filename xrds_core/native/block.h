@@ -52,9 +52,15 @@ static Block block_of(const Target *t, Area area) {
     return b;
 }
 
+// Tests make what lies between two planes forbidden.
+#ifndef BOUND
+#define BOUND(from, to, end)
+#endif
+
 static void *take(char **next, size_t count, size_t size) {
-    void *found = *next;
+    char *found = *next;
     *next += (count * size + 127) / 64 * 64;  // a vector more, for loads beyond the end
+    BOUND(found, found + count * size, *next);
     return found;
 }
 

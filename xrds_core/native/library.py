@@ -7,6 +7,7 @@ import sys
 from ctypes import CDLL, POINTER, c_double, c_float, c_int32, c_int64, c_void_p, sizeof
 from functools import cache
 from pathlib import Path
+from struct import unpack_from
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -76,6 +77,7 @@ def library() -> CDLL:
     """
     path = FOLDER / file_name()
     try:
+        _check_length(path)
         found = CDLL(str(path))
     except OSError as error:
         raise LibraryError(
@@ -91,6 +93,21 @@ def library() -> CDLL:
     if sizes != [sizeof(each) for each in IN_ORDER]:
         raise LibraryError(_other_version(path))
     return found
+
+
+def _check_length(path: Path) -> None:
+    """Raise OSError for a file that is cut off, where Linux would end the process.
+
+    The table of an ELF file's sections is its end.
+    """
+    with path.open("rb") as file:
+        head = file.read(64)
+    if len(head) < 64 or not head.startswith(b"\x7fELF"):
+        return  # which the system refuses, or which is not Linux's
+    (start,) = unpack_from("<Q", head, 40)
+    size, count = unpack_from("<2H", head, 58)
+    if path.stat().st_size < start + size * count:
+        raise OSError("it is cut off")
 
 
 def _other_version(path: Path) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ctypes import POINTER, Structure, c_float, c_int32, c_int64, c_void_p
+from ctypes import POINTER, Structure, c_float, c_int32, c_int64, c_uint32, c_void_p
 
 
 class Frame(Structure):
@@ -18,7 +18,7 @@ class Frame(Structure):
         ("parts", POINTER(c_void_p)),
         ("width", c_int32),
         ("height", c_int32),
-        ("number", c_int32),
+        ("number", c_uint32),
         ("samples", c_float),
     )
 

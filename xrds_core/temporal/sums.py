@@ -285,7 +285,7 @@ class _Call:
             parts=self._parts(frame),
             width=width,
             height=height,
-            number=frame.number % (1 << 31),
+            number=frame.number % (1 << 32),
             samples=frame.samples,
         )
         if frame.noise is not None:

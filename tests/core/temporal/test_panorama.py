@@ -3,58 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, pi, sin
+from math import pi
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from panoramas import HEIGHT, WIDTH, camera, frame, rays
 
 from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import Camera, Frame, Sphere, store
+from xrds_core.temporal.frame import Sphere, store
 from xrds_core.temporal.motion import reproject, reprojection
 
-Array = NDArray[np.float64]
-WIDTH, HEIGHT, RADIUS = 96, 48, 4.0
 HALF = Sphere((-pi / 2, pi / 2), (-pi / 4, pi / 3))
-
-
-def camera(
-    x: float = 0.0, z: float = 0.0, yaw: float = 0.0, sphere: Sphere | None = None
-) -> Camera:
-    """A panorama at (x, 0, z), turned to the left by ``yaw``."""
-    world = np.eye(4)
-    world[:3, :3] = [[cos(yaw), 0, sin(yaw)], [0, 1, 0], [-sin(yaw), 0, cos(yaw)]]
-    world[:3, 3] = x, 0.0, z
-    view, none = np.linalg.inv(world), np.zeros((4, 4))
-    return Camera(view, none, (WIDTH, HEIGHT), sphere=sphere or Sphere())
-
-
-def rays(eye: Camera) -> Array:
-    """Return the world directions (H, W, 3) of the pixels' centres."""
-    assert eye.sphere is not None
-    left, right = eye.sphere.longitude
-    low, high = eye.sphere.latitude
-    longitude = left + (np.arange(WIDTH) + 0.5) / WIDTH * (right - left)
-    latitude = high - (np.arange(HEIGHT)[:, None] + 0.5) / HEIGHT * (high - low)
-    level = np.cos(latitude)
-    parts = level * np.sin(longitude), np.sin(latitude), -level * np.cos(longitude)
-    own = np.stack(np.broadcast_arrays(*parts), -1)
-    return own @ np.linalg.inv(eye.view)[:3, :3].T
-
-
-def frame(number: int, eye: Camera, noise: float = 0.0) -> Frame:
-    """What is seen from inside a painted ball around the origin."""
-    start, ray = np.linalg.inv(eye.view)[:3, 3], rays(eye)
-    along = ray @ start
-    depth = -along + np.sqrt(along**2 - start @ start + RADIUS**2)
-    point = start + depth[..., None] * ray
-    colour = 0.5 + 0.3 * np.sin(point * [1.0, 1.3, 0.7])
-    away = np.array([[0, 0, -1], [-1, 0, 0], [0, 1, 0]])
-    normal = -point / RADIUS @ eye.view[:3, :3].T @ away.T
-    rng = np.random.default_rng(number)
-    noisy = colour * (1 + noise * rng.standard_normal((HEIGHT, WIDTH, 1)))
-    passes = (each.astype(np.float32) for each in (noisy, colour, normal, depth))
-    return Frame(number, eye, *passes)
 
 
 @pytest.mark.parametrize("sphere", [Sphere(), HALF])

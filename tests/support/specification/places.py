@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from xrds_core.temporal.motion import centres, grid, reproject
+from xrds_core.temporal.candidates import Images
+from xrds_core.temporal.frame import Stored
+from xrds_core.temporal.motion import Grid, Pair, centres, grid, reproject
 
-from .filters import extreme
+from .filters import Array, extreme
+
+Shape = tuple[int, int]
 
 TOLERANCE, AS_DISTANCE = 1.0, 2.0  # of forward and backward motion
 SURFACE = 0.02  # relative difference in inverse depth on one surface
@@ -25,18 +30,18 @@ class Places:
     that is, squared, with all that is unsure, and where it is `seen`.
     """
 
-    pixel: np.ndarray
-    x: np.ndarray
-    y: np.ndarray
-    apart: np.ndarray
-    seen: np.ndarray
+    pixel: Array
+    x: Array
+    y: Array
+    apart: Array
+    seen: Array
 
-    def put(self, at, other):
+    def put(self, at: Array, other: Places) -> None:
         for name in ("pixel", "x", "y", "apart", "seen"):
             getattr(self, name)[at] = getattr(other, name)
 
 
-def nearest(x, y, shape):
+def nearest(x: Array, y: Array, shape: Shape) -> Places:
     """The pixels that positions (n,) fall into; not seen outside the frame."""
     height, width = shape
     seen = (x >= 0.0) & (x < width) & (y >= 0.0) & (y < height)
@@ -47,26 +52,26 @@ def nearest(x, y, shape):
     return Places(pixel, off_x, off_y, off_x**2 + off_y**2, seen)
 
 
-def ranges(frame):
+def ranges(frame: Stored) -> tuple[Array, Array]:
     """The range of inverse depth in the 9x9 pixels around, with some slack."""
     depth = frame.inverse_depth.reshape(frame.shape)
     least, most = (extreme(depth, f, 4).ravel() for f in (np.fmin, np.fmax))
     return least * np.float32(1 - SLACK), most * np.float32(1 + SLACK)
 
 
-def nearest_surface(frame):
+def nearest_surface(frame: Stored) -> Array:
     """Of the 3x3 pixels around each one (H W)."""
     nearer = np.fmin if frame.camera.orthographic else np.fmax
     return extreme(frame.inverse_depth.reshape(frame.shape), nearer, 1).ravel()
 
 
-def rims(frame):
+def rims(frame: Stored) -> Array:
     """Pixels (H W) next to a nearer surface."""
     apart = np.abs(nearest_surface(frame) - frame.inverse_depth)
     return apart > SURFACE * np.abs(frame.inverse_depth)
 
 
-def still_places(pair):
+def still_places(pair: Pair) -> tuple[Places, Array]:
     """Places as if only the camera moved, and whether they are in the frame at all."""
     own = grid(pair.here.shape)
     x, y, _ = reproject(pair.forth, own.x, own.y, pair.here.inverse_depth)
@@ -84,7 +89,7 @@ def still_places(pair):
     return Places(found.pixel, found.x, found.y, apart, seen), in_frame
 
 
-def _jitter(found, pair, own, x, y):
+def _jitter(found: Places, pair: Pair, own: Grid, x: Array, y: Array) -> None:
     """Jitter the pixel taken where places lie at pixel centres."""
     at = np.flatnonzero(found.seen & (found.apart < pair.whole_motion))
     column, row = (each[at].astype(np.uint32) for each in (own.x, own.y))
@@ -102,7 +107,7 @@ def _jitter(found, pair, own, x, y):
     found.x[at], found.y[at] = (other.x + off[0])[inside], (other.y + off[1])[inside]
 
 
-def _parallax(transform, frame, pixels):
+def _parallax(transform: Any, frame: Stored, pixels: Array) -> Array:
     """The squared parallax of pixels (n,) to the nearest surface around them."""
     x, y = centres(pixels, frame.shape[1])
     own = reproject(transform, x, y, frame.inverse_depth[pixels])
@@ -111,7 +116,7 @@ def _parallax(transform, frame, pixels):
     return np.where(rims(frame)[pixels], np.fmin(apart, MOST_AT_RIMS), 0.0)
 
 
-def places(pair, images=None):
+def places(pair: Pair, images: Images | None = None) -> Places:
     """Places of all pixels: of surfaces, of what moves by itself, and of images."""
     found, _ = still_places(pair)
     here = np.arange(len(found.pixel))

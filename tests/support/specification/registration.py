@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 
 import numpy as np
+
+from .filters import Array
 
 SLOPE = np.array([1, -8, 0, 8, -1], np.float32) / 12
 BEND = np.array([-1, 16, -30, 16, -1], np.float32) / 24
 
 
-def moments(x, y, weight):
+def moments(x: Array, y: Array, weight: Array) -> Array:
     """Those of offsets, times their weights: (n,) -> (5, n)."""
     return np.stack([x, y, x * x, x * y, y * y]) * weight
 
 
-def changes(guess, summed):
+def changes(guess: Array, summed: Array) -> Array:
     """What offsets change, (n, H W), of a guess (n, H, W) and moments (5, H W)."""
     result = np.zeros((len(guess), summed.shape[1]), np.float32)
-    for plane, change in zip(guess.astype(np.float32), result, strict=True):
+    for k, plane in enumerate(guess.astype(np.float32)):
         with np.errstate(invalid="ignore"):
             for power, moment in zip(_powers(plane), summed, strict=True):
-                change -= moment * power.ravel()
+                result[k] -= moment * power.ravel()
     result[~np.isfinite(result)] = 0.0  # beside pixels without samples
     return result
 
 
-def _powers(plane):
+def _powers(plane: Array) -> Iterator[Array]:
     """Coefficients of the polynomial around each pixel (H, W), as moments are."""
     across = _filtered(plane, SLOPE, 1)
     yield across
@@ -35,7 +38,7 @@ def _powers(plane):
     yield _filtered(plane, BEND, 0)
 
 
-def _filtered(x, kernel, axis):
+def _filtered(x: Array, kernel: Array, axis: int) -> Array:
     wide = np.pad(x, [(2, 2) if k == axis else (0, 0) for k in range(2)], "edge")
     shifted = (np.roll(wide, 2 - k, axis) for k in range(5))
     found = sum(w * part for w, part in zip(kernel, shifted, strict=True) if w)

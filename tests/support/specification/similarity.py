@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from xrds_core.temporal.frame import Stored
 from xrds_core.temporal.noise import brightness as root_of_luminance
 from xrds_core.temporal.noise import guide_factor, guides_of
 from xrds_core.temporal.similarity import guide_area, penalties
 
-from .filters import box, least_difference, mean, total
+from .filters import Array, box, least_difference, mean, total
+
+Shape = tuple[int, int]
 
 UNSURE = 6.0
 SMOOTH, NOISE_AREA, MEAN, LIGHT_AREA, LIGHT = 3, 7, 3, 5, 4.0
@@ -18,13 +23,13 @@ TILE, AREAS, NEAR, CHANCE = 2, (1, 2, 4, 8), 1, 10.0
 TINY = np.float32(1e-9)
 
 
-def noise_of_guides(guides, samples):
+def noise_of_guides(guides: Array, samples: float) -> Array:
     """The standard deviation (H, W) of `guides_of` a frame, of all channels."""
     square = np.square(least_difference(guides)).sum(axis=-1)
     return np.sqrt(square * np.float32(2 / 3)) * np.float32(guide_factor(samples))
 
 
-def discounted(error, unsure):
+def discounted(error: Array, unsure: Array) -> Array:
     error = np.maximum(error, 0)
     return error * error / (error + unsure + TINY)
 
@@ -32,7 +37,14 @@ def discounted(error, unsure):
 class LightSimilarity:
     """Of frames with radiance; `picture` (H, W, 9 or 10), all else (H, W)."""
 
-    def __init__(self, frame, picture, noise, known, usual):
+    def __init__(
+        self,
+        frame: Stored,
+        picture: Array,
+        noise: list[Array],
+        known: Array,
+        usual: Any,
+    ) -> None:
         self.brightness, difference, self.noise = noise
         self.guides, self.known = guides_of(picture[..., 3:]), known
         self.penalties = penalties(frame.samples)
@@ -50,14 +62,16 @@ class LightSimilarity:
         )
         self.light = light / (box(texture, SMOOTH) + DARKEST_ROOT)
         self.untextured = self.brightness - self.light * texture
-        self.neighbours = []
+        self.neighbours: list[tuple[Array, Array, Array]] = []
 
-    def add(self, picture, brightness, difference, weight):
+    def add(
+        self, picture: Array, brightness: Array, difference: Array, weight: Array
+    ) -> None:
         """Add what a neighbour shows, whichever its group."""
         light = brightness - self.light * root_of_luminance(picture[..., 3:6])
         self.neighbours.append((light - self.untextured, difference, weight))
 
-    def weights(self, passes, brightness, seen):
+    def weights(self, passes: Array, brightness: Array, seen: Array) -> Array:
         """The weights of neighbours with these means, where they are `seen`."""
         valid = (seen & self.known).astype(np.float32)
         apart = np.square(guides_of(passes) - self.guides).sum(axis=-1) - self.noise
@@ -74,14 +88,14 @@ class LightSimilarity:
 class GuideSimilarity:
     """Of frames of guides alone; `picture` (H, W, 6 or 7)."""
 
-    def __init__(self, picture, known):
+    def __init__(self, picture: Array, known: Array) -> None:
         self.guides, self.known = guides_of(picture), known
         self.variance = box(noise_of_guides(self.guides, 1.0) ** 2, NOISE_AREA)
 
-    def add(self, *_):
+    def add(self, *_: Array) -> None:
         """Guides change with what they show alone."""
 
-    def weights(self, passes, _, seen):
+    def weights(self, passes: Array, _: Array, seen: Array) -> Array:
         valid = (seen & self.known).astype(np.float32)
         apart = np.square(guides_of(passes) - self.guides).sum(axis=-1)
         error = np.maximum(mean(apart, valid, SMOOTH) - self.variance, 0)
@@ -90,7 +104,7 @@ class GuideSimilarity:
         return np.where(self.known, like, 1.0) * seen
 
 
-def changes(neighbours, shape):
+def changes(neighbours: list[tuple[Array, Array, Array]], shape: Shape) -> Array:
     """The squared error of light that changes, summed over areas of all sizes."""
     error = np.zeros((-(-shape[0] // TILE), -(-shape[1] // TILE)), np.float32)
     for size in AREAS if neighbours else ():
@@ -107,7 +121,7 @@ def changes(neighbours, shape):
     return wide[: shape[0], : shape[1]]
 
 
-def _variance(weight, light, chance):
+def _variance(weight: Array, light: Array, chance: Array) -> Array:
     """Between neighbours (n, H, W) of tiles, beyond that of their noise."""
     share = 1 / np.maximum(weight, TINY)
     every = 1 / np.maximum(weight.sum(0), TINY)
@@ -120,7 +134,7 @@ def _variance(weight, light, chance):
     return variance**2 / (variance + noise + TINY)
 
 
-def _tiles(x):
+def _tiles(x: Array) -> Any:
     """The sums over tiles of (H, W), padded to whole tiles."""
     wide = np.pad(x, ((0, -x.shape[0] % TILE), (0, -x.shape[1] % TILE)))
     return sum(wide[i::TILE, j::TILE] for i in range(TILE) for j in range(TILE))

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from xrds_core.temporal.candidates import Images
+from xrds_core.temporal.frame import Stored
 from xrds_core.temporal.noise import brightness as root_of_luminance
-from xrds_core.temporal.sums import Means
+from xrds_core.temporal.sums import Aligned, Means, Reprojected
 
-from .filters import extreme
+from .filters import Array, extreme
 from .places import places, rims
 from .registration import changes, moments
 from .similarity import GuideSimilarity, LightSimilarity
+
+Neighbour = Aligned | Reprojected
+Judge = LightSimilarity | GuideSimilarity
 
 AS_DISTANCE = 0.25  # of offsets that are taken out
 TILE = 64
@@ -20,7 +27,7 @@ LARGEST_HALF = 65504.0
 TINY = np.float32(1e-9)
 
 
-def floats(x):
+def floats(x: Array) -> Array:
     return x.astype(np.float32)
 
 
@@ -28,13 +35,13 @@ def floats(x):
 class Work:
     """As `temporal.sums.Work`, which it takes the place of."""
 
-    target: object
-    images: object
+    target: Stored
+    images: Images | None
     usual: float
-    lit: tuple
-    threads: object
+    lit: tuple[str, ...]
+    threads: int | None
 
-    def guess(self, neighbours):
+    def guess(self, neighbours: Sequence[Neighbour]) -> Array:
         means = self.means([neighbours])
         light = root_of_luminance(means.passes[0]) if self.target.has_light else 0
         planes = [each.reshape(-1, each.shape[-1]) for each in means.passes]
@@ -43,7 +50,7 @@ class Work:
         guess = np.clip(np.hstack([*planes, light]), -LARGEST_HALF, LARGEST_HALF)
         return guess.T.reshape(-1, *self.target.shape).astype(np.float16)
 
-    def means(self, groups, guess=None):
+    def means(self, groups: Sequence[Any], guess: Array | None = None) -> Means:
         frame = self.target
         own = np.hstack(
             [floats(frame.picture), *(self.part(frame, x) for x in self.lit)]
@@ -80,7 +87,7 @@ class Work:
         count = -(-channels // 3)
         return Means(planes[:count], planes[count:], total.reshape(frame.shape), reused)
 
-    def judge(self, known):
+    def judge(self, known: Array) -> Judge:
         frame, shape = self.target, self.target.shape
         picture = floats(frame.picture).reshape(*shape, -1)
         known = known.reshape(shape)
@@ -91,7 +98,9 @@ class Work:
         noise = [floats(x).reshape(shape) for x in planes]
         return LightSimilarity(frame, picture, noise, known, np.float32(self.usual))
 
-    def sums(self, group, judge, guess):
+    def sums(
+        self, group: Sequence[Neighbour], judge: Judge, guess: Array | None
+    ) -> tuple[Array, ...]:
         """Weighted values, brightness, weights, and samples taken of a group."""
         frame = self.target
         channels = frame.picture.shape[1] + 3 * len(self.lit)
@@ -118,7 +127,7 @@ class Work:
             values, bright = values + change[:-1].T, bright + change[-1]
         return floats(values), floats(bright), floats(weights), floats(shares)
 
-    def taken(self, found, registers):
+    def taken(self, found: Neighbour, registers: bool) -> tuple[Array, ...]:
         """Pixels taken of a neighbour, samples of each, weights, and offsets."""
         other, count = found.other, len(self.target.picture)
         nothing = np.zeros((2, count), np.float32)
@@ -137,14 +146,14 @@ class Work:
         apart = apart - (1 - AS_DISTANCE) * np.square(offsets).sum(0)
         return pixel, share, floats(share * np.exp(apart * np.float32(fall))), offsets
 
-    def tiles(self, found):
+    def tiles(self, found: Reprojected) -> Array:
         """The weights of a neighbour's pixels by coarse rejection."""
         share = tile_shares(found.tiles, self.target.shape).ravel()
         if self.images is not None:
             share[self.images.positions(found.pair)[0]] = found.tiles.max()
         return floats(share)
 
-    def picture(self, found, pixel):
+    def picture(self, found: Neighbour, pixel: Array) -> tuple[Array, Any]:
         """Values (n, C) of pixels taken, and brightness and difference, if any."""
         other = found.other
         picture = floats(other.picture[pixel])
@@ -159,13 +168,13 @@ class Work:
             )
         return np.hstack([picture, *parts]), light
 
-    def part(self, frame, name):
+    def part(self, frame: Stored, name: str) -> Array:
         part = frame.parts[name]
         dark = np.zeros((len(frame.picture), 3), np.float32)
         return dark if part is None else floats(part)
 
 
-def tile_shares(tiles, shape):
+def tile_shares(tiles: Array, shape: tuple[int, int]) -> Array:
     """The weights (H, W) of tiles, linear between their centres."""
     places = (
         np.clip((np.arange(n) + 0.5) / TILE - 0.5, 0, k - 1)
@@ -178,7 +187,7 @@ def tile_shares(tiles, shape):
     return floats(down.T @ tiles @ across)
 
 
-def counts(frame, pixels):
+def counts(frame: Stored, pixels: Array | slice) -> Array:
     if frame.counts is None:
         return np.full(len(frame.picture), frame.samples, np.float32)[pixels]
     return floats(frame.counts[pixels])
