@@ -14,8 +14,9 @@ import numpy as np
 
 from .. import exr
 from ..exr.openexr_io import Part
+from ..temporal.frame import pack_frame
 from ..temporal.half_floats import LARGEST_HALF
-from ..temporal.packing import pack_counts, pack_frame
+from ..temporal.packing import pack_counts
 from .cameras import to_header
 from .names import CAMERA_NORMAL, COUNTS, NOISE, NOISY, PATH_LENGTH
 from .reading import KEY, NAME, RADIUS, SAMPLES, STILL, SUBSET

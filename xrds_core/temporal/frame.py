@@ -18,7 +18,7 @@ from ..errors import PictureError
 from ..native.surfaces import find_rims
 from .halves import Halves
 from .local_filters import extreme
-from .packing import pack_counts, pack_frame, pack_parts, pack_vectors
+from .packing import pack, pack_counts, pack_parts, pack_vectors, pack_with_noise
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -234,6 +234,19 @@ class Stored:
     def shows_same(self, other: Stored) -> bool:
         """Whether two frames differ in their noise alone."""
         return self.still and other.still and self.camera.same(other.camera)
+
+
+def pack_frame(
+    frame: Frame,
+) -> tuple[NDArray[np.float16], NDArray[np.bool_], Noise | None]:
+    """Return `Stored.picture`, its invalid pixels, and the noise, 0 at these.
+
+    There is none of guides alone.
+    """
+    passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
+    if frame.radiance is None:
+        return *pack(*passes), None
+    return pack_with_noise(passes, frame.samples, frame.halves)
 
 
 def store(frame: Frame) -> Stored:

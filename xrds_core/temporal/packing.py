@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..arrays import Array
-    from .frame import Frame
     from .halves import Halves
 
     Passes = tuple[Array | None, Array, Array, Array | None]
@@ -37,16 +36,15 @@ def pack(
     return packing.picture, packing.invalid
 
 
-def pack_frame(frame: Frame) -> tuple[NDArray[np.float16], Mask, Noise | None]:
-    """Return `Stored.picture`, its invalid pixels, and the noise, 0 at these.
+def pack_with_noise(
+    passes: Passes, samples: float, halves: Halves | None
+) -> tuple[NDArray[np.float16], Mask, Noise]:
+    """Return the same of a frame with radiance, and its noise, 0 at invalid pixels.
 
-    There is none of guides alone.
+    The noise is that of its `halves`, where there are any.
     """
-    packing = _Packing((frame.radiance, frame.albedo, frame.normal, frame.alpha))
-    if frame.radiance is None:
-        packing.run()
-        return packing.picture, packing.invalid, None
-    noise = packing.run_with_noise(frame.samples, frame.halves)
+    packing = _Packing(passes)
+    noise = packing.run_with_noise(samples, halves)
     return packing.picture, packing.invalid, noise
 
 

@@ -2,8 +2,8 @@
 
 Frames of synthetic samples, without a renderer. All parts run once per round, on as
 many cores as asked for, so that a slow minute of the machine hits all; told are
-medians. Beside the seconds stand the bytes that a part has to read and write, and how long this
-machine's memory takes for them.
+medians. Beside the seconds stand the bytes that a part has to read and write, and how
+long this machine's memory takes for them.
 """
 
 from __future__ import annotations

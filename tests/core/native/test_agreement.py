@@ -31,10 +31,10 @@ from specification.places import SURFACE, ranges, still_places
 from xrds_core.native.library import library
 from xrds_core.native.surfaces import find_ranges, find_rims
 from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.frame import Frame, Stored
+from xrds_core.temporal.frame import Frame, Stored, pack_frame
 from xrds_core.temporal.halves import Halves
 from xrds_core.temporal.motion import Pair, pair
-from xrds_core.temporal.packing import pack_frame, pack_parts, pack_vectors
+from xrds_core.temporal.packing import pack_parts, pack_vectors
 from xrds_core.temporal.sums import Work, find_spots
 
 Array = NDArray[Any]

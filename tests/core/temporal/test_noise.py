@@ -7,9 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from shots import camera
 
-from xrds_core.temporal.frame import Frame
+from xrds_core.temporal.frame import Frame, pack_frame
 from xrds_core.temporal.noise import Noise
-from xrds_core.temporal.packing import pack_frame
 
 SHAPE = 64, 96
 RNG = np.random.default_rng(5)

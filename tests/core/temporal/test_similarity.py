@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from shots import camera
 
 from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import Frame, Stored, store
+from xrds_core.temporal.frame import Frame, Stored, pack_frame, store
 from xrds_core.temporal.halves import Halves
 from xrds_core.temporal.local_filters import box
-from xrds_core.temporal.packing import pack_frame
 
 Array = NDArray[np.float32]
 SHAPE = (48, 64)
