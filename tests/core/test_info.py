@@ -91,7 +91,6 @@ def test_lines_show_missing_blender_and_weights() -> None:
         "torch_error": None,
         "devices": ["cpu", "metal"],
         "denoiser": ["metal", "cpu"],
-        "accumulation": ["Radeon", "cpu"],
         "paper_table": [],
         "presets": {},
         "weights": [],
@@ -102,7 +101,6 @@ def test_lines_show_missing_blender_and_weights() -> None:
     assert "weights: none" in text
     assert "denoiser: metal, cpu" in text
     assert "network: torch 2.0 on cpu, metal" in text
-    assert "accumulation: Radeon, cpu" in text
     assert "own.safetensors  sha256 0123456789abcdef" in text
 
 

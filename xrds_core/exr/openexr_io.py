@@ -150,7 +150,16 @@ def _library() -> Any:
     """OpenEXR, on all processors: by itself it reads and writes on one."""
     import OpenEXR
 
-    OpenEXR.set_global_thread_count(os.cpu_count() or 1)
+    def start() -> None:
+        OpenEXR.set_global_thread_count(os.cpu_count() or 1)
+
+    start()
+    if hasattr(os, "register_at_fork"):  # a fork has none of the threads it waits for
+        os.register_at_fork(
+            before=lambda: OpenEXR.set_global_thread_count(0),
+            after_in_parent=start,
+            after_in_child=start,
+        )
     return OpenEXR
 
 
