@@ -209,11 +209,6 @@ class Denoiser:
             stages.report(1.0)
         return Denoised(result, pictures.bad_pixels, prefiltered, made_of)
 
-    @property
-    def filters_guides(self) -> bool:
-        """Whether guides that are not clean are denoised before the picture is."""
-        return self.quality in _WITH_PREFILTER
-
     def guides(
         self, albedo: Array, normal: Array, *, progress: Callback | None = None
     ) -> tuple[Array, Array]:

@@ -90,7 +90,7 @@ def finish_frame(
     Where a frame has few samples, and few are reused, the picture is that of the frame
     alone, also denoised: next to pixels of many samples a denoiser mistakes the noise
     of few for detail. Where that is a small part of the picture, that part alone is
-    denoised again. Guides are denoised once for both.
+    denoised again.
     `region`, rows and columns, is the part to denoise: black around a crop would give
     the denoiser a wrong exposure. `movement` is that of the shot; `accumulated` is the
     frame with its neighbours if it is known already; `light` are the parts that are
@@ -109,28 +109,21 @@ def finish_frame(
     parts = 1 + len(areas)
     passes = _Passes.of(accumulated, light, region)
     told = [_part(progress, number, parts) for number in range(parts)]
-    shares_guides = bool(areas) and denoiser.filters_guides
-    prefiltered: tuple[str, ...] = ()
-    if shares_guides:
-        passes, prefiltered = passes.with_clean_guides(denoiser)
-    denoised = passes.denoised(denoiser, told[0], shares_guides)
+    denoised = passes.denoised(denoiser, told[0])
     if areas:
         lacking = _Passes.of(
             _filled(alone, accumulated), light, region, like=denoised.parts
         )
-        if shares_guides:
-            lacking = lacking._replace(albedo=passes.albedo, normal=passes.normal)
         mixed = denoised.radiance.copy()
         for area, done in zip(areas, told[1:], strict=True):
-            single = lacking.within(area.around).denoised(denoiser, done, shares_guides)
+            single = lacking.within(area.around).denoised(denoiser, done)
             weight = share[area.place][..., None]
             pairs = [(mixed, single.radiance)]
             pairs += [(x, single.parts[k]) for k, x in denoised.parts.items()]
             for whole, part in pairs:
                 inner = part[area.within]
                 whole[area.place] = inner + (whole[area.place] - inner) * weight
-        prefiltered = prefiltered or denoised.prefiltered
-        denoised = replace(denoised, radiance=mixed, prefiltered=prefiltered)
+        denoised = replace(denoised, radiance=mixed)
     names = dict.fromkeys(x.colour_name for x in light if x.colour)
     colours = {x: completed(accumulated.parts[x][region]) for x in names}
     found = colours | added_up(denoised.radiance, denoised.parts, light, colours)
@@ -248,26 +241,10 @@ class _Passes(NamedTuple):
         noisy, albedo, normal = (np.ascontiguousarray(x[region]) for x in self[:3])
         return _Passes(noisy, albedo, normal, _cropped(self.parts, region))
 
-    def with_clean_guides(self, denoiser: Denoiser) -> tuple[_Passes, tuple[str, ...]]:
-        """The same with denoised guides, and the names of those that needed it."""
-        noisy = np.nan_to_num(self.albedo), np.nan_to_num(self.normal)
-        albedo, normal = clean = denoiser.guides(*noisy)
-        names = zip(("albedo", "normal"), noisy, clean, strict=True)
-        changed = tuple(name for name, before, after in names if after is not before)
-        return self._replace(albedo=albedo, normal=normal), changed
-
     def denoised(
-        self,
-        denoiser: Denoiser,
-        progress: Callable[[float], bool] | None,
-        has_clean_guides: bool,
+        self, denoiser: Denoiser, progress: Callable[[float], bool] | None
     ) -> Denoised:
-        return denoiser(
-            *self[:3],
-            parts=self.parts,
-            guides_are_clean=has_clean_guides or None,
-            progress=progress,
-        )
+        return denoiser(*self[:3], parts=self.parts, progress=progress)
 
 
 def _cropped(

@@ -34,37 +34,15 @@ def frame(number: int) -> Frame:
 
 
 class Counting:
-    """A denoiser that notes the sizes of what it denoises, and how often its guides."""
+    """A denoiser that notes the sizes of what it denoises."""
 
-    def __init__(self, quality: str = "fast") -> None:
-        self.denoiser = Denoiser(quality, "cpu")
-        self.filters_guides = self.denoiser.filters_guides
+    def __init__(self) -> None:
+        self.denoiser = Denoiser("fast", "cpu")
         self.sizes: list[tuple[int, ...]] = []
-        self.takes_clean: list[bool | None] = []
-        self.guided = 0
 
     def __call__(self, *passes: NDArray[np.float32], **rest: Any) -> Any:
         self.sizes.append(passes[0].shape[:2])
-        self.takes_clean.append(rest["guides_are_clean"])
         return self.denoiser(*passes, **rest)
-
-    def guides(self, *guides: NDArray[np.float32]) -> Any:
-        self.guided += 1
-        return self.denoiser.guides(*guides)
-
-
-def test_guides_are_denoised_once_for_both_pictures() -> None:
-    own, others = store(frame(1)), [store(frame(n)) for n in range(2, 6)]
-    counting = Counting("medium")
-    finished = finish_frame(own, others, counting, Movement())
-    assert counting.guided == 1
-    assert counting.takes_clean == [True, True]
-    alone = Counting("medium")
-    single = finish_frame(own, [], alone, Movement())
-    assert alone.guided == 0
-    assert alone.takes_clean == [None]
-    # the plan tells which guides were noisy, once or twice denoised
-    assert finished.denoised.prefiltered == single.denoised.prefiltered
 
 
 def test_only_the_part_that_lacks_neighbours_is_denoised_again(

@@ -92,7 +92,6 @@ class Counting:
 
     def __init__(self, denoiser: Denoiser) -> None:
         self.denoiser, self.pictures = denoiser, []
-        self.filters_guides, self.guides = denoiser.filters_guides, denoiser.guides
 
     def __call__(self, *passes: Any, progress: Any = None, **more: Any) -> Any:
         self.pictures.append(passes[0])
