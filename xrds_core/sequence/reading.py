@@ -391,7 +391,20 @@ def _is_cycles_samples(name: str) -> bool:
 
 
 def _target(file: File, found: Found) -> tuple[int, list[str]]:
-    """Return the part that the picture is written to, and its channels' names there."""
+    """Return the part that the picture is written to, and its channels' names there.
+
+    Raises Unfit where it lies in another file than the one that is copied.
+    """
+    part, names = _target_of_all(file, found)
+    if part >= file.own_parts:
+        raise Unfit(
+            f"the picture of {file.path} lies in a file of --also: give that file as "
+            "the input, and this one by --also"
+        )
+    return part, names
+
+
+def _target_of_all(file: File, found: Found) -> tuple[int, list[str]]:
     prefix = found.picture[0].rpartition(".")[0]
     alpha = f"{prefix}.A" if prefix else "A"
     wanted = [*found.picture, alpha] if found.alpha is not None else found.picture

@@ -190,7 +190,7 @@ def _damage(shot: _Shot, dice: Dice) -> None:
     """An input that is not whole."""
     path = shot.path(dice.choice(shot.numbers))
     data = path.read_bytes()
-    path.write_bytes(data[: dice.randrange(len(data))])
+    path.write_bytes(data[: dice.randrange(max(len(data), 1))])
 
 
 def _swap(shot: _Shot, dice: Dice) -> None:
@@ -229,7 +229,7 @@ def _output(shot: _Shot, dice: Dice) -> None:
     data = path.read_bytes()
     how = dice.randrange(4)
     if how == 0:
-        path.write_bytes(data[: dice.randrange(len(data))])
+        path.write_bytes(data[: dice.randrange(max(len(data), 1))])
     elif how == 1:
         path.unlink()
     elif how == 2:

@@ -374,7 +374,7 @@ def _camera(folder: Path, dice: random.Random) -> list[str]:
     keys = dice.choice((["all"], ["1", "2", "3"], ["1"], ["²"], ["9" * 30], []))
     text = json.dumps(dict.fromkeys(keys, told))
     if dice.random() < 0.2:
-        place = dice.randrange(len(text))
+        place = dice.randrange(max(len(text), 1))
         extra = dice.choice(
             ("", "[" * 3000, "1e999", "\x00", "9" * 5000, "NaN", "null")
         )

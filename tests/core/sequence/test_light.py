@@ -212,6 +212,22 @@ def test_files_that_belong_to_a_frame_are_not_overwritten(
         denoise_sequence(files, denoiser, reading=Reading(also=also))
 
 
+def test_the_picture_must_lie_in_the_file_that_is_copied(
+    shot: Path, denoiser: Denoiser
+) -> None:
+    guides = {name: x for name, x in CYCLES.items() if name != "radiance"}
+    for number in range(1, 4):
+        write(shot / "guides", frame(number), guides)
+        write(shot / "light", frame(number), {"radiance": CYCLES["radiance"]})
+    also = (str(shot / "light/####.exr"),)
+    source, output = str(shot / "guides/####.exr"), str(shot / "out/####.exr")
+    files = Files(source, output, also=also)
+    with pytest.raises(
+        PictureError, match=r"the picture of .* lies in a file of --also"
+    ):
+        denoise_sequence(files, denoiser, reading=Reading(also=also))
+
+
 def test_files_of_another_size_are_no_part_of_a_frame(
     shot: Path, denoiser: Denoiser
 ) -> None:
