@@ -19,11 +19,11 @@ from xrds_blender.command import main
 from xrds_blender.planning import budget
 from xrds_blender.planning.settings import Denoising, Mode, Network, Settings
 from xrds_core.errors import UsageError
+from xrds_core.native.threads import processors
 from xrds_lab.bench import (
     growth,
     inputs,
     low_budgets,
-    machine,
     measure,
     pictures,
     sweep,
@@ -56,7 +56,7 @@ def few_modes(monkeypatch: pytest.MonkeyPatch) -> None:
         for name in ("DENOISERS", "LOW_DENOISING"):
             if hasattr(user, name):
                 monkeypatch.setattr(user, name, few)
-    monkeypatch.setattr(growth, "_core_counts", lambda: [machine.cores()])
+    monkeypatch.setattr(growth, "_core_counts", lambda: [processors()])
 
 
 class World:

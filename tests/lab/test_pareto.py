@@ -10,6 +10,7 @@ import pytest
 
 from xrds_blender.planning.settings import Denoising, Network
 from xrds_core.errors import Cancelled
+from xrds_core.native.threads import processors
 from xrds_lab.bench import growth, machine, pareto, same_picture
 from xrds_lab.bench.inputs import OFF
 from xrds_lab.bench.journal import MOST_KILLS, Journal
@@ -287,12 +288,12 @@ def test_what_kills_the_process_again_and_again_is_left_out(tmp_path: Path) -> N
     assert "ended with its process 3 times" in last.failures["deadly"]
 
 
-@pytest.mark.skipif(machine.cores() < 2, reason="there is one core alone")
+@pytest.mark.skipif(processors() < 2, reason="there is one core alone")
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="not Linux")
 def test_threads_are_held_to_cores_and_let_go_again() -> None:
     before = os.sched_getaffinity(0)
     with machine.only_cores(1):
-        assert machine.cores() == 1
+        assert processors() == 1
     assert os.sched_getaffinity(0) == before
     with pytest.raises(OSError, match="cores, not 4096"), machine.only_cores(4096):
         pass

@@ -44,7 +44,7 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
         ),
     ),
     "packing_bytes": (c_int64, (POINTER(Packing), c_int32)),
-    "pack": (c_int32, (POINTER(Packing), c_int32, c_int32, c_void_p)),
+    "pack": (None, (POINTER(Packing), c_int32, c_int32, c_void_p)),
     "to_halves": (c_int32, (POINTER(Pass), *(c_int32,) * 4, c_void_p)),
     "find_spots": (
         None,

@@ -4,7 +4,7 @@ INLINE int is_finite(float x) { return fabsf(x) < INFINITY; }
 
 // The nearest half that is finite; 0 for NaN.
 INLINE half finite_half(float x) {
-    return to_half(x == x ? at_most(at_least(x, -LARGEST_HALF), LARGEST_HALF) : 0.0f);
+    return to_half(x == x ? limited_half(x) : 0.0f);
 }
 
 INLINE const float *channel_of(const Pass *p, int y, int c) {

@@ -53,6 +53,9 @@ INLINE half to_half(float f) {
 #endif
 }
 
+// The nearest number that a half holds; not of NaN.
+INLINE float limited_half(float x) { return at_most(at_least(x, -LARGEST_HALF), LARGEST_HALF); }
+
 // Two halves that lie side by side.
 INLINE uint32_t pair_at(const half *from) { uint32_t p; memcpy(&p, from, 4); return p; }
 

@@ -3,7 +3,7 @@
 Samples are gathered, never interpolated: each pixel takes the nearest pixel of the
 neighbour frame. Interpolation would correlate the noise of adjacent pixels, and
 denoisers mistake correlated noise for texture. How far that pixel lies from the true
-place is taken out by `registration`, for which a frame is gathered twice. The mean is
+place is taken out by registration, for which a frame is gathered twice. The mean is
 weighted by sample counts, by what distance remains, which keeps fine texture sharp, and
 by a similarity weight: do both frames show the same light?
 """

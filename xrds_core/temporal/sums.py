@@ -1,8 +1,8 @@
 """Has the compiled library sum the samples of neighbours: hands over all it needs.
 
 The steps, for each pixel of each neighbour: where it was (`motion`, `panorama`), what
-it weighs there, the offset of the nearest pixel (`registration`), then for all
-neighbours together `similarity` and `changes`. The sources lie in `native`.
+it weighs there, the offset of the nearest pixel, then for all neighbours together
+`similarity`, and light that changes. The sources lie in `native`.
 """
 
 from __future__ import annotations
@@ -147,12 +147,12 @@ def find_spots(pair: Pair, step: int) -> tuple[NDArray[np.int32], Mask, Mask]:
     count = len(range(start, height, step)) * across
     pixel = np.empty(count, np.int32)
     seen, in_frame = np.empty((2, count), np.bool_)
-    call = _Call(Work(pair.here, None, 0.0, (), 1), [])
-    neighbour = call.reprojected(pair)
+    whole = Reprojected(pair, np.ones((1, 1), np.float32), 0.0)
+    call = _Call(Work(pair.here, None, 0.0, (), 1), [(whole, 0)])
     scratch = np.empty(8 * across, np.float32)
     library().find_spots(
         call.target,
-        neighbour,
+        call.target.all[0],
         step,
         *(x.ctypes.data for x in (pixel, seen, in_frame, scratch)),
     )
@@ -209,10 +209,8 @@ class _Call:
 
         return sum(in_threads(work, areas, self._work.threads))
 
-    def reprojected(self, pair: Pair) -> structures.Neighbour:
+    def _reprojected(self, pair: Pair) -> structures.Neighbour:
         """The structure of a neighbour without motion of its own."""
-        self._extent(pair)
-        self.target.frame = self._frame(pair.here, True)
         turn = np.eye(3) if pair.turn is None else pair.turn
         result = structures.Neighbour(
             frame=self._frame(pair.there, True),
@@ -233,7 +231,7 @@ class _Call:
             result.turn[:] = np.eye(3).ravel().tolist()
         else:
             pair = found.pair
-            result = self.reprojected(pair)
+            result = self._reprojected(pair)
             self._moving(result, pair)
             result.fall, result.most = found.fall, found.tiles.max()
             result.tile_rows, result.tile_columns = found.tiles.shape

@@ -18,6 +18,7 @@ import numpy as np
 
 from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
+from xrds_core.native.threads import processors
 
 from . import machine, tasks
 from .inputs import Request
@@ -81,7 +82,7 @@ def growth(
 
 def _core_counts() -> list[int]:
     """One core and all of them, where threads can be held to cores (Linux)."""
-    most = machine.cores()
+    most = processors()
     if not Path("/proc/self/task").is_dir() or most == 1:
         return [most]
     return [1, most]

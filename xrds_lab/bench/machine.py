@@ -9,6 +9,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from xrds_core.native.threads import processors
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
@@ -31,7 +33,7 @@ def describe(device: str = "cpu") -> dict[str, Any]:
         }
     return {
         "processor": _processor(),
-        "cores": cores(),
+        "cores": processors(),
         "memory": _memory(),
         "system": f"{platform.system()} {platform.release()}",
         "device": device,
@@ -40,13 +42,6 @@ def describe(device: str = "cpu") -> dict[str, Any]:
         **networks,
         "xrds": package_version(),
     }
-
-
-def cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 @contextmanager

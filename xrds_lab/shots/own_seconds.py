@@ -22,6 +22,7 @@ from xrds_core.atomic import replacing, write_json
 from xrds_core.denoising import Denoiser
 from xrds_core.exr import openexr_io
 from xrds_core.native.surfaces import find_ranges, find_rims
+from xrds_core.native.threads import processors
 from xrds_core.sequence.finishing import finish_frame
 from xrds_core.temporal import accumulate as accumulation
 from xrds_core.temporal.coarse_rejection import tile_weights
@@ -74,7 +75,7 @@ def bench_own_seconds(
     so on, doubled.
     """
     out.mkdir(parents=True, exist_ok=True)
-    counts = cores or _doubled(machine.cores())
+    counts = cores or _doubled(processors())
     bandwidth = _bandwidth()
     points = [
         row
