@@ -304,9 +304,9 @@ def flipped(target: Stored, others: Sequence[Stored]) -> Array:
     result = np.zeros(len(target.picture), bool)
     for other in same_shot(target, others):
         both = pair(target, other)
-        pixel, seen, _ = find_spots(both, 1)
-        expected, _ = still_places(both)
-        result |= (seen != expected.seen) | (seen & (pixel != expected.pixel))
+        spots, (expected, _) = find_spots(both, 1), still_places(both)
+        result |= spots.seen != expected.seen
+        result |= spots.seen & (spots.pixel != expected.pixel)
     return result.reshape(target.shape)
 
 

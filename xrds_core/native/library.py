@@ -50,6 +50,10 @@ _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
         None,
         (POINTER(Target), POINTER(Neighbour), c_int32, *(c_void_p,) * 4),
     ),
+    "compare_spots": (
+        None,
+        (POINTER(Target), POINTER(Neighbour), c_int32, *(c_void_p,) * 5),
+    ),
 }
 
 

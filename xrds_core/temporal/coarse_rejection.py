@@ -13,19 +13,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .motion import spot_stride
-from .noise import brightness, luminance
-from .sums import find_spots
+from .sums import compare_spots
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from ..arrays import Array
-    from .frame import Stored
     from .motion import Pair
+    from .sums import Compared
 
-    Mask = NDArray[np.bool_]
-
-TILE = 64  # pixels across
 # Of the hits that reproject into the other frame: if fewer match, it is a shot cut.
 _LEAST_SHARE = 1 / 3
 # Radii in tiles: tests single tiles, 3x3 tiles, and the whole picture.
@@ -37,60 +33,27 @@ _HARMLESS = 0.01
 
 def tile_weights(pair: Pair) -> Array:
     """Return the weights (rows, columns) of `pair.here`'s tiles, 0 across a cut."""
-    height, width = pair.here.shape
-    tiles = -(-height // TILE), -(-width // TILE)
-    if pair.here.is_empty:  # there is nothing to compare
-        return np.ones(tiles, np.float32)
     step = spot_stride(pair.here.shape)
-    y, x = np.mgrid[step // 2 : height : step, step // 2 : width : step]
-    spots = (y * width + x).ravel()
-    there, seen, in_frame = find_spots(pair, step)
-    still = _still(pair, spots, there)
-    seen &= still
-    if _is_shot_cut(pair, step, spots, seen, in_frame & still):
-        return np.zeros(tiles, np.float32)
-    alike = pair.here.samples == pair.there.samples
-    own = _brightness(pair.here, spots, alike)
-    other = _brightness(pair.there, there, alike)
-    tile = (y // TILE * tiles[1] + x // TILE).ravel()[seen]
-    difference = (other - own)[seen]
-    sums = [
-        np.bincount(tile, part, minlength=tiles[0] * tiles[1])
-        .astype(np.float64)
-        .reshape(tiles)
-        for part in (np.ones(len(tile)), difference, difference**2, own[seen])
-    ]
-    return _weights(sums)
+    found = compare_spots(pair, step)
+    if pair.here.is_empty:  # there is nothing to compare
+        return np.ones(found.tiles.shape[1:], np.float32)
+    if _is_shot_cut(pair, step, found):
+        return np.zeros(found.tiles.shape[1:], np.float32)
+    return _weights(found.tiles)
 
 
-def _is_shot_cut(
-    pair: Pair, step: int, spots: NDArray[np.intp], seen: Mask, in_frame: Mask
-) -> bool:
+def _is_shot_cut(pair: Pair, step: int, found: Compared) -> bool:
     """Whether too few of the pixels that are in both frames match.
 
     The sky is left out if there is anything else: it looks the same in every view.
     """
-    near = pair.here.inverse_depth[spots]
-    hit = (near > 0.0) | (near < 0.0)
-    if hit.any():
-        seen, in_frame = seen & hit, in_frame & hit
     moved, followed = _moving(pair, step)
-    compared = in_frame.sum() + moved
-    return bool(compared == 0 or seen.sum() + followed < _LEAST_SHARE * compared)
-
-
-def _still(pair: Pair, here: NDArray[np.intp], there: NDArray[np.int32]) -> Mask:
-    """Return where neither frame shows a moving object or an invalid pixel."""
-    result = np.ones(len(here), bool)
-    for frame, pixels in ((pair.here, here), (pair.there, there)):
-        if frame.invalid is not None:
-            result &= ~frame.invalid[pixels]
-    if pair.object_motion is not None:
-        result &= (
-            ~np.isin(here, pair.object_motion.pixels)
-            & ~pair.object_motion.moving[there]
-        )
-    return result
+    if found.surfaces:
+        compared, matching = found.compared_surfaces, found.matching_surfaces
+    else:
+        compared, matching = found.compared, found.matching
+    most = compared + moved
+    return most == 0 or matching + followed < _LEAST_SHARE * most
 
 
 def _moving(pair: Pair, step: int) -> tuple[float, float]:
@@ -101,19 +64,9 @@ def _moving(pair: Pair, step: int) -> tuple[float, float]:
     return len(pair.object_motion.pixels) / step**2, followed / step**2
 
 
-def _brightness(frame: Stored, pixels: NDArray[np.integer], alike: bool) -> Array:
-    """Return the square root of luminance (n,), or luminance if not `alike`.
-
-    Between frames of different sample counts the root would be biased: less noise has
-    a larger mean root.
-    """
-    light = frame.picture[pixels, :3].astype(np.float32)
-    return brightness(light) if alike else luminance(light)
-
-
-def _weights(sums: list[NDArray[np.float64]]) -> Array:
-    """Return weights from sums: count, differences, their squares, and brightness."""
-    weights = np.ones(sums[0].shape)
+def _weights(sums: NDArray[np.float64]) -> Array:
+    """Return weights from the sums of tiles."""
+    weights = np.ones(sums.shape[1:])
     for reach in _REACHES:
         count, total, squares, bright = (_around(x, reach) for x in sums)
         count = np.maximum(count, 1.0)

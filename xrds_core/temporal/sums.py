@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     Mask = NDArray[np.bool_]
     Guess = NDArray[np.float16]
 
+TILE = 64
+"""Pixels across, of coarse rejection: as the library has it."""
 _COLUMNS = 512  # of an area: what it needs beside the pictures stays small
 
 
@@ -135,20 +137,71 @@ class Work:
         return Means(pictures(means), pictures(parts), samples, reused)
 
 
-def find_spots(pair: Pair, step: int) -> tuple[NDArray[np.int32], Mask, Mask]:
-    """Return where every `step`th pixel was, as if only the camera moved, (n,) each.
+@dataclass(frozen=True)
+class Spots:
+    """Where every `step`th pixel of a frame was, as if only the camera moved.
 
-    The flat pixel of `pair.there`; whether it shows the same; whether it is in the
-    frame at all. In both directions the first one is pixel `step` // 2.
+    `pixel` (n,) is the flat pixel of the neighbour, `seen` (n,) whether it shows the
+    same, `in_frame` (n,) whether it is in the neighbour at all. In both directions the
+    first one is pixel `step` // 2.
     """
+
+    pixel: NDArray[np.int32]
+    seen: Mask
+    in_frame: Mask
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What some pixels of two frames say of each other.
+
+    `tiles` (4, rows, columns): of those of each tile that match how many there are, the
+    sum of what their light differs by, of its square, and of their own light. Of all
+    pixels, and of those that show a `surface`, how many were `compared` and matched.
+    """
+
+    tiles: NDArray[np.float64]
+    compared: int
+    matching: int
+    compared_surfaces: int
+    matching_surfaces: int
+    surfaces: int
+
+
+def find_spots(pair: Pair, step: int) -> Spots:
+    """Return where every `step`th pixel was."""
+    return _spots(_spot_call(pair), pair, step)
+
+
+def compare_spots(pair: Pair, step: int) -> Compared:
+    """Compare every `step`th pixel that neither moves nor is invalid, tile by tile."""
+    call = _spot_call(pair)
+    found = _spots(call, pair, step)
+    height, width = pair.here.shape
+    tiles = np.zeros((4, -(-height // TILE), -(-width // TILE)))
+    counts = np.zeros(5, np.int64)
+    library().compare_spots(
+        call.target,
+        call.target.all[0],
+        step,
+        *(x.ctypes.data for x in (found.pixel, found.seen, found.in_frame)),
+        *(x.ctypes.data for x in (tiles, counts)),
+    )
+    return Compared(tiles, *counts.tolist())
+
+
+def _spot_call(pair: Pair) -> _Call:
+    whole = Reprojected(pair, np.ones((1, 1), np.float32), 0.0)
+    return _Call(Work(pair.here, None, 0.0, (), 1), [(whole, 0)])
+
+
+def _spots(call: _Call, pair: Pair, step: int) -> Spots:
     height, width = pair.here.shape
     start = step // 2
     across = len(range(start, width, step))
     count = len(range(start, height, step)) * across
     pixel = np.empty(count, np.int32)
     seen, in_frame = np.empty((2, count), np.bool_)
-    whole = Reprojected(pair, np.ones((1, 1), np.float32), 0.0)
-    call = _Call(Work(pair.here, None, 0.0, (), 1), [(whole, 0)])
     scratch = np.empty(8 * across, np.float32)
     library().find_spots(
         call.target,
@@ -156,7 +209,7 @@ def find_spots(pair: Pair, step: int) -> tuple[NDArray[np.int32], Mask, Mask]:
         step,
         *(x.ctypes.data for x in (pixel, seen, in_frame, scratch)),
     )
-    return pixel, seen, in_frame
+    return Spots(pixel, seen, in_frame)
 
 
 class _Call:

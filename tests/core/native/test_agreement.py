@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import fields, replace
+from dataclasses import astuple, fields, replace
 from typing import Any
 
 import numpy as np
@@ -25,6 +25,7 @@ from native_shots import (
 )
 from numpy.typing import NDArray
 from shots import camera
+from specification.coarse_rejection import compared
 from specification.filters import extreme
 from specification.places import SURFACE, ranges, still_places
 
@@ -35,7 +36,8 @@ from xrds_core.temporal.frame import Frame, Stored, pack_frame
 from xrds_core.temporal.halves import Halves
 from xrds_core.temporal.motion import Pair, pair
 from xrds_core.temporal.packing import pack_parts, pack_vectors
-from xrds_core.temporal.sums import Work, find_spots
+from xrds_core.temporal.sums import Work, compare_spots, find_spots
+from xrds_core.temporal.vectors import Movement
 
 Array = NDArray[Any]
 
@@ -200,10 +202,28 @@ def test_spots(name: str, shape: tuple[int, int], step: int) -> None:
     at = (rows * shape[1] + columns).ravel()
     for each in pairs(Kind(name, shape, 2.0, extreme=True)):
         found, in_frame = still_places(each)
-        pixel, seen, inside = find_spots(each, step)
-        assert np.array_equal(seen, found.seen[at])
-        assert np.array_equal(inside, in_frame[at])
-        assert np.array_equal(pixel[seen], found.pixel[at][seen])
+        spots = find_spots(each, step)
+        assert np.array_equal(spots.seen, found.seen[at])
+        assert np.array_equal(spots.in_frame, in_frame[at])
+        assert np.array_equal(spots.pixel[spots.seen], found.pixel[at][spots.seen])
+
+
+@pytest.mark.parametrize("light", [True, False])
+@pytest.mark.parametrize("shape", [(140, 150), (1, 1), (9, 130)])
+@pytest.mark.parametrize("name", CAMERAS)
+def test_first_look(name: str, shape: tuple[int, int], light: bool) -> None:
+    target, others = shot(
+        Kind(name, shape, 2.0, light=light, moving=True, invalid=True)
+    )
+    others[0] = replace(others[0], samples=3.0)
+    for other, motion in zip(
+        others, Movement().object_motions(target, others), strict=True
+    ):
+        both = pair(target, other, motion)
+        found = compare_spots(both, 2)
+        tiles, counts = compared(both, 2)
+        assert list(astuple(found)[1:]) == counts
+        assert np.allclose(found.tiles, tiles, rtol=1e-4, atol=1e-4)
 
 
 @pytest.mark.parametrize("level", [1, 3])

@@ -7,9 +7,10 @@ import pytest
 from shots import HEIGHT, WIDTH, World, camera, view
 from specification.summing import tile_shares
 
-from xrds_core.temporal.coarse_rejection import TILE, tile_weights
+from xrds_core.temporal.coarse_rejection import tile_weights
 from xrds_core.temporal.frame import store
 from xrds_core.temporal.motion import pair
+from xrds_core.temporal.sums import TILE
 
 
 def test_like_frames_lend_all() -> None:
