@@ -4,6 +4,8 @@ enum { TILE = 64 };  // pixels across, of coarse rejection
 // What remains of an offset's square as distance once it is taken out: what the guess
 // does not know of texture.
 static const float AS_DISTANCE_REGISTERED = 0.25f;
+// Samples of a frame with which half of an offset is taken out beside nearer surfaces.
+static const float TRUSTED_AT_RIMS = 8.0f;
 
 static int64_t first_of(const Places *p, int64_t pixel) {
     int64_t low = 0, high = p->count;
@@ -46,23 +48,18 @@ static void tile_shares(const Neighbour *o, int y, int left, int w, float *share
     }
 }
 
-// Leave alone what moves by itself, in the neighbour or beside it in the target.
-static void leave_moving(const Neighbour *o, int64_t start, int w, const Found *f) {
-    if (o->moving) LANES(i, w)
-        f->pixel[i] = f->pixel[i] >= 0 && o->moving[f->pixel[i]] ? -1 : f->pixel[i];
-    if (o->beside) LANES(i, w) f->pixel[i] = o->beside[start + i] ? -1 : f->pixel[i];
-}
-
-// Offsets that cannot be taken out become 0: beside a nearer surface, what a pixel mixes
-// moves in two ways.
-static void keep_rims(const Target *t, const Neighbour *o, int64_t start, int w,
-                      const Found *f) {
+// Offsets that are taken out: less of them beside a nearer surface, where the guess has
+// more noise than slope if samples are few; none where a pixel takes nothing.
+static void choose_offsets(const Target *t, const Neighbour *o, int64_t start, int w,
+                           const Found *f) {
     if (o->aligned) { LANES(i, w) f->x[i] = f->y[i] = 0.0f; return; }
+    const float at_rims = t->frame.samples / (t->frame.samples + TRUSTED_AT_RIMS);
     const uint8_t *here = t->frame.rims + start, *there = o->frame.rims;
     LANES(i, w) {
         const int32_t at = f->pixel[i] < 0 ? 0 : f->pixel[i];
-        const int inner = (f->pixel[i] >= 0) & !here[i] & !there[at];
-        f->x[i] = inner ? f->x[i] : 0.0f, f->y[i] = inner ? f->y[i] : 0.0f;
+        const float share = f->pixel[i] < 0 ? 0.0f : here[i] | there[at] ? at_rims : 1.0f;
+        f->x[i] = share > 0.0f ? f->x[i] * share : 0.0f;
+        f->y[i] = share > 0.0f ? f->y[i] * share : 0.0f;
     }
 }
 
@@ -77,7 +74,8 @@ static void find(const Target *t, const Neighbour *o, int y, int left, int w, co
         if (o->forth.columns) places_of(t, o, left, y, w, 1, f, 1);
         else places_of(t, o, left, y, w, 1, f, 0);
         tile_shares(o, y, left, w, share);
-        leave_moving(o, start, w, f);
+        if (o->moving) LANES(i, w)
+            pixel[i] = pixel[i] >= 0 && o->moving[pixel[i]] ? -1 : pixel[i];
         put(&o->moved, &o->frame, start, w, f, -1.0f);
         put(&o->images, &o->frame, start, w, f, o->most);
     }
@@ -88,7 +86,7 @@ static void find(const Target *t, const Neighbour *o, int y, int left, int w, co
         share[i] *= pixel[i] >= 0 ? from_half(o->frame.counts[pixel[i]]) : 0.0f;
     else LANES(i, w) share[i] *= pixel[i] >= 0 ? samples : 0.0f;
     if (t->guess) {
-        keep_rims(t, o, start, w, f);
+        choose_offsets(t, o, start, w, f);
         const float less = 1.0f - AS_DISTANCE_REGISTERED;
         In x = f->x, dy = f->y;
         LANES(i, w) apart[i] -= less * (x[i] * x[i] + dy[i] * dy[i]);

@@ -3,8 +3,12 @@
 // A position is valid if it survives the way back: what the other frame shows there must
 // come from this pixel, to within a pixel of motion, and be as near as something in the
 // 9 x 9 pixels around it. This rejects occlusions and disocclusions, and leaves edges their
-// mixed samples as long as both sides of the edge move alike. Selecting samples by what is
-// at the pixel's own centre would select by content: edges would lose their antialiasing.
+// mixed samples. Selecting samples by what is at the pixel's own centre would select by
+// content: edges would lose their antialiasing.
+//
+// A pixel beside a nearer surface shows some of it. The edge moves with that surface, so
+// these pixels do as well (as temporal antialiasing dilates motion vectors: B. Karis, 2014),
+// unless samples are so few that what lies behind counts more: it moves otherwise.
 
 // Pixels by which forward and backward motion may differ, squared; their difference
 // counts as this much distance, squared.
@@ -13,9 +17,8 @@ static const float TOLERANCE = 1.0f, AS_DISTANCE = 2.0f;
 static const float SURFACE = 0.02f;
 // Relative excess of inverse depth over the range around a pixel that is allowed.
 static const float SLACK = 0.02f;
-// Parallax between both sides of an edge counts as this much distance (squared), up to a
-// pixel. Where all is fine edges, 0.5 cost 0.2 dB, and leaving such samples out 1 dB.
-static const float AS_DISTANCE_AT_RIMS = 0.3f, MOST_AT_RIMS = 1.0f;
+// The squared parallax between both sides of an edge counts up to this much.
+static const float MOST_AT_RIMS = 1.0f;
 // Pixels by which the pixel taken is jittered where places lie at pixel centres.
 static const float OFF = 0.6f;
 // Multiples of these spread evenly over a unit square (M. Roberts, R3 and R2 sequences);
@@ -130,17 +133,27 @@ static void ranges_of(const float *depth, float *least, float *most, int w, int 
     }
 }
 
-// The squared parallax of a pixel to the nearest surface around it, 0 where it is no rim.
-INLINE float parallax(const Reprojection *r, const Frame *f, int32_t column,
-                             int32_t row, float own_x, float own_y, const int panorama) {
-    const int32_t pixel = row * f->width + column, rim = f->rims[pixel];
-    const int32_t k = rim ? rim - 1 : 4;
+// The depth of the nearest surface around a pixel, if that is nearer than its own.
+INLINE float nearer_depth(const Frame *f, int32_t column, int32_t row) {
+    const int32_t rim = f->rims[row * f->width + column], k = rim ? rim - 1 : 4;
     const int32_t beside = clamped(row + k / 3 - 1, f->height) * f->width
                            + clamped(column + k % 3 - 1, f->width);
-    const Point p = reproject(r, column, row, f->depth[beside], panorama);
-    const float dx = p.x - own_x, dy = p.y - own_y, square = dx * dx + dy * dy;
+    return f->depth[beside];
+}
+
+// The depth that a pixel moves by, or that of its edge's other side.
+INLINE float side_depth(const Frame *f, int32_t column, int32_t row, int nearer) {
+    return nearer ? nearer_depth(f, column, row) : f->depth[row * f->width + column];
+}
+
+// The squared parallax between a pixel's place and that of its edge's other side.
+INLINE float parallax(const Reprojection *r, const Frame *f, int32_t column, int32_t row,
+                      float at_x, float at_y, int leads, const int panorama) {
+    const float depth = side_depth(f, column, row, !leads);
+    const Point p = reproject(r, column, row, depth, panorama);
+    const float dx = p.x - at_x, dy = p.y - at_y, square = dx * dx + dy * dy;
     const float most = square < MOST_AT_RIMS ? square : MOST_AT_RIMS;  // NaN: behind
-    return most * (rim != 0);
+    return most * (f->rims[row * f->width + column] != 0);
 }
 
 // ---- places of a row of pixels, `step` apart ----
@@ -179,13 +192,14 @@ INLINE void places_of(const Target *t, const Neighbour *o, int left, int row,
                              const int panorama) {
     const int wide = o->frame.width, high = o->frame.height;
     const size_t start = (size_t)row * t->frame.width + left;
-    In near = t->frame.depth + start, least = t->least + start, most = t->most + start;
-    In there = o->frame.depth;
+    In least = t->least + start, most = t->most + start;
+    const int leads = t->leads;
     Row x = f->x, y = f->y, apart = f->apart, at_x = f->at_x, at_y = f->at_y;
     int32_t *restrict pixel = f->pixel, *restrict columns = f->column, *restrict rows = f->row;
     LANES(i, count) {
         const int32_t column = left + (int32_t)i * step;
-        const Point p = reproject(&o->forth, column, row, near[i * step], panorama);
+        const float depth = side_depth(&t->frame, column, row, leads);
+        const Point p = reproject(&o->forth, column, row, depth, panorama);
         const Place n = nearest(p.x, p.y, wide, high);
         at_x[i] = p.x, at_y[i] = p.y, x[i] = n.x, y[i] = n.y;
         pixel[i] = n.pixel, apart[i] = n.apart;
@@ -195,18 +209,19 @@ INLINE void places_of(const Target *t, const Neighbour *o, int left, int row,
     LANES(i, count) {
         const int32_t column = left + (int32_t)i * step, at = pixel[i] < 0 ? 0 : pixel[i];
         const int32_t across = columns[i], down = rows[i];
-        const float depth = there[at];
+        const float depth = side_depth(&o->frame, across, down, leads);
         const Point p = reproject(&o->back, across, down, depth, panorama);
         const float dx = p.x + (at_x[i] - (column + 0.5f) - (across + 0.5f));
         const float dy = p.y + (at_y[i] - (row + 0.5f) - (down + 0.5f));
         const float differs = dx * dx + dy * dy;
         const int seen = (pixel[i] >= 0) & (differs < TOLERANCE)
                          & (p.depth >= least[i * step]) & (p.depth <= most[i * step]);
-        const float one = parallax(&o->forth, &t->frame, column, row, at_x[i], at_y[i], panorama);
-        const float two = parallax(&o->back, &o->frame, across, down, p.x, p.y, panorama);
+        const float one = parallax(&o->forth, &t->frame, column, row, at_x[i], at_y[i], leads,
+                                   panorama);
+        const float two = parallax(&o->back, &o->frame, across, down, p.x, p.y, leads, panorama);
         pixel[i] = seen ? at : -1;
         apart[i] = seen ? apart[i] + AS_DISTANCE * differs
-                              + AS_DISTANCE_AT_RIMS * at_least(one, two)
+                              + o->at_rims * at_least(one, two)
                         : 0.0f;
     }
 }

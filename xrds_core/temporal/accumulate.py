@@ -22,7 +22,7 @@ from ..native.threads import in_threads
 from .candidates import find_images
 from .coarse_rejection import tile_weights
 from .half_floats import floats
-from .motion import FEW_SAMPLES, pair
+from .motion import pair
 from .shot_cuts import same_shot
 from .similarity import light_for_albedo
 from .sums import Aligned, Means, Reprojected, Work
@@ -86,7 +86,7 @@ def accumulate(
     lit = _lit(target, others)
     work = Work(target, images, usual, lit, threads)
     # the guess's own noise counts more than texture where samples are few
-    registers = bool(pairs) and target.samples > FEW_SAMPLES
+    registers = any(x.leads for x in pairs)
     guess = work.guess(groups[0]) if registers else None
     means = work.means(groups, guess)
     height, width = target.shape

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..native.surfaces import find_ranges
-from .local_filters import extreme
 from .panorama import PanoramaReprojection, panorama_reprojection
 
 if TYPE_CHECKING:
@@ -66,15 +65,13 @@ class ObjectMotion:
     `pixels`: flat, ascending, those of this frame that show moving objects; `x` and
     `y`: where they were in the other frame, NaN where forward and backward motion are
     inconsistent. All (m,). `moving` (H W): which pixels of the other frame show moving
-    objects, `beside` (H W), or None: which of this frame show something else, but may
-    contain some of their light.
+    objects. In a `Pair` their edges are among both.
     """
 
     pixels: NDArray[np.intp]
     x: Array
     y: Array
     moving: NDArray[np.bool_]
-    beside: NDArray[np.bool_] | None = None
 
     @property
     def is_empty(self) -> bool:
@@ -103,12 +100,20 @@ class Pair:
         return None if same else turn.astype(np.float32)
 
     @property
+    def leads(self) -> bool:
+        """Whether edges move with the nearer of their sides.
+
+        What lies behind moves otherwise; where samples are few, its errors count more.
+        """
+        return self.here.samples > FEW_SAMPLES
+
+    @property
     def jitters(self) -> bool:
         """Whether the pixels taken are jittered where places lie at pixel centres."""
         here, there = self.here, self.there
         is_static = here.camera.same(replace(there.camera, window=here.camera.window))
         moment = here.number == there.number
-        return not (here.samples > FEW_SAMPLES or is_static or moment)
+        return not (self.leads or is_static or moment)
 
     @property
     def whole_motion(self) -> float:
@@ -192,30 +197,55 @@ def pair(
     if object_motion is not None and object_motion.is_empty:
         object_motion = None
     if object_motion is not None:
-        object_motion = _with_rims(object_motion, here, there)
+        object_motion = _with_edges(object_motion, here, there)
     extent = extent or find_ranges(here.inverse_depth, here.shape)
     return Pair(here, there, forth, back, extent, object_motion)
 
 
-def _with_rims(
+def _with_edges(
     object_motion: ObjectMotion, here: Stored, there: Stored
 ) -> ObjectMotion:
     """Return object motion that includes the edges of moving objects.
 
-    Pixels on an edge belong to both sides. They are not reused for the side that stands
-    still: the moving object's share of such a pixel is different in every frame.
+    Pixels on an edge belong to both sides: they move along with the nearer one.
     """
-    own = np.zeros(here.inverse_depth.shape, bool)
+    own = np.zeros(here.inverse_depth.size, bool)
     own[object_motion.pixels] = True
-    beside = _beside(own, here)
-    moving = object_motion.moving | _beside(object_motion.moving, there)
-    return replace(object_motion, moving=moving, beside=beside)
+    edges, leading = _edges(own, here)
+    place = np.searchsorted(object_motion.pixels, leading)
+    (row, column), (down, across) = (
+        np.divmod(x, here.shape[1]) for x in (edges, leading)
+    )
+    x = object_motion.x[place] + (column - across).astype(np.float32)
+    y = object_motion.y[place] + (row - down).astype(np.float32)
+    pixels = np.concatenate((object_motion.pixels, edges))
+    order = np.argsort(pixels, kind="stable")
+    moving = object_motion.moving.copy()
+    moving[_edges(moving, there)[0]] = True
+    return ObjectMotion(
+        pixels[order],
+        np.concatenate((object_motion.x, x))[order],
+        np.concatenate((object_motion.y, y))[order],
+        moving,
+    )
 
 
-def _beside(mask: NDArray[np.bool_], frame: Stored) -> NDArray[np.bool_]:
-    """Return the rims (H W) that are adjacent to a mask (H W), but not in it."""
-    wide = extreme(mask.reshape(frame.shape), np.logical_or).ravel()
-    return np.asarray(wide & ~mask & (frame.rims > 0))
+def _edges(
+    mask: NDArray[np.bool_], frame: Stored
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the pixels (n,) whose leading surface is in a mask (H W), and its pixels.
+
+    Pixels of the mask itself are not among them.
+    """
+    height, width = frame.shape
+    rims = np.flatnonzero((frame.rims > 0) & ~mask)
+    row, column = np.divmod(rims, width)
+    down, across = np.divmod(frame.rims[rims].astype(np.intp) - 1, 3)
+    row = np.clip(row + down - 1, 0, height - 1)
+    column = np.clip(column + across - 1, 0, width - 1)
+    leading = row * width + column
+    led = mask[leading]
+    return rims[led], leading[led]
 
 
 def spot_stride(shape: tuple[int, int]) -> int:

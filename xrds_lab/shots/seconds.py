@@ -1,8 +1,8 @@
 """Seconds per frame of whole frames: a shot by XRDS beside Cycles + OIDN.
 
 To be run on a quiet machine. The runs of both take turns; each figure is a median.
-What finishing takes is timed up to a few samples. More of them leave it less to do:
-frames of many are finished, on paper, in the seconds of few.
+From some samples on finishing takes as long for any number: frames are denoised once.
+For these it is timed on frames of few, which say that they have many.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ from __future__ import annotations
 import json
 import statistics
 import time
+from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from xrds_blender.planning.settings import DEFAULT_DENOISING
@@ -34,7 +36,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_FINISHED = 4  # samples, at most, of frames whose finishing is timed
+_FEW, _MANY = 4, 16  # samples of frames whose finishing is timed, and for how many
 
 
 class SceneSeconds:
@@ -69,9 +71,9 @@ class SceneSeconds:
         if not left and _name(DEFAULT, 0) in known:
             return
         few = {}
-        if samples > _FINISHED:
-            self.measure(_FINISHED, radii, rounds)
-            few = self.known[str(_FINISHED)]
+        if samples > _FEW:
+            self.measure(_FEW, radii, rounds)
+            few = self.known[str(_FEW)]
         known |= timed(self.shot.path, self.window, samples, left, rounds, few)
         write_json(self._path, self.known)
 
@@ -86,7 +88,7 @@ def timed(
 ) -> Timed:
     """Time a panning shot: seconds of a frame by stage, `total` and `cpu`.
 
-    Finishing is taken from `few`, the figures of fewer samples, where there are any.
+    Finishing is taken from `few`, the figures of few samples, where there are any.
     """
     from xrds_blender import render
     from xrds_blender.planning.request import render_request
@@ -109,15 +111,17 @@ def timed(
             rival.append(_clocked(lambda: render(scene, **plain))[1])
     result = {_name(DEFAULT, 0): _median(rival)}
     for radius in radii:
-        if few:
-            finished = few[_name(XRDS, radius)]["finish"]
-        else:
-            finished = _finished(
-                sampled, job.with_settings(temporal_radius=radius), rounds
-            )
+        name = _name(XRDS, radius)
+        finish = partial(
+            _finished, job=job.with_settings(temporal_radius=radius), rounds=rounds
+        )
+        finished = few[name]["finish_of_many"] if few else finish(sampled)
         taken = _median(ours)
-        both = {name: taken[name] + finished[name] for name in ("total", "cpu")}
-        result[_name(XRDS, radius)] = {**both, "sample": taken, "finish": finished}
+        both = {key: taken[key] + finished[key] for key in ("total", "cpu")}
+        result[name] = {**both, "sample": taken, "finish": finished}
+        if samples == _FEW:
+            many = {k: replace(x, samples=_MANY) for k, x in sampled.items()}
+            result[name]["finish_of_many"] = finish(many)
     return result
 
 

@@ -25,6 +25,7 @@ from specification.places import Places, places, still_places
 
 from xrds_core.temporal.frame import store
 from xrds_core.temporal.motion import grid, pair, reproject, reprojection
+from xrds_core.temporal.sums import find_spots
 
 CAMERAS = [
     camera(x=0.37),
@@ -107,7 +108,7 @@ def test_edges_keep_both_sides_that_move_alike() -> None:
 @pytest.mark.parametrize(
     ("eye", "card_z", "more"),
     [
-        (camera(x=6 * 5 * PIXEL), -5.0, 0.3),  # the card moves 6 pixels, the wall 3
+        (camera(x=6 * 5 * PIXEL), -5.0, 0.5),  # the card moves 6 pixels, the wall 3
         (camera(x=3 * 10 * PIXEL), -9.9, 0.0),  # both 3: their mixture moves with them
         (camera(yaw=0.1), -5.0, 0.0),  # a turning camera moves all alike
     ],
@@ -125,6 +126,21 @@ def test_pixels_beside_a_nearer_thing_that_moves_otherwise_count_as_farther(
     added = result.apart - plain.apart
     assert added[mixed] == pytest.approx(more, abs=0.01)
     assert not added[~mixed].any()
+
+
+@pytest.mark.parametrize(("samples", "pixels"), [(2.0, 3), (4.0, 6)])
+def test_edges_move_with_the_nearer_side_unless_samples_are_few(
+    samples: float, pixels: int
+) -> None:
+    world = World(card=(0.0, 0.0), card_z=-5.0)
+    eye = camera(x=6 * 5 * PIXEL)  # the card moves 6 pixels, the wall 3
+    here = view(0, camera(), world, samples=samples)
+    there = view(1, eye, world, samples=samples)
+    found = find_spots(pair(store(here.frame), store(there.frame)), 1)
+    edge = beside_card(here).ravel() & found.seen
+    moved = found.pixel - np.arange(found.pixel.size)
+    assert edge.sum() > 20
+    assert np.median(np.abs(moved[edge])) == pixels  # of few samples it is jittered
 
 
 @pytest.mark.parametrize(

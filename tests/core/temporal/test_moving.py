@@ -68,24 +68,30 @@ def test_the_wall_takes_no_samples_of_a_card_that_passes(pan: float) -> None:
     stored = by_vectors(shown)
     for there in (0, 1, 3, 4):
         result = find(stored, 2, there)
-        wall = (shown[2].name == WALL).ravel()
+        card = shown[2].name == CARD
+        wall = ~_around(card).ravel()
         took = shown[there].name.ravel()[result.pixel]
         assert (took[wall & result.seen] == WALL).all()
         assert result.seen[wall].mean() > 0.6
-        assert (took[~wall & result.seen] == CARD).all()
+        assert (took[card.ravel() & result.seen] == CARD).all()
 
 
-def test_what_stands_still_lends_nothing_beside_what_moves() -> None:
-    """Pixels at an edge hold some of both sides, another share in every frame."""
+def test_edges_of_what_moves_move_along_with_it() -> None:
+    """Pixels at an edge hold some of both sides, as much as these in the next frame."""
     shown = views(0.0)
     card = [x.name == CARD for x in shown]
     result = find(by_vectors(shown), 2, 3)
     seen = result.seen.reshape(card[2].shape)
     took = result.pixel.reshape(card[2].shape)
-    beside = [_around(x) & ~x for x in card]
-    assert beside[2].sum() > 40
-    assert not seen[beside[2]].any()
-    assert not beside[3].ravel()[took[seen & ~card[2]]].any()
+    edge = [_around(x) & ~x for x in card]
+    assert edge[2].sum() > 40
+    moved = took - np.arange(took.size).reshape(took.shape)
+    inner = card[2] & seen
+    assert (inner | edge[2])[seen & (moved != 0)].all()
+    assert seen[edge[2]].mean() > 0.9
+    assert set(moved[edge[2] & seen]) <= set(moved[inner])
+    still = seen & ~card[2] & ~edge[2]
+    assert not edge[3].ravel()[took[still]].any()
     assert seen[~_around(card[2]) & ~_around(card[3])].all()
 
 
@@ -153,7 +159,7 @@ def test_a_pane_that_moves_lends_little() -> None:
         each.frame.albedo[(each.name == CARD) & chance] = 1.0
         each.frame.albedo[(each.name == CARD) & ~chance] = 0.0
     panes = samples(by_vectors(shown))
-    assert cards > 3.0
+    assert cards > 2.5
     assert panes < 1.2
 
 

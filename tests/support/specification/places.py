@@ -18,7 +18,8 @@ Shape = tuple[int, int]
 TOLERANCE, AS_DISTANCE = 1.0, 2.0  # of forward and backward motion
 SURFACE = 0.02  # relative difference in inverse depth on one surface
 SLACK = 0.02  # of the range of inverse depth
-AS_DISTANCE_AT_RIMS, MOST_AT_RIMS = 0.3, 1.0
+# Of the squared parallax at edges, in the logarithm of weights; its most.
+AT_RIMS, AT_RIMS_OF_FEW, MOST_AT_RIMS = 1.7, 0.5, 1.0
 OFF = 0.6  # pixels, of jitter
 SPREAD_X = np.array([3518319155, 2882110345, 2360945575], np.uint32)
 SPREAD_Y = np.array([3242174889, 2447445414, 2654435769], np.uint32)
@@ -74,13 +75,17 @@ def rims(frame: Stored) -> Array:
 def still_places(pair: Pair) -> tuple[Places, Array]:
     """Places as if only the camera moved, and whether they are in the frame at all."""
     own = grid(pair.here.shape)
-    x, y, _ = reproject(pair.forth, own.x, own.y, pair.here.inverse_depth)
+    depth = [
+        nearest_depth(f) if pair.leads else f.inverse_depth
+        for f in (pair.here, pair.there)
+    ]
+    x, y, _ = reproject(pair.forth, own.x, own.y, depth[0])
     found = nearest(x, y, pair.there.shape)
     in_frame = found.seen
     if pair.jitters:
         _jitter(found, pair, own, x, y)
     centre_x, centre_y = centres(found.pixel, pair.there.shape[1])
-    near = pair.there.inverse_depth[found.pixel]
+    near = depth[1][found.pixel]
     back_x, back_y, near = reproject(pair.back, centre_x, centre_y, near)
     left = (back_x + x - own.x - centre_x) ** 2 + (back_y + y - own.y - centre_y) ** 2
     least, most = ranges(pair.here)
@@ -107,16 +112,21 @@ def _jitter(found: Places, pair: Pair, own: Grid, x: Array, y: Array) -> None:
     found.x[at], found.y[at] = (other.x + off[0])[inside], (other.y + off[1])[inside]
 
 
+def nearest_depth(frame: Stored) -> Array:
+    """Inverse depth (H W), at rims that of the nearest surface around."""
+    return np.where(rims(frame), nearest_surface(frame), frame.inverse_depth)
+
+
 def _parallax(transform: Any, frame: Stored, pixels: Array) -> Array:
-    """The squared parallax of pixels (n,) to the nearest surface around them."""
+    """The squared parallax between both sides of the edge in pixels (n,)."""
     x, y = centres(pixels, frame.shape[1])
     own = reproject(transform, x, y, frame.inverse_depth[pixels])
-    near = reproject(transform, x, y, nearest_surface(frame)[pixels])
+    near = reproject(transform, x, y, nearest_depth(frame)[pixels])
     apart = (near[0] - own[0]) ** 2 + (near[1] - own[1]) ** 2
     return np.where(rims(frame)[pixels], np.fmin(apart, MOST_AT_RIMS), 0.0)
 
 
-def places(pair: Pair, images: Images | None = None) -> Places:
+def places(pair: Pair, images: Images | None = None, fall: float = -1.0) -> Places:
     """Places of all pixels: of surfaces, of what moves by itself, and of images."""
     found, _ = still_places(pair)
     here = np.arange(len(found.pixel))
@@ -124,12 +134,11 @@ def places(pair: Pair, images: Images | None = None) -> Places:
         _parallax(pair.forth, pair.here, here),
         _parallax(pair.back, pair.there, found.pixel),
     )
-    found.apart += np.where(found.seen, AS_DISTANCE_AT_RIMS * parallax, 0)
+    at_rims = (AT_RIMS if pair.leads else AT_RIMS_OF_FEW) / -fall
+    found.apart += np.where(found.seen, np.float32(at_rims) * parallax, 0)
     motion = pair.object_motion
     if motion is not None:
         found.seen &= ~motion.moving[found.pixel]
-        if motion.beside is not None:
-            found.seen &= ~motion.beside
         found.put(motion.pixels, nearest(motion.x, motion.y, pair.there.shape))
     if images is not None:
         pixels, x, y = images.positions(pair)

@@ -22,6 +22,7 @@ Neighbour = Aligned | Reprojected
 Judge = LightSimilarity | GuideSimilarity
 
 AS_DISTANCE = 0.25  # of offsets that are taken out
+TRUSTED_AT_RIMS = 8.0  # samples of half an offset at edges
 TILE = 64
 LARGEST_HALF = 65504.0
 TINY = np.float32(1e-9)
@@ -135,11 +136,13 @@ class Work:
             pixel, seen, apart, share = np.arange(count), np.ones(count, bool), 0, 1
             offsets, fall = nothing, 0
         else:
-            at = places(found.pair, self.images)
+            at = places(found.pair, self.images, found.fall)
             pixel, seen, apart, fall = at.pixel, at.seen, at.apart, found.fall
             share = self.tiles(found)
-            inner = seen & ~(rims(self.target) | rims(other)[pixel])
-            offsets = np.stack([at.x, at.y]) * inner if registers else nothing
+            edge = rims(self.target) | rims(other)[pixel]
+            samples = np.float32(self.target.samples)
+            trust = np.where(edge, samples / (samples + TRUSTED_AT_RIMS), np.float32(1))
+            offsets = np.stack([at.x, at.y]) * (seen * trust) if registers else nothing
         if other.invalid is not None:
             seen = seen & ~other.invalid[pixel]
         share = floats(share * seen) * counts(other, pixel)
