@@ -7,8 +7,9 @@
 // content: edges would lose their antialiasing.
 //
 // A pixel beside a nearer surface shows some of it. The edge moves with that surface, so
-// these pixels do as well (as temporal antialiasing dilates motion vectors: B. Karis, 2014),
-// unless samples are so few that what lies behind counts more: it moves otherwise.
+// these pixels do as well, as temporal antialiasing has them do (Yang et al., 2020, see
+// docs/method.md), unless samples are so few that what lies behind counts more: it moves
+// otherwise.
 
 // Pixels by which forward and backward motion may differ, squared; their difference
 // counts as this much distance, squared.

@@ -39,9 +39,9 @@ _APART, _USUAL, _NEAR = 1.5, 33, 24
 # few noisy pixels are.
 _LEAST_FACTOR, _MOST_FACTOR = 1.0, 2.0
 _SMOOTH = 3  # pixels across
-# Frames of so many samples are denoised once: a denoiser no longer mistakes their noise
-# beside that of more, and the frame alone would bring it back.
-_DENOISED_ONCE = 8.0
+# Beyond so many samples a denoiser bears what lacks samples along thin lines, as at edges,
+# where the frame alone would bring its noise back: a pixel to each side for each doubling.
+_THICK = 4.0
 # The frame alone is denoised in parts where these are less than this much of it.
 _PART = 0.75
 AROUND = 96
@@ -101,7 +101,7 @@ def finish_frame(
         accumulated = accumulate(own, neighbours, movement)
     region = region or (slice(None), slice(None))
     areas: list[_Area] = []
-    if neighbours and own.samples < _DENOISED_ONCE:
+    if neighbours:
         alone = accumulate(own, [])
         share = _share(accumulated, alone, own.samples)[region]
         areas = _lacking(share)
@@ -148,9 +148,17 @@ def _share(accumulated: Accumulated, alone: Accumulated, samples: float) -> Arra
     reused = np.clip((times * most / usual - 1.0) / enough, 0.0, 1.0)
     factor = np.float32(np.clip(samples / 2.0, _LEAST_FACTOR, _MOST_FACTOR))
     around = 1.0 - factor * (1.0 - box(reused, _SMOOTH))
-    return np.clip(
-        box(np.clip(np.minimum(reused, around), 0.0, 1.0), _SMOOTH), 0.0, 1.0
-    )
+    share = np.clip(np.minimum(reused, around), 0.0, 1.0)
+    share = np.clip(box(share, _SMOOTH), 0.0, 1.0)
+    return _closed(share, max(round(np.log2(samples / _THICK)), 0))
+
+
+def _closed(share: Array, reach: int) -> Array:
+    """Return a share (H, W) without low values that reach less far to each side."""
+    for smaller in (np.fmax, np.fmin):
+        for _ in range(reach):
+            share = extreme(share, smaller)
+    return share
 
 
 class _Area(NamedTuple):

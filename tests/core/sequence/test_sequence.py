@@ -131,6 +131,22 @@ def test_beside_many_samples_the_picture_of_few_is_that_of_the_frame_alone(
     assert (shot.picture[:, : half - 8] != alone[:, : half - 8]).mean() > 0.1
 
 
+@pytest.mark.parametrize(
+    ("samples", "width", "pictures"), [(4, 2, 2), (64, 2, 1), (64, 24, 2), (256, 6, 1)]
+)
+def test_thin_lines_of_few_samples_need_no_picture_of_their_own(
+    samples: int, width: int, pictures: int, denoiser: Denoiser
+) -> None:
+    """The more samples, the wider lines a denoiser bears."""
+    own, *others = (replace(noisy(n), samples=samples) for n in NUMBERS)
+    for other in others:
+        other.radiance[:, 20 : 20 + width] = np.nan
+    counting = Counting(denoiser)
+    lenders = [store(other) for other in others]
+    finish_frame(store(own), lenders, counting, Movement())
+    assert len(counting.pictures) == pictures
+
+
 def test_where_little_is_reused_everywhere_all_of_it_counts(
     denoiser: Denoiser,
 ) -> None:
