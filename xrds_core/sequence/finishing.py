@@ -39,8 +39,9 @@ _APART, _USUAL, _NEAR = 1.5, 33, 24
 # few noisy pixels are.
 _LEAST_FACTOR, _MOST_FACTOR = 1.0, 2.0
 _SMOOTH = 3  # pixels across
-# Beyond so many samples a denoiser bears what lacks samples along thin lines, as at edges,
-# where the frame alone would bring its noise back: a pixel to each side for each doubling.
+# Beyond so many samples a denoiser bears what lacks samples along thin lines, as at
+# edges, where the frame alone would bring its noise back: a pixel to each side for each
+# doubling.
 _THICK = 4.0
 # The frame alone is denoised in parts where these are less than this much of it.
 _PART = 0.75
