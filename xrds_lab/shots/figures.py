@@ -97,7 +97,7 @@ class Clip:
 
     def _packed(self, number: int) -> Stored:
         if number not in self._stored:
-            self._stored[number] = store(self.frames[number], np.float16)
+            self._stored[number] = store(self.frames[number])
         return self._stored[number]
 
     def oidn(self, number: int, mode: Denoising) -> Array:
