@@ -43,6 +43,10 @@ _SMOOTH = 3  # pixels across
 # edges, where the frame alone would bring its noise back: a pixel to each side for each
 # doubling.
 _THICK = 4.0
+# Blocks that lack less than this on the mean, and lie beside none that lacks more, lose
+# nothing that is seen, and the frame alone is not denoised for them.
+_BEARABLE = 0.1
+_RAMP = 17  # pixels across, at the border of such blocks
 # The frame alone is denoised in parts where these are less than this much of it.
 _PART = 0.75
 AROUND = 96
@@ -151,7 +155,8 @@ def _share(accumulated: Accumulated, alone: Accumulated, samples: float) -> Arra
     around = 1.0 - factor * (1.0 - box(reused, _SMOOTH))
     share = np.clip(np.minimum(reused, around), 0.0, 1.0)
     share = np.clip(box(share, _SMOOTH), 0.0, 1.0)
-    return _closed(share, max(round(np.log2(samples / _THICK)), 0))
+    share = _closed(share, max(round(np.log2(samples / _THICK)), 0))
+    return _where_much_lacks(share)
 
 
 def _closed(share: Array, reach: int) -> Array:
@@ -160,6 +165,20 @@ def _closed(share: Array, reach: int) -> Array:
         for _ in range(reach):
             share = extreme(share, smaller)
     return share
+
+
+def _where_much_lacks(share: Array) -> Array:
+    """Return a share (H, W), 1 in blocks that lack little."""
+    lacking = block_means(1.0 - share) > _BEARABLE
+    if not lacking.any():
+        return np.ones_like(share)
+    blocks = extreme(lacking, np.logical_or)
+    if blocks.all():
+        return share
+    pixels = blocks.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)
+    pixels = pixels[: share.shape[0], : share.shape[1]].astype(np.float32)
+    inside = np.clip(2.0 * box(pixels, _RAMP) - 1.0, 0.0, 1.0)
+    return np.asarray(1.0 - (1.0 - share) * inside)
 
 
 class _Area(NamedTuple):
