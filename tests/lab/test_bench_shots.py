@@ -115,12 +115,11 @@ def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
     (path,) = (blend.parent / "cache").glob("*-shot-seconds.json")
     known = json.loads(path.read_text())
     name = f"{XRDS}-5"
-    assert known.keys() == {"2", "4", "6"}  # frames of 6 are finished as those of many
-    many = known["4"][name]["finish_of_many"]
-    assert known["6"][name]["finish"] == many
+    assert known.keys() == {"2", "4", "6"}  # frames of 6 are finished as those of 4
+    assert known["6"][name]["finish"] == known["4"][name]["finish"]
     assert known["6"][name]["finish"] != known["2"][name]["finish"]
     assert known["6"][name]["total"] == pytest.approx(
-        known["6"][name]["sample"]["total"] + many["total"]
+        known["6"][name]["sample"]["total"] + known["4"][name]["finish"]["total"]
     )
     assert "Of frames of 48x32" in (blend.parent / "out/report.md").read_text()
     drawn = (blend.parent / "out/error-pan.svg").read_text()

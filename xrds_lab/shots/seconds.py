@@ -1,8 +1,8 @@
 """Seconds per frame of whole frames: a shot by XRDS beside Cycles + OIDN.
 
 To be run on a quiet machine. The runs of both take turns; each figure is a median.
-From some samples on finishing takes as long for any number: frames are denoised once.
-For these it is timed on frames of few, which say that they have many.
+What finishing takes is timed up to a few samples. More of them leave it less to do:
+frames of many are finished, on paper, in the seconds of few.
 """
 
 from __future__ import annotations
@@ -10,8 +10,6 @@ from __future__ import annotations
 import json
 import statistics
 import time
-from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from xrds_blender.planning.settings import DEFAULT_DENOISING
@@ -36,7 +34,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_FEW, _MANY = 4, 16  # samples of frames whose finishing is timed, and for how many
+_FINISHED = 4  # samples, at most, of frames whose finishing is timed
 
 
 class SceneSeconds:
@@ -71,9 +69,9 @@ class SceneSeconds:
         if not left and _name(DEFAULT, 0) in known:
             return
         few = {}
-        if samples > _FEW:
-            self.measure(_FEW, radii, rounds)
-            few = self.known[str(_FEW)]
+        if samples > _FINISHED:
+            self.measure(_FINISHED, radii, rounds)
+            few = self.known[str(_FINISHED)]
         known |= timed(self.shot.path, self.window, samples, left, rounds, few)
         write_json(self._path, self.known)
 
@@ -88,7 +86,7 @@ def timed(
 ) -> Timed:
     """Time a panning shot: seconds of a frame by stage, `total` and `cpu`.
 
-    Finishing is taken from `few`, the figures of few samples, where there are any.
+    Finishing is taken from `few`, the figures of fewer samples, where there are any.
     """
     from xrds_blender import render
     from xrds_blender.planning.request import render_request
@@ -111,17 +109,15 @@ def timed(
             rival.append(_clocked(lambda: render(scene, **plain))[1])
     result = {_name(DEFAULT, 0): _median(rival)}
     for radius in radii:
-        name = _name(XRDS, radius)
-        finish = partial(
-            _finished, job=job.with_settings(temporal_radius=radius), rounds=rounds
-        )
-        finished = few[name]["finish_of_many"] if few else finish(sampled)
+        if few:
+            finished = few[_name(XRDS, radius)]["finish"]
+        else:
+            finished = _finished(
+                sampled, job.with_settings(temporal_radius=radius), rounds
+            )
         taken = _median(ours)
-        both = {key: taken[key] + finished[key] for key in ("total", "cpu")}
-        result[name] = {**both, "sample": taken, "finish": finished}
-        if samples == _FEW:
-            many = {k: replace(x, samples=_MANY) for k, x in sampled.items()}
-            result[name]["finish_of_many"] = finish(many)
+        both = {name: taken[name] + finished[name] for name in ("total", "cpu")}
+        result[_name(XRDS, radius)] = {**both, "sample": taken, "finish": finished}
     return result
 
 
