@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from .motion import spot_stride
-from .sums import compare_spots
+from .sums import compare_spots, tile_grid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -33,12 +33,13 @@ _HARMLESS = 0.01
 
 def tile_weights(pair: Pair) -> Array:
     """Return the weights (rows, columns) of `pair.here`'s tiles, 0 across a cut."""
+    tiles = tile_grid(pair.here.shape)
+    if pair.here.is_empty:  # there is nothing to compare
+        return np.ones(tiles, np.float32)
     step = spot_stride(pair.here.shape)
     found = compare_spots(pair, step)
-    if pair.here.is_empty:  # there is nothing to compare
-        return np.ones(found.tiles.shape[1:], np.float32)
     if _is_shot_cut(pair, step, found):
-        return np.zeros(found.tiles.shape[1:], np.float32)
+        return np.zeros(tiles, np.float32)
     return _weights(found.tiles)
 
 

@@ -161,7 +161,8 @@ class Compared:
 
     `tiles` (4, rows, columns): of those of each tile that match how many there are, the
     sum of what their light differs by, of its square, and of their own light. Of all
-    pixels, and of those that show a `surface`, how many were `compared` and matched.
+    pixels, and of those that show a surface and no sky, how many were `compared` and
+    matched. `surfaces`: how many show one, compared or not.
     """
 
     tiles: NDArray[np.float64]
@@ -170,6 +171,11 @@ class Compared:
     compared_surfaces: int
     matching_surfaces: int
     surfaces: int
+
+
+def tile_grid(shape: tuple[int, int]) -> tuple[int, int]:
+    """Return the rows and columns of tiles of a picture (H, W)."""
+    return -(-shape[0] // TILE), -(-shape[1] // TILE)
 
 
 def find_spots(pair: Pair, step: int) -> Spots:
@@ -181,8 +187,7 @@ def compare_spots(pair: Pair, step: int) -> Compared:
     """Compare every `step`th pixel that neither moves nor is invalid, tile by tile."""
     call = _spot_call(pair)
     found = _spots(call, pair, step)
-    height, width = pair.here.shape
-    tiles = np.zeros((4, -(-height // TILE), -(-width // TILE)))
+    tiles = np.zeros((4, *tile_grid(pair.here.shape)))
     counts = np.zeros(5, np.int64)
     library().compare_spots(
         call.target,
