@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 
 # Penalties: factors on errors seen in guides, and on light that changes, against the
 # noise of light. They are divided by the frame's samples per pixel, since a denoiser
-# removes less noise the more samples there are, but are never less than `_LEAST`.
-_GUIDES, _CHANGES, _LEAST = 512.0, 256.0, 4.0
+# removes less noise the more samples there are, down to a least one: that of guides is
+# high, as errors of many neighbours add up where waves or glass show something else.
+_GUIDES, _LEAST_GUIDES = 512.0, 32.0
+_CHANGES, _LEAST_CHANGES = 256.0, 4.0
 # (samples per pixel up to, pixels across): over how many pixels errors of guides are
 # averaged. Half buffers of few samples say little about one pixel.
 _GUIDE_AREAS = ((4.0, 9), (np.inf, 5))
@@ -54,7 +56,8 @@ def light_for_albedo(frame: Stored) -> float:
 
 def penalties(samples: float) -> tuple[np.float32, np.float32]:
     """Return those of errors seen in guides, and of light that changes."""
-    guides, changes = (max(x / samples, _LEAST) for x in (_GUIDES, _CHANGES))
+    guides = max(_GUIDES / samples, _LEAST_GUIDES)
+    changes = max(_CHANGES / samples, _LEAST_CHANGES)
     return np.float32(guides), np.float32(changes)
 
 
