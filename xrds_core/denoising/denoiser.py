@@ -84,7 +84,8 @@ _WITH_PREFILTER = ("best", "high", "medium")
 _NO_ALBEDO = 0.5  # what Cycles gives with a normal alone: OIDN wants both
 _MOST_MEBIBYTES = 2**31 - 1  # the library counts them in 32 bits
 # What a filter takes on the processor unless told otherwise: all that a picture of
-# 1920x1080 needs. One of 3840x2160 takes a tenth more time in tiles, and half the memory.
+# 1920x1080 needs. In tiles one of 3840x2160 takes a tenth more time, and half the
+# memory.
 _ON_PROCESSOR = 1500
 _MEBIBYTE = 1 << 20
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..light_parts.adding_up import completed
 from ..light_parts.sums import added_up, light_in
-from ..temporal.accumulate import Accumulated, accumulate
+from ..temporal.accumulate import Accumulated, accumulate, sample_counts
 from ..temporal.local_filters import box, extreme
 from .rectangles import rectangles
 from .same_picture import BLOCK, block_means
@@ -107,8 +107,7 @@ def finish_frame(
     region = region or (slice(None), slice(None))
     areas: list[_Area] = []
     if neighbours:
-        alone = accumulate(own, [])
-        share = _share(accumulated, alone, own.samples)[region]
+        share = _share(accumulated, own)[region]
         areas = _lacking(share)
     denoise_started = time.perf_counter()
     parts = 1 + len(areas)
@@ -116,9 +115,8 @@ def finish_frame(
     told = [_part(progress, number, parts) for number in range(parts)]
     denoised = passes.denoised(denoiser, told[0])
     if areas:
-        lacking = _Passes.of(
-            _filled(alone, accumulated), light, region, like=denoised.parts
-        )
+        alone = _filled(accumulate(own, []), accumulated)
+        lacking = _Passes.of(alone, light, region, like=denoised.parts)
         mixed = denoised.radiance.copy()
         for area, done in zip(areas, told[1:], strict=True):
             single = lacking.within(area.around).denoised(denoiser, done)
@@ -139,16 +137,21 @@ def finish_frame(
     return Finished(denoised, accumulated, seconds, found)
 
 
-def _share(accumulated: Accumulated, alone: Accumulated, samples: float) -> Array:
+def _share(accumulated: Accumulated, own: Stored) -> Array:
     """Return (H, W) in [0, 1]: the weight of the accumulated picture.
 
-    It depends on how many samples are reused. `samples` is the frame's own mean.
+    It depends on how many samples are reused for each of the frame's `own`.
     """
+    samples = own.samples
     enough = np.float32(max(_ENOUGH, _IN_ALL / samples))
     most = _APART * (1.0 + enough)
+    alone = sample_counts(own, slice(None), len(own.picture))
+    if own.invalid is not None:
+        alone[own.invalid] = 0.0
+    alone = alone.reshape(own.shape)
     with np.errstate(divide="ignore", invalid="ignore"):  # where the frame has none
-        times = np.clip(accumulated.samples / alone.samples, 1.0, most)
-    times = np.where(alone.samples > 0.0, times, most).astype(np.float32)
+        times = np.clip(accumulated.samples / alone, 1.0, most)
+    times = np.where(alone > 0.0, times, most).astype(np.float32)
     usual = extreme(box(times, _USUAL), np.fmax, _NEAR)
     reused = np.clip((times * most / usual - 1.0) / enough, 0.0, 1.0)
     factor = np.float32(np.clip(samples / 2.0, _LEAST_FACTOR, _MOST_FACTOR))
