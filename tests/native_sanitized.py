@@ -104,8 +104,8 @@ def exercise(folder: Path, seconds: float, first: int) -> None:
     import numpy as np
     import pytest
 
+    from xrds_core.accumulation.accumulate import accumulate
     from xrds_core.native import library as module
-    from xrds_core.temporal.accumulate import accumulate
 
     np.seterr(all="ignore")
     module.FOLDER = folder

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from .cycles.passes import CyclesPasses
-    from .frame.picture import Picture
+    from .render.picture import Picture
 
 __all__ = ["register", "render", "run_job", "unregister"]
 
@@ -51,7 +51,7 @@ def render(scene: Any, scale: int = 1, **choices: Any) -> Picture:
     for values out of range, Cancelled when the user stops the render.
     """
     from .interface.registration import ensure_registered
-    from .shot import render
+    from .render import render
 
     ensure_registered()
     return render.render(scene, scale, **choices)
@@ -67,8 +67,8 @@ def run_job(
     raises reaches the caller; engine and settings are then as before. Raises SceneError
     without a camera.
     """
-    from .frame import rendering
     from .interface.registration import ensure_registered
+    from .render import blender_job
 
     ensure_registered()
-    return rendering.run_job(scene, job, layer=layer)
+    return blender_job.run_job(scene, job, layer=layer)

@@ -21,12 +21,9 @@ from .errors import (
 )
 
 if TYPE_CHECKING:
-    from .superres.exr_upscale import upscale_file as upscale_file
-    from .superres.network import XRDS as XRDS
-    from .superres.network import NetworkConfig as NetworkConfig
-    from .superres.upscaler import Upscaled as Upscaled
-    from .superres.upscaler import Upscaler as Upscaler
-    from .superres.upscaler import upscale as upscale
+    from .superres.exr_upscale import upscale_file
+    from .superres.network import XRDS, NetworkConfig
+    from .superres.upscaler import Upscaled, Upscaler, upscale
 
 _LAZY = {
     "XRDS": ".superres.network",

@@ -6,6 +6,10 @@ remedy. Whatever else reaches a caller is a bug.
 
 from __future__ import annotations
 
+import sys
+from contextlib import suppress
+from typing import Any
+
 
 def printable(text: str) -> str:
     """The text with all that could steer a terminal or break the line escaped."""
@@ -65,3 +69,15 @@ class Cancelled(XRDSError):
 
     def __init__(self, message: str = "cancelled") -> None:
         super().__init__(message)
+
+
+finished: list[Any] = []
+"""What `--json` prints of each frame that a command has finished, should it fail."""
+
+
+def warn(text: str) -> None:
+    """Print one line for the user; lost where there is no stderr."""
+    if sys.stderr is None:
+        return
+    with suppress(OSError, ValueError):  # full, or closed
+        print(f"xrds: {printable(text)}", file=sys.stderr, flush=True)

@@ -23,7 +23,7 @@ def network_devices() -> list[str]:
     """
     import torch
 
-    from .devices import device_name
+    from .superres.devices import device_name
 
     found = [torch.device("cuda", i) for i in range(torch.cuda.device_count())]
     if torch.backends.mps.is_available():

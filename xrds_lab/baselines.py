@@ -12,7 +12,7 @@ from torch.nn import functional
 
 from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
-from xrds_core.superres.layout import to_picture, to_planes
+from xrds_core.superres.front_end import to_picture, to_planes
 
 # Chosen on the very windows that are measured, which favours this rival alone.
 SPATIAL_SIGMA = 0.5  # of a low-resolution pixel

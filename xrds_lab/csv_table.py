@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -69,7 +69,7 @@ def lpips(picture: Array, reference: Array, exposure: float = 0.0) -> float:
     """
     import torch
 
-    from xrds_core.superres.layout import to_planes
+    from xrds_core.superres.front_end import to_planes
 
     _check(picture, reference)
     shown = [to_planes(to_srgb(x, exposure) * 2 - 1) for x in (picture, reference)]

@@ -12,7 +12,7 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from xrds_core.atomic import write_json
+from xrds_core.files import write_json
 from xrds_core.info import COSTS
 from xrds_core.superres.kernels import GUIDE_COUNT, KernelTail
 from xrds_core.superres.network import (

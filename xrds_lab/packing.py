@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.arrays import Array
-from xrds_core.temporal.frame import Frame
-from xrds_core.temporal.half_floats import LARGEST_HALF
+from xrds_core.accumulation.frame import Frame
+from xrds_core.arrays import LARGEST_HALF, Array
 
 # What the window keeps in half floats as well.
 _HALF = {"radiance", "albedo", "normal", "alpha", "vector", "halves"}

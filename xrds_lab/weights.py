@@ -9,8 +9,8 @@ import torch
 from safetensors.torch import save as serialize
 from torch import Tensor, nn
 
-from xrds_core.atomic import replacing
 from xrds_core.errors import WeightsError
+from xrds_core.files import replacing
 from xrds_core.superres.guide_filter import GuideFilter
 from xrds_core.superres.network import XRDS
 from xrds_core.superres.weights import FACTORS

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from xrds_core import atomic
-from xrds_core.atomic import replacing
+from xrds_core import files
 from xrds_core.errors import XRDSError
+from xrds_core.files import replacing
 
 
 def names(folder: Path) -> list[str]:
@@ -110,7 +110,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from xrds_core.atomic import replacing, scratch_folder
+from xrds_core.files import replacing, scratch_folder
 with replacing(Path(sys.argv[1]) / "frame.exr") as part, scratch_folder() as folder:
     part.write_text("half")
     (folder / "archive").write_text("half")
@@ -135,7 +135,7 @@ def test_what_a_killed_process_left_is_swept_up_wherever_it_lies(
     (folder / "1.exr").write_text("a frame")
     kill_a_writer(folder)
     assert names(temporary)
-    atomic.sweep()
+    files.sweep()
     assert not names(temporary)
     assert names(folder) == ["1.exr"]
 
@@ -145,7 +145,7 @@ def test_a_folder_is_swept_without_links(tmp_path: Path, temporary: Path) -> Non
     folder = tmp_path / "frames"
     folder.mkdir()
     kill_a_writer(folder)
-    atomic.sweep(folder)
+    files.sweep(folder)
     assert not names(folder)
 
 
@@ -157,11 +157,11 @@ def test_another_machine_may_still_be_writing_for_an_hour(
     folder.mkdir()
     left = kill_a_writer(folder)
     elsewhere = left.rename(left.with_name(".xrds-" + "0" * 8 + left.name[14:]))
-    atomic.sweep(folder)
+    files.sweep(folder)
     assert names(folder) == [elsewhere.name]
     day_before = time.time() - 86400
     os.utime(elsewhere, (day_before, day_before))
-    atomic.sweep(folder)
+    files.sweep(folder)
     assert not names(folder)
 
 
@@ -173,8 +173,8 @@ def test_what_is_being_written_and_what_others_left_stays(tmp_path: Path) -> Non
         os.utime(tmp_path / name, (day_before, day_before))
     with replacing(tmp_path / "frame.exr") as part:
         part.write_text("half")
-        atomic.sweep(tmp_path)
-        atomic.sweep()
+        files.sweep(tmp_path)
+        files.sweep()
         part.write_text("whole")
     assert names(tmp_path) == sorted([*others, "frame.exr"])
 
@@ -188,7 +188,7 @@ def test_a_link_that_leads_to_a_foreign_file_takes_nothing_along(
     link.symlink_to(precious)
     day_before = time.time() - 86400
     os.utime(link, (day_before, day_before), follow_symlinks=False)
-    atomic.sweep()
+    files.sweep()
     assert not names(temporary)
     assert precious.exists()
 
@@ -196,7 +196,7 @@ def test_a_link_that_leads_to_a_foreign_file_takes_nothing_along(
 ENDING = """
 import os, sys, threading
 from pathlib import Path
-from xrds_core.atomic import abandon, replacing
+from xrds_core.files import abandon, replacing
 
 folder = Path(sys.argv[1])
 with replacing(folder / "frame.exr") as part:
@@ -223,8 +223,8 @@ def test_a_process_that_ends_on_the_spot_leaves_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize("content", [b"", b"{", b"\xff\xfe", b"[1, 2"])
 def test_a_damaged_record_is_named(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "runs.json"
-    atomic.write_json(path, {"a": [1]})
-    assert atomic.read_json(path) == {"a": [1]}
+    files.write_json(path, {"a": [1]})
+    assert files.read_json(path) == {"a": [1]}
     path.write_bytes(content)
     with pytest.raises(XRDSError, match=r"runs\.json is damaged"):
-        atomic.read_json(path)
+        files.read_json(path)

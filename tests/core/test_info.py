@@ -9,9 +9,9 @@ import torch
 
 from xrds_core import info
 from xrds_core.denoising import oidn_device
-from xrds_core.devices import choose_device, device_name
 from xrds_core.errors import UsageError, WeightsError
 from xrds_core.superres import weights_header
+from xrds_core.superres.devices import choose_device, device_name
 from xrds_core.superres.network import PRESETS, NetworkConfig, preset_config
 from xrds_core.superres.weights_header import DIRECTORY
 from xrds_lab import operations

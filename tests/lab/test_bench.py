@@ -19,16 +19,8 @@ from xrds_blender.command import main
 from xrds_blender.planning import budget
 from xrds_blender.planning.settings import Denoising, Mode, Network, Settings
 from xrds_core.errors import UsageError
-from xrds_core.native.threads import processors
-from xrds_lab.bench import (
-    growth,
-    inputs,
-    low_budgets,
-    measure,
-    pictures,
-    sweep,
-    tasks,
-)
+from xrds_core.native.library import processors
+from xrds_lab.bench import growth, inputs, low_budgets, measure, pictures, sweep, tasks
 from xrds_lab.bench.bench import bench
 from xrds_lab.bench.crops import SHOWN
 from xrds_lab.bench.stages import PLAIN_FRAME, STAGES

@@ -16,23 +16,15 @@ from mathutils import Matrix
 from xrds_blender import run_job
 from xrds_blender.command import main
 from xrds_blender.cycles.samples import sample_layer
-from xrds_blender.frame.rendering import call_engine
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.settings import CYCLES_DENOISING
+from xrds_blender.render.blender_job import call_engine
+from xrds_core.accumulation.camera import Camera
+from xrds_core.accumulation.frame import Frame
 from xrds_core.errors import SceneError, UsageError
-from xrds_core.temporal.frame import Camera, Frame
 from xrds_lab.bench.inputs import Folder
 from xrds_lab.bench.windows import Window, find_shots
-from xrds_lab.shots import (
-    bench,
-    blocks,
-    equal,
-    figures,
-    film,
-    motions,
-    report,
-    rivals,
-)
+from xrds_lab.shots import bench, blocks, equal, figures, film, motions, report, rivals
 from xrds_lab.shots.bench import Measure, bench_shots
 from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
 from xrds_lab.shots.frames import MIDDLE, ShotFrames, requests

@@ -12,7 +12,7 @@ pytest.importorskip("mitsuba_oidn")
 if os.name == "nt":
     pytest.skip("processes are forked", allow_module_level=True)
 
-from xrds_core.sequence import denoise
+from xrds_core.exr import sequence
 from xrds_lab.stability.fuzz import fuzz, run, run_case
 from xrds_lab.stability.fuzz_shots import make_twice
 from xrds_lab.stability.odd_shots import Case, make_case
@@ -47,13 +47,13 @@ def test_tracebacks_are_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
 
     case = make_case(tmp_path, SEED, 0)
     case.words[1:] = ["in/####.exr", "-o", "out/####.exr"]
-    monkeypatch.setattr(denoise.Files, "check", fail)
+    monkeypatch.setattr(sequence.Files, "check", fail)
     assert run(case).faults == ["traceback"]
 
 
 def test_frames_that_resume_believes_are_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(denoise, "is_made_of", lambda path, _: path.is_file())
+    monkeypatch.setattr(sequence, "is_made_of", lambda path, _: path.is_file())
     _, resumed, _ = run_case(tmp_path, SEED, 4)  # in which an input is replaced
     assert resumed.faults == ["0002.exr differs"]

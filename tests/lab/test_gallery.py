@@ -14,9 +14,10 @@ import pytest
 from PIL import Image
 
 from xrds_blender.interface.registration import ensure_registered
+from xrds_core.accumulation.accumulate import accumulate
+from xrds_core.accumulation.camera import Camera, Sphere
+from xrds_core.accumulation.frame import Frame, Stored, store
 from xrds_core.errors import UsageError
-from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import Camera, Frame, Sphere, Stored, store
 from xrds_lab import packing
 from xrds_lab.gallery import bench, crops, frames, report
 from xrds_lab.gallery.bench import bench_gallery

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("torch")
 
-from xrds_core.atomic import read_json
+from xrds_core.files import read_json
 from xrds_lab.shots import own_seconds
 from xrds_lab.shots.own_seconds import PARTS, bench_own_seconds, ratios
 

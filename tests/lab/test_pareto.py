@@ -10,7 +10,7 @@ import pytest
 
 from xrds_blender.planning.settings import Denoising, Network
 from xrds_core.errors import Cancelled
-from xrds_core.native.threads import processors
+from xrds_core.native.library import processors
 from xrds_lab.bench import growth, machine, pareto, same_picture
 from xrds_lab.bench.inputs import OFF
 from xrds_lab.bench.journal import MOST_KILLS, Journal

@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip("bpy")
 
+from xrds_core.accumulation.accumulate import accumulate
+from xrds_core.accumulation.frame import store
 from xrds_core.errors import SceneError, UsageError
-from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import store
 from xrds_lab.shots import growth
 from xrds_lab.shots.growth import COUNTS, RADII, Run, bench_growth
 from xrds_lab.shots.synthetic import SAMPLES, frame

@@ -17,16 +17,14 @@ from numpy.typing import NDArray
 from specification.filters import extreme
 from specification.places import still_places
 
-from xrds_core.temporal import accumulate as module
-from xrds_core.temporal import sums
-from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.frame import Frame, Sphere, Stored, store
-from xrds_core.temporal.halves import Halves
-from xrds_core.temporal.motion import pair
-from xrds_core.temporal.shot_cuts import same_shot
-from xrds_core.temporal.similarity import MARGIN
-from xrds_core.temporal.sums import find_spots
-from xrds_core.temporal.vectors import Movement
+from xrds_core.accumulation import accumulate as module
+from xrds_core.accumulation import weighted_sums
+from xrds_core.accumulation.accumulate import Accumulated, accumulate, same_shot
+from xrds_core.accumulation.camera import Sphere
+from xrds_core.accumulation.frame import Frame, Halves, Stored, store
+from xrds_core.accumulation.object_motion import Movement
+from xrds_core.accumulation.reprojection import pair
+from xrds_core.accumulation.weighted_sums import MARGIN, find_spots
 
 Array = NDArray[Any]
 Shape = tuple[int, int]
@@ -247,7 +245,7 @@ class Specified(specification.Work):
     def guess(self, neighbours: Sequence[Any]) -> Array:
         own = super().guess(neighbours).astype(np.float32)
         names = [field.name for field in fields(self)]
-        compiled = sums.Work(*(getattr(self, name) for name in names))
+        compiled = weighted_sums.Work(*(getattr(self, name) for name in names))
         guess = compiled.guess(neighbours).astype(np.float32)
         if not self.target.has_light:
             own[-1] = guess[-1] = 0.0  # brightness, which nothing asks for

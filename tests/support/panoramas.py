@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xrds_core.temporal.frame import Camera, Frame, Sphere
+from xrds_core.accumulation.camera import Camera, Sphere
+from xrds_core.accumulation.frame import Frame
 
 Array = NDArray[np.float64]
 WIDTH, HEIGHT, RADIUS = 96, 48, 4.0

@@ -11,9 +11,10 @@ import numpy as np
 import shots
 
 from xrds_core import exr
+from xrds_core.accumulation.camera import Camera
+from xrds_core.accumulation.frame import Frame
+from xrds_core.exr import cameras, frame_file
 from xrds_core.exr.openexr_io import Part
-from xrds_core.sequence import cameras, reading
-from xrds_core.temporal.frame import Camera, Frame
 
 WINDOW = ((0, 0), (shots.WIDTH - 1, shots.HEIGHT - 1))
 CYCLES = {
@@ -62,7 +63,7 @@ def write(
     height, width = frame.shape
     x, y = frame.camera.window
     data = ((x, y), (x + width - 1, y + height - 1))
-    told = {**cameras.to_header(frame.camera), reading.SAMPLES: 1}
+    told = {**cameras.to_header(frame.camera), frame_file.SAMPLES: 1}
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{frame.number:04d}.exr"
     channels = planes({**vars(frame), **more}, names)

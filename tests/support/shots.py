@@ -13,7 +13,8 @@ from math import cos, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from xrds_core.temporal.frame import Camera, Frame
+from xrds_core.accumulation.camera import Camera
+from xrds_core.accumulation.frame import Frame
 
 Array = NDArray[np.float32]
 Matrix = NDArray[np.float64]

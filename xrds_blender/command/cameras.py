@@ -6,11 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from xrds_core.atomic import write_json
-from xrds_core.files import check_output
+from xrds_core.files import check_output, write_json
 
 from . import arguments
-from .deferred import need_blender
+from .console import need_blender
 from .options import add_scene, choice_of, resolve_paths
 
 
@@ -34,9 +33,9 @@ def add_cameras(commands: Any) -> argparse.ArgumentParser:
 
 def _cameras(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("cameras")
-    from xrds_core.sequence.cameras import to_json
+    from xrds_core.exr.cameras import to_json
 
-    from ..shot.cameras import shot_cameras
+    from ..render.shot import shot_cameras
     from .scene_file import open_scene
 
     resolve_paths(options)

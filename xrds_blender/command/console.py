@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import io
 import json
 import os
 import shutil
@@ -9,21 +11,21 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
-from xrds_core import atomic
-from xrds_core.errors import Cancelled, UsageError, XRDSError, printable
-from xrds_core.notices import finished as finished_frames
-from xrds_core.notices import warn
-
-from . import streams
+from xrds_core import files
+from xrds_core.errors import Cancelled, UsageError, XRDSError, printable, warn
+from xrds_core.errors import finished as finished_frames
 
 Check = Callable[[Any], None]
 
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
+
 _SIGNALS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 
 
@@ -59,7 +61,7 @@ def status_with_json(work: Callable[[], Any], check: Check | None = None) -> int
 
     All else that is printed goes to stderr.
     """
-    with streams.stdout_to_stderr():
+    with stdout_to_stderr():
         end = _ended(work)
     result = end.value if end.status == DONE else _error(end.line, end.status)
     print(json.dumps(result, indent=1), flush=True)
@@ -112,11 +114,11 @@ def _reason(error: OSError) -> str:
 
 def prepare() -> None:
     """Make streams and signals safe; once, at the start of a process."""
-    streams.prepare()
+    prepare_streams()
     if hasattr(signal, "SIGPIPE"):  # as in Python, but not in a Blender program
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     end_at_once_by_signals()
-    atomic.sweep()
+    files.sweep()
 
 
 def end_at_once_by_signals() -> None:
@@ -140,11 +142,11 @@ def end_at_once_by_signals() -> None:
     def wait() -> None:
         while (number := os.read(woken, 1)[0]) not in heeded:
             pass
-        atomic.abandon()
+        files.abandon()
         _remove_blenders_folder()
         line, status = heeded[number], 128 + number
         result = json.dumps(_error(line, status), indent=1) + "\n"
-        streams.write_at_once(f"xrds: {line}\n", result)
+        write_at_once(f"xrds: {line}\n", result)
         os._exit(status)
 
     threading.Thread(target=wait, daemon=True).start()
@@ -152,7 +154,7 @@ def end_at_once_by_signals() -> None:
 
 def finished(status: int) -> int:
     """The exit status at last: what could not be printed is a failure, too."""
-    fault = streams.fault()
+    fault = stdout_fault()
     if fault is None or status != DONE:
         return status
     if not isinstance(fault, BrokenPipeError):  # not as `head` leaves
@@ -164,7 +166,7 @@ def leave(status: int) -> NoReturn:
     """End the process; the bpy module can hang when the interpreter ends."""
     status = finished(status)
     _remove_blenders_folder()
-    streams.flush_all()
+    flush_all()
     os._exit(status)
 
 
@@ -174,3 +176,128 @@ def _remove_blenders_folder() -> None:
     folder = getattr(getattr(bpy, "app", None), "tempdir", "")
     if folder and Path(folder).name.startswith("blender_"):  # not the user's own
         shutil.rmtree(folder, ignore_errors=True)
+
+
+_aside: int | None = None  # where stdout really leads, while it is moved
+
+
+class _Stream(io.FileIO):
+    """A stream whose faults stop no work; `fault` is the first one."""
+
+    fault: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        if self.fault is None:
+            try:
+                return super().write(data)
+            except OSError as error:  # full, closed, or nobody reads it any more
+                self.fault = error
+        return len(data)
+
+
+def prepare_streams() -> None:
+    """Make the streams safe to print on, whatever the shell has made of them.
+
+    A closed one would give its number to the next file that is opened, and Cycles would
+    print into that. As in GNU's tools the null device comes in its place, opened the
+    other way round so that writing still fails and is reported.
+    """
+    for number, mode in ((0, os.O_WRONLY), (1, os.O_RDONLY), (2, os.O_RDONLY)):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, mode)  # takes the lowest number that is free
+    sys.stdout, sys.stderr = (
+        io.TextIOWrapper(
+            io.BufferedWriter(_Stream(number, "w", closefd=False)),
+            encoding=getattr(before, "encoding", None) or "utf-8",
+            errors="backslashreplace",
+            line_buffering=number == 2 or os.isatty(number),
+        )
+        for number, before in ((1, sys.stdout), (2, sys.stderr))
+    )
+
+
+def stdout_fault() -> OSError | None:
+    """Why stdout did not take all that was printed, None if it did."""
+    flush_all()
+    raw = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
+    return raw.fault if isinstance(raw, _Stream) else None
+
+
+def flush_all() -> None:
+    """Flush what Python and the C library still hold of stdout and stderr."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):  # full, closed, None
+            stream.flush()
+    if os.name != "nt":  # Windows' C libraries keep one buffer each
+        ctypes.CDLL(None).fflush(None)
+
+
+@contextmanager
+def stdout_to_stderr() -> Iterator[None]:
+    """Let all that is printed on stdout go to stderr, so that a result has it alone."""
+    global _aside
+    with _moved() as _aside:
+        os.dup2(2, 1)
+        yield
+    _aside = None
+
+
+@contextmanager
+def stdout_to(path: Path) -> Iterator[None]:
+    """Append what is printed on stdout to a file."""
+    with _moved(), path.open("ab") as file:
+        os.dup2(file.fileno(), 1)
+        yield
+
+
+def write_at_once(text: str, result: str) -> None:
+    """Write to stderr, and `result` to stdout where it waits for one, without buffers.
+
+    For a process that is about to end on the spot.
+    """
+    for number, each in ((2, text), (_aside, result)):
+        if number is not None:
+            with suppress(OSError):  # the terminal may have gone
+                os.write(number, each.encode())
+
+
+@contextmanager
+def _moved() -> Iterator[int]:
+    """Yield a copy of stdout's descriptor, which is put back at the end."""
+    flush_all()
+    saved = os.dup(1)
+    try:
+        yield saved
+    finally:
+        flush_all()
+        os.dup2(saved, 1)
+        os.close(saved)
+
+
+Lines = Callable[[dict[str, Any]], Iterable[str]]
+
+
+def lines_of(module: str) -> Lines:
+    """The `lines` of a module, which make a result readable."""
+    return lambda result: import_module(module).lines(result)
+
+
+def no_lines(_: dict[str, Any]) -> Iterable[str]:
+    """For commands whose work has printed all there is to say."""
+    return ()
+
+
+def need_blender(command: str) -> None:
+    """Register the engine; raises UsageError where Blender is not there."""
+    try:
+        import bpy  # noqa: F401  # only asked whether it is there
+    except ImportError as error:
+        raise UsageError(
+            f"{command} needs Blender: install the bpy module "
+            "(pip install bpy) or run blender --command xrds"
+        ) from error
+    from ..interface.registration import ensure_registered
+
+    ensure_registered()

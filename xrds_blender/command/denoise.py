@@ -6,10 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from xrds_core.errors import UsageError, XRDSError
+from xrds_core.errors import UsageError, XRDSError, warn
+from xrds_core.exr.pass_names import PASSES, PassNames
 from xrds_core.frames import in_words
-from xrds_core.notices import warn
-from xrds_core.sequence.names import PASSES, PassNames
 
 from ..planning.settings import QUALITIES
 from . import arguments
@@ -142,14 +141,13 @@ _PASS_HELP = {
 
 def _denoise(options: argparse.Namespace) -> dict[str, Any]:
     from xrds_core.denoising import Denoiser
-    from xrds_core.exr import limits
-    from xrds_core.light_parts.find import Wanted
-    from xrds_core.light_parts.table import read_renderers
-    from xrds_core.sequence.cameras import read_cameras
-    from xrds_core.sequence.denoise import Files, denoise_sequence
-    from xrds_core.sequence.reading import Reading
+    from xrds_core.denoising.light_passes import Wanted, read_renderers
+    from xrds_core.exr import raw_header
+    from xrds_core.exr.cameras import read_cameras
+    from xrds_core.exr.frame_file import Reading
+    from xrds_core.exr.sequence import Files, denoise_sequence
 
-    limits.allow(options.read_limit)
+    raw_header.allow(options.read_limit)
     reading = Reading(
         PassNames(**{name: getattr(options, name) for name in PASSES}),
         cameras=read_cameras(options.camera) if options.camera else None,

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from .deferred import lines_of
+from .console import lines_of
 
 
 def add_info(commands: Any) -> argparse.ArgumentParser:

@@ -13,12 +13,11 @@ from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import entry_points
 from typing import Any, NoReturn
 
-from xrds_core.errors import UsageError
-from xrds_core.notices import finished
+from xrds_core.errors import UsageError, finished
 from xrds_core.version import package_version
 
 from . import cameras, console, denoise, info, render, upscale
-from .deferred import no_lines
+from .console import no_lines
 
 EXAMPLES = {
     "render": (
@@ -157,10 +156,10 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         command.formatter_class = argparse.RawDescriptionHelpFormatter
         command.epilog = (f"examples:\n{examples}\n" if examples else "") + _STATUS
     parser.epilog = apart.listing()
-    command = words[0] if words else ""
-    if command in LABORATORY and command not in commands.choices:
+    name = words[0] if words else ""
+    if name in LABORATORY and name not in commands.choices:
         raise UsageError(
-            f"{command} belongs to the laboratory, which is not installed: "
+            f"{name} belongs to the laboratory, which is not installed: "
             "run pip install ./xrds_lab in a source tree of XRDS"
         )
     return parser

@@ -8,10 +8,10 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from xrds_core.denoising.light_passes import NONE
 from xrds_core.errors import UsageError
-from xrds_core.exr.encoding import CODECS, FLOAT_ZIP, Encoding
+from xrds_core.exr.openexr_io import CODECS, FLOAT_ZIP, Encoding
 from xrds_core.frames import RADIUS
-from xrds_core.light_parts.find import NONE
 from xrds_core.superres.weights_header import PRESETS
 
 from ..planning.plan import SAVINGS

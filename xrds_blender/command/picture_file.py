@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,15 +12,12 @@ from typing import Any
 import numpy as np
 
 from xrds_core import files
+from xrds_core.accumulation.noise import luminance
 from xrds_core.arrays import Array
-from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
-from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
+from xrds_core.exr.openexr_io import FLOAT_ZIP, Encoding
+from xrds_core.files import replacing
 from xrds_core.frames import check_pattern, frame_path
-from xrds_core.temporal.noise import luminance
-
-from . import png_text
-from .whole_file import png_size
 
 SUFFIXES = (".exr", ".png")
 
@@ -92,7 +91,7 @@ def _write_png(
             _save_png(unfinished, radiance, alpha, scene)
             if png_size(unfinished) != alpha.shape[::-1]:
                 raise PictureError(f"cannot write {path}: is the disk full?")
-            png_text.add(unfinished, metadata)
+            add(unfinished, metadata)
     except OSError as error:
         raise PictureError(f"cannot write {path}: {error.strerror}") from error
 
@@ -147,3 +146,65 @@ def _png_settings(scene: Any) -> Iterator[None]:
     finally:
         for name, value in old.items():
             setattr(settings, name, value)
+
+
+_SIGNATURE, _HEADER = 8, 25  # bytes: of the file, and of its first chunk, IHDR
+
+_LONGEST = 79  # letters of a name
+
+
+def add(path: Path, texts: Mapping[str, str]) -> None:
+    """Put texts by name into a PNG that is whole; longer names are cut."""
+    data = path.read_bytes()
+    at = _SIGNATURE + _HEADER
+    chunks = b"".join(_chunk(name[:_LONGEST], text) for name, text in texts.items())
+    path.write_bytes(data[:at] + chunks + data[at:])
+
+
+def _chunk(name: str, text: str) -> bytes:
+    keyword = name.encode("latin-1", "replace")
+    try:
+        content = b"tEXt" + keyword + b"\0" + text.encode("latin-1")
+    except UnicodeEncodeError:  # no compression, no language, no translated name
+        content = b"iTXt" + keyword + b"\0\0\0\0\0" + text.encode()
+    length = struct.pack(">I", len(content) - 4)
+    return length + content + struct.pack(">I", zlib.crc32(content))
+
+
+_BEGINNING = b"\x89PNG\r\n\x1a\n"
+
+
+def is_whole(path: Path, size: tuple[int, int]) -> bool:
+    """Whether `path`, .exr or .png, holds a whole picture of `size` (width, height)."""
+    size_of = png_size if path.suffix.lower() == ".png" else _exr_size
+    try:
+        return size_of(path) == size
+    except (OSError, PictureError):
+        return False
+
+
+def png_size(path: Path) -> tuple[int, int] | None:
+    """Width and height of a PNG; None where any of its checksums is not right."""
+    data = path.read_bytes()
+    at, size = len(_BEGINNING), None
+    if not data.startswith(_BEGINNING):
+        return None
+    while at + 12 <= len(data):  # length, kind, content, checksum
+        length, kind = struct.unpack_from(">I4s", data, at)
+        content, after = at + 8, at + 8 + length
+        checksum = zlib.crc32(data[at + 4 : after])
+        if data[after : after + 4] != checksum.to_bytes(4, "big"):
+            return None
+        if kind == b"IHDR":
+            size = struct.unpack_from(">II", data, content)
+        if kind == b"IEND":
+            return size
+        at = after + 4
+    return None
+
+
+def _exr_size(path: Path) -> tuple[int, int]:
+    from xrds_core import exr
+
+    height, width = exr.read_beauty(path).radiance.shape[:2]
+    return width, height

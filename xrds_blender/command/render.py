@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import UsageError
-from xrds_core.time_left import duration
+from xrds_core.progress import duration
 
 from ..planning.plan import DEADLINE, GUIDE_CACHE, SAME_PICTURE
 from ..planning.settings import counted
 from . import arguments
-from .deferred import need_blender
+from .console import need_blender
 from .options import (
     add_output,
     add_request,
@@ -97,7 +97,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("plan")
-    from ..shot.explain import explain
+    from ..render.explain import explain
     from .scene_file import frames_of, open_scene
 
     resolve_paths(options)

@@ -9,30 +9,27 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from xrds_core.errors import PictureError, UsageError, XRDSError
-from xrds_core.exr.encoding import FLOAT_ZIP, Encoding
+from xrds_core.errors import PictureError, UsageError, XRDSError, finished, warn
+from xrds_core.exr.openexr_io import FLOAT_ZIP, Encoding
 from xrds_core.files import check_folder
 from xrds_core.frames import frame_path, in_words
-from xrds_core.notices import finished, warn
-from xrds_core.time_left import Clock
+from xrds_core.progress import Clock
 
 from ..cycles.settings import subset_of_file
-from ..cycles.size import picture_size
-from ..frame import record
-from ..frame.denoisers import load_denoiser
-from ..frame.networks import is_ready, load_upscaler
-from ..frame.picture import NetworkFailed, Picture
+from ..cycles.view import picture_size
 from ..planning.request import Request
 from ..planning.settings import Mode
+from ..render.loading import is_ready, load_denoiser, load_upscaler
+from ..render.picture import NetworkFailed, Picture, metadata_of, record_of
+from ..render.render import render_scene
+from ..render.sample_cache import SampleCache, cache_of
+from ..render.sampling import has_neighbours
+from ..render.shot import cache_samples, render_shot
 from ..scene.contents import frame_range, moves_in_time
 from ..scene.remarks import missing, remarks
-from ..shot.cache import SampleCache, cache_of
-from ..shot.render import render_scene
-from ..shot.sampling import has_neighbours
-from ..shot.shot import cache_samples, render_shot
 from . import picture_file
+from .picture_file import is_whole
 from .scene_file import AS_SAVED, SceneChoice, frames_of, open_scene
-from .whole_file import is_whole
 
 
 def render_file(
@@ -75,7 +72,9 @@ def render_file(
     numbers = _numbers(scene, frames, animation, output)
     notes = _notes(scene, request, output)
     size = picture_size(scene.render)
-    cache = sample_cache and _cache(scene, request, sample_cache, numbers, choice)
+    cache = None
+    if sample_cache is not None:
+        cache = _cache(scene, request, sample_cache, numbers, choice)
 
     def is_done(number: int) -> bool:  # anew: others may be writing the same frames
         return resume and is_whole(frame_path(str(output), number), size)
@@ -249,7 +248,7 @@ def _write(
     target = frame_path(output, number)
     settings = picture.settings or request.settings
     _, of_file = subset_of_file(scene.cycles, scene.cycles.samples)
-    metadata = record.metadata(record.fields(picture, settings, of_file))
+    metadata = metadata_of(record_of(picture, settings, of_file))
     start = time.perf_counter()
     if scene.frame_current != number and scene.animation_data:
         scene.frame_set(number)  # its view settings may be animated

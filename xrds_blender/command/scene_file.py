@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from xrds_core.errors import SceneError, UsageError
+from xrds_core.errors import SceneError, UsageError, warn
 from xrds_core.files import check_input
 from xrds_core.frames import in_words
-from xrds_core.notices import warn
 
 from ..scene.contents import frame_range
 

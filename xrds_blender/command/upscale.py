@@ -56,11 +56,11 @@ def add_upscale(commands: Any) -> argparse.ArgumentParser:
 
 
 def _upscale(options: argparse.Namespace) -> dict[str, Any]:
-    from xrds_core.exr import limits
+    from xrds_core.exr import raw_header
 
-    from ..frame.torch_folder import load
+    from ..render.torch_folder import load
 
-    limits.allow(options.read_limit)
+    raw_header.allow(options.read_limit)
     return load("superres.exr_upscale").upscale_file(
         options.beauty,
         options.guide_file,

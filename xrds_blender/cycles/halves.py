@@ -14,21 +14,22 @@ from typing import Any
 
 import numpy as np
 
+from xrds_core.accumulation.frame import Halves
+from xrds_core.accumulation.sample_subsets import SampleSubset
 from xrds_core.arrays import Array
-from xrds_core.light_parts.find import LightPart
-from xrds_core.light_parts.light import passes_by_name
-from xrds_core.temporal.halves import Halves
-from xrds_core.temporal.sample_subsets import SampleSubset
+from xrds_core.denoising.light_passes import LightPart, passes_by_name
 
 from ..internals.borrowed import Borrowed
 from . import session
-from .clock import StageClock
 from .layer_session import LayerSession
-from .pass_names import SAMPLE_COUNT, is_of_first_sample
+from .low_resolution import Region
+from .passes import CyclesPasses
 from .samples import COUNTS, GEOMETRY, Samples, sample_layer
-from .settings import first_look, set_share
+from .session import StageClock
+from .settings import SAMPLE_COUNT, first_look, is_of_first_sample, set_share
 
 _Passes = dict[tuple[str, str], Array]
+
 _Geometry = Sequence[tuple[str, str]]
 
 
@@ -79,7 +80,8 @@ def sample_halves(
             view: _joined(first, parts[1][view], shares)
             for view, first in parts[0].items()
         }
-        layer.put_back(_merged(*passes, shares, found) | _light(light, found))
+        first, second = passes
+        layer.put_back(_merged(first, second, shares, found) | _light(light, found))
     return found, seconds_of(clocks)
 
 
@@ -134,29 +136,32 @@ def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Hal
         shares=shares,
         counts=counts,
     )
-    radiance, alpha = halves.mean("radiance"), halves.mean("alpha")
+    share = halves.share()
     whole = replace(
         first,
-        picture=np.dstack((radiance, alpha)),
-        albedo=halves.mean("albedo"),
-        normal=halves.mean("normal"),
+        picture=_mean(first.picture, second.picture, share[..., None]),
+        albedo=_mean(first.albedo, second.albedo, share[..., None]),
+        normal=_mean(first.normal, second.normal, share[..., None]),
         counts=None if counts is None else counts.sum(axis=0),
-        path_length=_mean_length(first, second, halves.share()),
-        parts=_mean_parts(first, second, halves.share()[..., None]),
+        path_length=_mean_length(first, second, share),
+        parts=_mean_parts(first, second, share[..., None]),
     )
     return Half(whole, halves)
+
+
+def _mean(one: Array, two: Array, share: Array) -> Array:
+    return np.asarray(one * share + two * (np.float32(1.0) - share))
 
 
 def _mean_length(first: Samples, second: Samples, share: Array) -> Array | None:
     one, two = first.path_length, second.path_length
     if one is None or two is None:
         return None
-    return np.asarray(one * share + two * (np.float32(1.0) - share))
+    return _mean(one, two, share)
 
 
 def _mean_parts(first: Samples, second: Samples, share: Array) -> dict[str, Array]:
-    rest = np.float32(1.0) - share
-    return {k: x * share + second.parts[k] * rest for k, x in first.parts.items()}
+    return {k: _mean(x, second.parts[k], share) for k, x in first.parts.items()}
 
 
 def _light(parts: Sequence[LightPart], found: Mapping[str, Half]) -> _Passes:
@@ -182,7 +187,55 @@ def _merged(
             continue
         share = found[view].halves.share()[..., None]
         if name == SAMPLE_COUNT:  # itself a share, of the most samples
-            share = np.float32(shares[0])
-        other = second[view, name]
-        merged[view, name] = pixels * share + other * (np.float32(1.0) - share)
+            share = np.asarray(shares[0], np.float32)
+        merged[view, name] = _mean(pixels, second[view, name], share)
     return merged
+
+
+def more_samples(
+    engine: Any,
+    depsgraph: Any,
+    parts: Sequence[SampleSubset],
+    *,
+    region: Region | None = None,
+    share: float | None = None,
+    light: Sequence[LightPart] = (),
+) -> tuple[list[dict[str, Samples]], dict[str, float]]:
+    """Render parts of sequences; samples of each by view, and the seconds.
+
+    `region` is a part of the picture, in its own pixels; None is all of it. `share`
+    keeps the file's noise threshold, as `set_share` has it, for each part.
+    All samples have counts, and the parts of the `light`. The result has the passes
+    afterwards that it had before. Raises Cancelled when the user stops it.
+    """
+    geometry = [] if share is None else [COUNTS]
+    found, clocks = [], []
+    with CyclesPasses(engine, depsgraph, geometry=geometry) as passes:
+        whole, before = passes.region, passes.all_passes()
+        region = region or Region(0, 0, whole.width, whole.height)
+        place = Region(
+            whole.x + region.x, whole.y + region.y, region.width, region.height
+        )
+        with Borrowed() as borrowed:
+            if share is not None:
+                scene = depsgraph.scene_eval
+                set_share(borrowed, scene, session.samples_of(depsgraph), share)
+            for part in parts:
+                rendered, clock = passes.part_samples(
+                    place, part, is_even=share is None, light=light
+                )
+                clocks.append(clock)
+                found.append({v: _counted(x, part, clock) for v, x in rendered.items()})
+        passes.put_back(before)
+    return found, seconds_of(clocks)
+
+
+def _counted(
+    samples: Samples, part: SampleSubset, clock: session.StageClock
+) -> Samples:
+    """With the number of each pixel's samples, even ones as well."""
+    found = counted(samples, part, clock)
+    if found.counts is not None:
+        return found
+    counts = np.full(samples.picture.shape[:2], part.length, np.float32)
+    return replace(samples, counts=counts)

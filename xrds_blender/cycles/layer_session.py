@@ -16,11 +16,10 @@ from xrds_core.arrays import Array
 from ..internals import spare_passes
 from ..internals.borrowed import Borrowed, PipelineSettings
 from . import session
-from .low_camera import CameraFrame, LowGrid, Region, is_exact, widen
-from .pass_names import COMBINED, DEPTH, GUIDE_PASSES, NOISY, is_light
+from .low_resolution import CameraFrame, LowGrid, Region, is_exact, widen
 from .samples import Reader, read_geometry
-from .settings import set_box_filter
-from .size import border_start, frame_size
+from .settings import COMBINED, DEPTH, GUIDE_PASSES, NOISY, is_light, set_box_filter
+from .view import border_start, frame_size
 
 
 class LayerSession:

@@ -7,25 +7,37 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
-from xrds_core.light_parts.find import LightPart
-from xrds_core.temporal.sample_subsets import SampleSubset
+from xrds_core.accumulation.sample_subsets import SampleSubset
+from xrds_core.denoising.light_passes import LightPart
 
 from ..internals.borrowed import Borrowed
-from ..planning.plan import GuideRender
+from ..planning.plan import GuideRender, guide_bounces
 from ..planning.settings import Denoising
+from ..scene.closures import of_tree
 from . import live, session
-from .guide_settings import guide_settings
 from .layer_session import LayerSession
-from .low_camera import LowGrid, Region
-from .low_samples import LowPlace, LowSamples
-from .pass_names import ALBEDO, DEPTH, NOISY, NORMAL
-from .rendered import Beauty, Guides, InProcess, Probe
+from .low_resolution import (
+    Beauty,
+    Guides,
+    InProcess,
+    LowGrid,
+    LowPlace,
+    LowSamples,
+    Probe,
+    Region,
+)
 from .samples import Samples, read_samples
 from .settings import (
+    ALBEDO,
+    DEPTH,
+    NOISY,
+    NORMAL,
     set_blue_noise,
     set_denoising,
     set_repeatable,
@@ -35,6 +47,7 @@ from .settings import (
 
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
+
 # What a probe of the guides is enlarged by, where it keeps this many pixels.
 PROBE_SCALE, PROBE_PIXELS = 8, 4096
 
@@ -276,3 +289,58 @@ class CyclesPasses(LayerSession):
             samples,
             seconds,
         )
+
+
+@contextmanager
+def guide_settings(depsgraph: Any, guides: GuideRender) -> Iterator[None]:
+    """Hold the settings of a guide render on the evaluated scene."""
+    with Borrowed() as borrowed:
+        _set_paths(borrowed, depsgraph.scene_eval, guides)
+        changed = list(_set_lights(borrowed, depsgraph, guides))
+        for item in changed:
+            item.update_tag()
+        try:
+            yield
+        finally:
+            borrowed.give_back()
+            # The next pass is to see the lights again.
+            for item in changed:
+                item.update_tag()
+
+
+def _set_paths(borrowed: Borrowed, scene: Any, guides: GuideRender) -> None:
+    """Follow light only as far as albedo and normal need it."""
+    borrowed.set(
+        scene.cycles,
+        max_bounces=min(guides.bounces, guide_bounces(scene.cycles.max_bounces)),
+        diffuse_bounces=0,
+        volume_bounces=0,
+        use_fast_gi=False,
+        use_guiding=False,
+    )
+    if not guides.shadows:
+        borrowed.set(scene.cycles, light_sampling_threshold=1.0)
+
+
+def _set_lights(
+    borrowed: Borrowed, depsgraph: Any, guides: GuideRender
+) -> Iterator[Any]:
+    """Switch light sampling off; yields what Cycles has to look at again."""
+    import bpy
+
+    for item in depsgraph.ids:
+        if isinstance(item, bpy.types.World) and not guides.sample_world:
+            if item.cycles.sampling_method != "NONE":
+                borrowed.set(item.cycles, sampling_method="NONE")
+                yield item
+        elif isinstance(item, bpy.types.Material) and not guides.sample_emitters:
+            if item.cycles.emission_sampling != "NONE" and _emits(item):
+                borrowed.set(item.cycles, emission_sampling="NONE")
+                yield item
+        elif isinstance(item, bpy.types.Light) and not guides.lamps and item.energy:
+            borrowed.set(item, energy=0.0)
+            yield item
+
+
+def _emits(material: Any) -> bool:
+    return material.node_tree is not None and of_tree(material.node_tree).emits

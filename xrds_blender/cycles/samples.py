@@ -8,34 +8,43 @@ from typing import Any
 
 import numpy as np
 
+from xrds_core.accumulation.sample_subsets import SampleSubset
 from xrds_core.arrays import Array
-from xrds_core.light_parts.find import LightPart
-from xrds_core.light_parts.light import light_of
-from xrds_core.temporal.sample_subsets import SampleSubset
+from xrds_core.denoising.light_passes import LightPart, light_of
 
 from ..internals import spare_passes
+from ..internals.borrowed import Borrowed
+from ..planning.settings import Denoising
 from . import live, session
-from .once import render_once
-from .pass_names import (
+from .session import StageClock
+from .settings import (
     ALBEDO,
     COMBINED,
     DEPTH,
     FIRST_HIT,
+    GUIDE_PASSES,
     MOTION,
     NOISY,
     NORMAL,
     SAMPLE_COUNT,
+    set_blue_noise,
+    set_denoising,
+    set_samples,
 )
 
 GEOMETRY = ((FIRST_HIT, "Z"), (MOTION, "XYZW"))
 """Passes for reprojection into another frame."""
+
 PATH_LENGTH = (DEPTH, "Z")
 """Beside the first hit's depth: to what mirrors and glass show."""
+
 LATE_DEPTH = (DEPTH, "Z")
 """In the place of the first hit's depth where a sequence is continued: that one is
 written by its first sample alone."""
+
 COUNTS = (SAMPLE_COUNT, "X")
 """Pass with how many samples each pixel took, where Cycles decides that."""
+
 Reader = Callable[[str], Array | None]
 """Pixels (H, W, channels) of a pass by name, None where there is none."""
 
@@ -120,7 +129,10 @@ def read_samples(
     # Without its denoiser Cycles leaves Combined black where there is Noisy Image.
     noisy = read(NOISY)
     picture = read(COMBINED) if noisy is None else noisy
-    passes = [picture, read(ALBEDO), read(NORMAL)]
+    albedo, normal = read(ALBEDO), read(NORMAL)
+    assert picture is not None
+    assert albedo is not None
+    assert normal is not None
     geometry = {*wanted} - {SAMPLE_COUNT}
     depth, vector = read_geometry(read, geometry) if geometry else (None, None)
     counts = read(SAMPLE_COUNT) if SAMPLE_COUNT in wanted else None
@@ -129,8 +141,16 @@ def read_samples(
     path = read(DEPTH) if {DEPTH, FIRST_HIT} <= {*wanted} else None
     if path is not None:
         path = np.ascontiguousarray(path[..., 0])
-    own = (np.ascontiguousarray(x) for x in passes)
-    return Samples(*own, depth, vector, counts, path, _read_light(read, light))
+    return Samples(
+        picture=np.ascontiguousarray(picture),
+        albedo=np.ascontiguousarray(albedo),
+        normal=np.ascontiguousarray(normal),
+        depth=depth,
+        vector=vector,
+        counts=counts,
+        path_length=path,
+        parts=_read_light(read, light),
+    )
 
 
 def _read_light(read: Reader, parts: Sequence[LightPart]) -> dict[str, Array]:
@@ -154,3 +174,45 @@ def read_geometry(read: Reader, wanted: Collection[str]) -> tuple[Array, Array |
         depth = np.where(depth > 0.0, depth, np.float32(np.inf))  # 0 is the sky
     vector = read(MOTION) if MOTION in wanted else None
     return depth, None if vector is None else np.ascontiguousarray(vector)
+
+
+def render_once(
+    engine: Any,
+    depsgraph: Any,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
+    denoiser: Denoising | None = None,
+    noisy: bool = False,
+    subset: SampleSubset | None = None,
+    is_even: bool = True,
+) -> StageClock:
+    """Render into the engine's result, exactly as Cycles' own engine would.
+
+    `samples`, `seed` and `denoiser` None leave the scene's own. `noisy` switches
+    Cycles' denoiser off, adds the passes that guide another one, and takes samples by
+    the pattern that suits it. `subset` is of a
+    longer sequence, in the place of samples and seed; it `is_even` as in `set_samples`.
+    Raises Cancelled when the user stops it.
+    """
+    keeps_session = engine.path_resolve("render").use_persistent_data
+    scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
+    if noisy:
+        for name, letters, _ in GUIDE_PASSES:
+            spare_passes.add(engine, layer.name, name, letters)
+    with Borrowed() as borrowed:
+        set_samples(borrowed, scene, samples, seed, subset, is_even)
+        if noisy:
+            set_blue_noise(borrowed, scene)
+            set_denoising(borrowed, scene, layer, False)
+        elif denoiser is not None and session.has_denoiser():
+            set_denoising(borrowed, scene, layer, True, denoiser)
+        live.samples()
+        try:
+            clock = session.run(engine, depsgraph)
+        finally:
+            if not keeps_session:
+                borrowed.forget()  # Cycles frees the evaluated scene as it syncs
+                session.free(engine)
+    session.stop_if_cancelled(engine)
+    return clock

@@ -9,6 +9,8 @@ sync and its BVH then cost next to nothing.
 
 from __future__ import annotations
 
+import re
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -16,11 +18,9 @@ from typing import TYPE_CHECKING, Any
 from xrds_core.errors import Cancelled
 
 from ..internals import spare_passes
-from .clock import StageClock
-from .pass_names import COMBINED, NOISY
+from .settings import COMBINED, NOISY
 
 if TYPE_CHECKING:
-    # numpy is imported where pixels are: Blender starts faster without it.
     from xrds_core.arrays import Array
 
 
@@ -203,3 +203,65 @@ def write_pass(layer: Any, name: str, view: str, pixels: Array) -> None:
     if render_pass is not None:
         flipped = np.ascontiguousarray(pixels[::-1], dtype=np.float32)
         render_pass.rect.foreach_set(flipped.ravel())
+
+
+# What Cycles says once the scene is there; a frame in tiles is read back and denoised
+# after its last sample.
+_RENDERING = ("Sample ", "Rendered ", "Finish", "Reading full buffer", "Denoising")
+
+_PEAK = re.compile(r"Mem:[\d.]+M, Peak:([\d.]+)M")
+
+_SAMPLE = re.compile(r"Sample (\d+)/")
+
+
+class StageClock:
+    """Times one Cycles render: `sync` (scene and BVH) and `render` seconds.
+
+    `peak` is the largest memory in bytes that Cycles reported, `samples` the most that
+    it said it had taken; 0 when it reported none.
+    """
+
+    def __init__(self) -> None:
+        self._start = self._end = 0.0
+        self._sync = self._status = 0.0
+        self._syncing = True
+        self.peak = self.samples = 0
+
+    def __enter__(self) -> StageClock:
+        import bpy
+
+        self._start = self._status = time.perf_counter()
+        if bpy.app.background:
+            bpy.app.handlers.render_stats.append(self._hear)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        import bpy
+
+        self._end = time.perf_counter()
+        if bpy.app.background:
+            bpy.app.handlers.render_stats.remove(self._hear)
+
+    def _hear(self, line: str, *_: Any) -> None:
+        """Add the time since the last line to what Cycles did until now.
+
+        With several views it syncs, samples, and syncs again.
+        """
+        now = time.perf_counter()
+        if self._syncing:
+            self._sync += now - self._status
+        if match := _PEAK.search(line):
+            self.peak = max(self.peak, int(float(match[1]) * 2**20))
+        status = line.rpartition("|")[2].strip()
+        if match := _SAMPLE.match(status):
+            self.samples = max(self.samples, int(match[1]))
+        self._status = now
+        self._syncing = not status.startswith(_RENDERING)
+
+    @property
+    def sync(self) -> float:
+        return self._sync
+
+    @property
+    def render(self) -> float:
+        return self._end - self._start - self._sync

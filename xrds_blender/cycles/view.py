@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.temporal.frame import Camera, Sphere
+from xrds_core.accumulation.camera import Camera, Sphere
 
 from ..internals.borrowed import Borrowed
-from ..planning.forecast import low_size
-from .size import border_start, frame_size, picture_size
+from ..planning.settings import low_size
 
 
 def cameras_of(engine: Any, depsgraph: Any) -> dict[str, Camera]:
@@ -108,3 +107,39 @@ def low_view(camera: Camera, scale: int, window: tuple[int, int]) -> Camera:
     wider = np.diag([across, down, 1.0, 1.0])
     wider[0, 3], wider[1, 3] = across - 1.0, 1.0 - down
     return replace(camera, project=wider @ camera.project, size=size, window=window)
+
+
+def frame_size(render: Any) -> tuple[int, int]:
+    """Width and height of the whole frame.
+
+    Blender multiplies and divides integers (BKE_render_resolution): 720 rows at 70 %
+    are 504, where 720 * 0.7 would be 503.
+    """
+    percentage = render.resolution_percentage
+    return (
+        render.resolution_x * percentage // 100,
+        render.resolution_y * percentage // 100,
+    )
+
+
+def border_start(render: Any) -> tuple[int, int]:
+    """Left column and bottom row of the border, counted from the lower left."""
+    width, height = frame_size(render)
+    return _pixel(render.border_min_x, width), _pixel(render.border_min_y, height)
+
+
+def picture_size(render: Any) -> tuple[int, int]:
+    """Width and height of what is rendered: of the border, where there is one."""
+    width, height = frame_size(render)
+    if not render.use_border:
+        return width, height
+    left, bottom = border_start(render)
+    right = _pixel(render.border_max_x, width)
+    return right - left, _pixel(render.border_max_y, height) - bottom
+
+
+def _pixel(edge: float, side: int) -> int:
+    """Blender multiplies in single precision, and cuts off."""
+    import numpy as np
+
+    return int(np.float32(edge) * np.float32(side))

@@ -10,7 +10,7 @@ import bpy
 from ..cycles import session
 from ..internals.engine_override import ENGINE
 from . import thread_guard
-from .panel import support
+from .panel import messages
 
 
 class XRDSRender(bpy.types.RenderEngine):
@@ -28,7 +28,7 @@ class XRDSRender(bpy.types.RenderEngine):
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        self.session = None
+        self.session: Any = None
         self.most_samples = 0
         self.spare_passes: set[tuple[str, str]] = set()
 
@@ -55,27 +55,27 @@ class XRDSRender(bpy.types.RenderEngine):
             session.functions().render(self, depsgraph)
         else:
             with thread_guard.shared():
-                from ..frame.rendering import render_in
+                from ..render.blender_job import render_in
 
                 render_in(self, depsgraph, lambda: self._render_requested(depsgraph))
 
     def _render_requested(self, depsgraph: Any) -> None:
         """Render what the scene's settings describe, and report what was done."""
         from ..cycles.settings import subset_of_file
-        from ..frame import record
-        from ..shot.render import render_frame
+        from ..render.picture import log_line, record_of, stamp_result
+        from ..render.render import render_frame
         from .properties import request_of
 
         scene, request = depsgraph.scene_eval, request_of(depsgraph.scene_eval.xrds)
         # Cycles may free the scene as it renders.
         frame = scene.frame_current
         _, samples = subset_of_file(scene.cycles, scene.cycles.samples)
-        layer, notes = depsgraph.view_layer_eval.name, list(support.notes(scene))
+        layer, notes = depsgraph.view_layer_eval.name, list(messages.notes_of(scene))
         picture = render_frame(self, depsgraph, request)
         settings = picture.settings or request.settings
-        entries = record.fields(picture, settings, samples)
-        record.stamp(self, entries, layer)
-        self.report({"INFO"}, record.line(entries, frame, layer))
+        entries = record_of(picture, settings, samples)
+        stamp_result(self, entries, layer)
+        self.report({"INFO"}, log_line(entries, frame, layer))
         for note in notes if settings.is_enlarged else ():
             self.report({"INFO"}, f"XRDS: {note}")
 

@@ -13,8 +13,8 @@ import bpy
 
 from xrds_core.errors import UsageError
 
-from ..frame import torch_folder
 from ..internals.lifetimes import PROCESS
+from ..render import torch_folder
 from . import machine
 
 LOOK_AGAIN = 2.0  # seconds between two looks for the result

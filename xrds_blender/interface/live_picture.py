@@ -10,8 +10,11 @@ from typing import Any
 
 import bpy
 
+from xrds_core.arrays import Array
+
 from ..cycles import live, session
 from ..internals.lifetimes import PROCESS
+from ..render import stages
 
 
 @dataclass
@@ -28,7 +31,7 @@ def draw(engine: Any, depsgraph: Any, space: Any) -> None:
     if now.picture is None:
         _draw_samples(engine, depsgraph, space, now.scale)
     else:
-        _draw_picture(now, _height(engine))
+        _draw_picture(now, now.picture, _height(engine))
 
 
 def _draw_samples(engine: Any, depsgraph: Any, space: Any, scale: int) -> None:
@@ -42,15 +45,15 @@ def _draw_samples(engine: Any, depsgraph: Any, space: Any, scale: int) -> None:
         session.functions().draw(engine, depsgraph, space)
 
 
-def _draw_picture(now: live.Live, height: int) -> None:
+def _draw_picture(now: live.Live, picture: Array, height: int) -> None:
     import gpu
     from gpu_extras.presets import draw_texture_2d
 
-    rows, columns = (side * now.scale for side in now.picture.shape[:2])
+    rows, columns = (side * now.scale for side in picture.shape[:2])
     dy, dx = now.offset
     gpu.state.blend_set("ALPHA_PREMULT")
     place = -dx, height + dy - rows
-    draw_texture_2d(_texture(now.picture), place, columns, rows)
+    draw_texture_2d(_texture(picture), place, columns, rows)
     gpu.state.blend_set("NONE")
 
 
@@ -95,3 +98,11 @@ def unregister() -> None:
     """Listen no more."""
     for handlers in (bpy.app.handlers.render_complete, bpy.app.handlers.render_cancel):
         handlers.remove(_forget_soon)
+
+
+def draw_status(self: Any, context: Any) -> None:
+    """Draw the stage into the status bar, before Blender draws its progress bar."""
+    stage = stages.current()
+    if stage is not None:
+        stages.show()
+        self.layout.label(text=stage)

@@ -11,10 +11,10 @@ import bpy
 
 from xrds_core.errors import UsageError
 
-from ..frame import torch_folder
+from ..render import torch_folder
 from . import get_torch, machine
+from .operators import XRDS_OT_self_test
 from .panel.paragraph import translated
-from .self_test import XRDS_OT_self_test
 
 # Numbers stay with their devices: a preference holds the number.
 _AUTOMATIC = ("auto", "Automatic", "The fastest device that PyTorch finds", 0)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
+from xrds_core.denoising.light_passes import ALL, GROUPS, NONE
 from xrds_core.frames import RADIUS
-from xrds_core.light_parts.find import ALL, GROUPS, NONE
 
-from ..choosing import modes
 from ..planning.request import Request, render_request
 from ..planning.settings import Mode
-from ..scene.light import passes_looked_at
+from ..render import choose
+from ..scene.contents import passes_looked_at
 from .machine import machine
 from .translations import CONTEXT
 
@@ -264,7 +264,8 @@ class XRDSSettings(bpy.types.PropertyGroup):
 
 def request_of(settings: XRDSSettings) -> Request:
     """What a scene's settings and the preferences describe."""
-    here, passes = machine(), (settings.passes,)
+    here = machine()
+    passes: tuple[str, ...] = (settings.passes,)
     if settings.passes == AUTOMATIC:
         passes = passes_looked_at(settings.id_data)
     wanted = render_request(
@@ -284,4 +285,4 @@ def request_of(settings: XRDSSettings) -> Request:
         deadline=settings.deadline if settings.animation == DEADLINE else None,
         passes=passes,
     )
-    return modes.in_mode(wanted, Mode(settings.mode))
+    return choose.in_mode(wanted, Mode(settings.mode))

@@ -10,11 +10,9 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
-from xrds_core.time_left import duration
+from xrds_core.progress import duration
 
-from .facts import Facts, SceneFacts
-from .forecast import low_size
-from .settings import counted
+from .settings import counted, low_size
 
 __all__ = [
     "DEADLINE",
@@ -39,8 +37,11 @@ __all__ = [
 
 # Mirrors and glass show other things' albedo and normals; four bounces hold them.
 GUIDE_BOUNCES = 4
+
 GUIDE_CACHE = "guide cache"
+
 SAME_PICTURE, DEADLINE = "same picture", "deadline"
+
 # What may be left out where a scene does not need it, by the names of the decisions.
 SAVINGS = (
     "denoise",
@@ -52,11 +53,15 @@ SAVINGS = (
     "motion blur",
     "network",
 )
+
 # Shares of a guide render's seconds that a saving takes off: docs/lab/measurements.md.
 LIGHT_SHARE = 0.45
+
 BOUNCE_SHARE = 0.12
+
 # Guide samples where nothing is finer than an edge.
 CRISP_SAMPLES = 2
+
 # Cryptomatte counts what covers a pixel by samples: fewer give ragged masks.
 CRYPTOMATTE_SAMPLES = 16
 
@@ -134,7 +139,7 @@ def decide(facts: Facts, savings: Collection[str] = SAVINGS) -> Plan:
     lights, of_lights = _lights(facts, "guide lights" in savings)
     blurred, of_blur = _motion_blur(facts, "motion blur" in savings)
     idle, of_network = _idle("network" in savings)
-    decisions = (of_denoiser, of_guides)
+    decisions: tuple[Decision, ...] = (of_denoiser, of_guides)
     if rendered:
         decisions += (of_samples, of_bounces, of_lights)
     return Plan(
@@ -358,3 +363,58 @@ def _cuts(cuts: Collection[int]) -> tuple[Decision, ...]:
     more = "" if len(cuts) <= _SHOWN else f" and {len(cuts) - _SHOWN} more"
     reason = "a marker binds another camera: nothing is reused across"
     return (Decision("cuts", f"frame {shown}{more}", reason),)
+
+
+@dataclass(frozen=True)
+class SceneFacts:
+    """What a scene holds; see `scene_facts` for how it is found."""
+
+    surfaces: bool = True
+    """Anything at all that a ray can hit."""
+    scatters: bool = True
+    """Some surface or volume reflects light: radiance is noisy."""
+    smooth: bool = True
+    """Mirrors, glass or gloss so smooth that they show others' albedo and normals."""
+    transparent: bool = True
+    volumes: bool = True
+    emitters: tuple[str, ...] = ()
+    """Names of materials that give light."""
+    lamps: int = 1
+    seen_lamps: int = 1
+    """Lamps that a camera, a mirror or glass may show."""
+    world: str = "varies"
+    """`none` (black), `constant` or `varies`."""
+    textures: bool = True
+    bump: bool = True
+    displacement: bool = True
+    subsurface: bool = True
+    hair: bool = True
+    depth_of_field: bool = True
+    motion_blur: bool = True
+    """Requested in the file; what moves is another question."""
+    moving: tuple[str, ...] = ("anything",)
+    """Up to a few names of what changes from frame to frame."""
+    film_transparent: bool = False
+    shadow_catchers: bool = True
+    passes: tuple[str, ...] = ()
+    """Requested beside the picture and its guides."""
+    materials: int = 0
+    unknown_nodes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What of a job, a scene and a Blender the decisions rest on; sizes in pixels."""
+
+    scale: int
+    width: int
+    height: int
+    max_bounces: int
+    has_denoiser: bool
+    exact_camera: bool
+    reprojects: bool = True
+    """Whether it is known where the camera shows a place in another frame."""
+    guide_samples: int = 4
+    scene: SceneFacts = SceneFacts()
+    guide_seconds: float | None = None
+    """Estimate for the guide render with nothing left out; None if there is none."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from xrds_core.denoising.light_passes import NONE, Wanted
 from xrds_core.errors import UsageError
-from xrds_core.light_parts.find import NONE, Wanted
 
 from .plan import SAVINGS, Facts, Plan, cycles_only, decide, full_size
 from .settings import CYCLES_DENOISING, QUALITIES, SCALES, Denoising, Mode, Settings

@@ -40,7 +40,7 @@ class Mode(StrEnum):
         return cls.FULL_SIZE if scale == 1 else cls(f"x{scale}")
 
 
-MODES = tuple(mode for mode in Mode if mode is not Mode.AUTOMATIC)
+MODES: tuple[Mode, ...] = tuple(mode for mode in Mode if mode is not Mode.AUTOMATIC)
 """In the order of the panel; of equally good ones the first is the best."""
 SCALES = tuple(mode.scale for mode in MODES if mode is not Mode.CYCLES_ONLY)
 
@@ -191,3 +191,8 @@ class Settings:
             f"{self.preset} x{self.scale}, {samples}, "
             f"{self.guide_samples} guide samples, OIDN {self.denoising}"
         )
+
+
+def low_size(width: int, height: int, scale: int) -> tuple[int, int]:
+    """Width and height of the small render."""
+    return -(-width // scale), -(-height // scale)

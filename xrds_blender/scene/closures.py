@@ -156,7 +156,7 @@ def of_node(node: Any) -> Closures:
         return Closures(emits=_is_lit(node, "Color", "Strength"))
     if all(socket.type != "SHADER" for socket in node.outputs):
         return Closures(varies=True)  # textures, attributes, coordinates
-    anything = dict.fromkeys((item.name for item in fields(Closures)), True)
+    anything: dict[str, Any] = dict.fromkeys((x.name for x in fields(Closures)), True)
     return Closures(**{**anything, "unknown": (kind,)})
 
 

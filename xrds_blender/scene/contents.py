@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import islice
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice, pairwise
 from typing import Any
 
-from ..planning.facts import SceneFacts
+from xrds_core.denoising.light_passes import ALL, NONE, Wanted, find_parts
+from xrds_core.exr.channels import Channels
+
+from ..planning.plan import SceneFacts
 from .closures import Closures, of_tree, reachable
-from .key_structs import TIMED_NODES
+from .hashing import TIMED_NODES
 
 _SURFACES = {
     "MESH",
@@ -20,7 +23,9 @@ _SURFACES = {
     "POINTCLOUD",
     "VOLUME",
 }
+
 _HAIR = {"CURVES"}
+
 # Modifiers whose result is the same in every frame unless something they use moves,
 # which then is found by itself.
 _STILL_MODIFIERS = (
@@ -31,6 +36,7 @@ _STILL_MODIFIERS = (
     "UV_WARP VERTEX_WEIGHT_EDIT VERTEX_WEIGHT_MIX VERTEX_WEIGHT_PROXIMITY WARP "
     "WEIGHTED_NORMAL WELD WIREFRAME"
 )
+
 _NAMED = 3  # of what moves; more would not help a reader
 
 
@@ -251,3 +257,72 @@ def _is_simulated(item: Any) -> bool:
     # A particle system left is hair: what is emitted was asked for.
     still = {*_STILL_MODIFIERS.split(), "PARTICLE_SYSTEM"}
     return emitting or any(m not in still for m in modifiers)
+
+
+def cuts(scene: Any, frames: Sequence[int]) -> frozenset[int]:
+    """Frames, of those given in order, that begin the take of another camera."""
+    bound = sorted(
+        (m.frame, m.camera.name_full) for m in scene.timeline_markers if m.camera
+    )
+    if not bound:
+        return frozenset()
+    pairs = pairwise((number, _camera(bound, number)) for number in frames)
+    return frozenset(number for (_, old), (number, new) in pairs if old != new)
+
+
+def _camera(bound: list[tuple[int, str]], number: int) -> str:
+    """The name of a frame's camera: before the first marker it is the first one's."""
+    before = [name for frame, name in bound if frame <= number]
+    return before[-1] if before else bound[0][1]
+
+
+# Switches of a view layer.
+_LIGHT = {
+    *("diffuse_direct", "diffuse_indirect", "glossy_direct", "glossy_indirect"),
+    *("transmission_direct", "transmission_indirect", "volume_direct"),
+    *("volume_indirect", "emit", "environment", "shadow_catcher"),
+}
+
+_IMAGES = ("OPEN_EXR_MULTILAYER", "MULTILAYER")
+
+
+def passes_looked_at(scene: Any) -> tuple[str, ...]:
+    """All where the file that is written holds them or the compositor reads one.
+
+    As `Wanted` has them.
+    """
+    is_written = scene.render.image_settings.file_format in _IMAGES
+    return (ALL,) if is_written or _is_composited(scene) else (NONE,)
+
+
+def has_light(layer: Any) -> bool:
+    """Whether a view layer has passes of light beside the picture."""
+    return bool(len(layer.lightgroups)) or bool(_LIGHT & {*requested_passes(layer)})
+
+
+def compositor_of(scene: Any) -> Any:
+    """The node tree that a render of the scene is to go through; None without one."""
+    if not scene.render.use_compositing:
+        return None
+    if hasattr(scene, "compositing_node_group"):  # Blender 5.0 and later
+        return scene.compositing_node_group
+    return scene.node_tree if scene.use_nodes else None
+
+
+def _is_composited(scene: Any) -> bool:
+    """Whether a node of the compositor takes light of a view layer."""
+    tree = compositor_of(scene)
+    read = {
+        f"{socket.name}.{letter}": None
+        for node in (tree.nodes if tree else ())
+        if node.type == "R_LAYERS"
+        for socket in node.outputs
+        if socket.is_linked
+        for letter in "RGB"
+    }
+    wanted = Wanted((ALL,))
+    # a lobe counts without the colour that it was divided by
+    lobes = (lobe for renderer in wanted.renderers for lobe in renderer.lobes)
+    names = {name for lobe in lobes for name in lobe.colour}
+    colours = {f"{name}.{letter}": None for name in names for letter in "RGB"}
+    return bool(find_parts(Channels(scene.name, {**read, **colours}), "", wanted))

@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ..planning.facts import SceneFacts
-from .key_files import file_digest, image_digest
-from .key_geometry import geometry, mesh, particles, pose, vertex_group
-from .key_structs import StructHash
+from ..planning.plan import SceneFacts
+from .hashing import StructHash, geometry, mesh, particles, pose, vertex_group
+from .outer_files import file_digest, image_digest
 
 # Counts up whenever the guide render itself changes what it gives.
 GENERATION = 2
@@ -37,10 +36,12 @@ _CYCLES_LEFT_OUT = (
     "ao_bounces ao_bounces_render sample_clamp_direct sample_clamp_indirect "
     "use_auto_tile tile_size scrambling_distance auto_scrambling_distance"
 )
-_CYCLES_PREFIXES = ("preview_", "denoising_", "use_preview", "bake_", "debug_")
-_CYCLES_PREFIXES += ("use_guiding", "guiding_", "use_surface_guiding")
-_CYCLES_PREFIXES += ("use_volume_guiding", "surface_guiding", "volume_guiding")
-_CYCLES_PREFIXES += ("use_deterministic_guiding",)
+_CYCLES_PREFIXES = (
+    *("preview_", "denoising_", "use_preview", "bake_", "debug_"),
+    *("use_guiding", "guiding_", "use_surface_guiding"),
+    *("use_volume_guiding", "surface_guiding", "volume_guiding"),
+    "use_deterministic_guiding",
+)
 # Of `scene.render`: the size, which the frame gives, and what comes after a render.
 _RENDER_LEFT_OUT = (
     "filepath engine image_settings ffmpeg resolution_x resolution_y "
@@ -52,8 +53,10 @@ _RENDER_LEFT_OUT = (
     "frame_path is_movie_format file_extension stereo_views views bake "
     "use_high_quality_normals use_spherical_stereo has_multiple_engines"
 )
-_RENDER_PREFIXES = ("preview_", "stamp_", "use_stamp", "bake_", "use_bake", "metadata_")
-_RENDER_PREFIXES += ("sequencer_", "use_sequencer", "compositor_", "simplify_gpencil")
+_RENDER_PREFIXES = (
+    *("preview_", "stamp_", "use_stamp", "bake_", "use_bake", "metadata_"),
+    *("sequencer_", "use_sequencer", "compositor_", "simplify_gpencil"),
+)
 # Of a view layer: what it holds by name, and what no light passes.
 _LAYER_LEFT_OUT = (
     "use samples objects depsgraph layer_collection active_layer_collection eevee "

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..planning.request import Request
-from .light import compositor_of, has_light
+from .contents import compositor_of, has_light
 from .outer_files import OuterFile, outer_files
 
 # Nodes without which a compositor gives the render itself.

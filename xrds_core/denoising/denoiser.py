@@ -16,9 +16,9 @@ from weakref import WeakSet
 import numpy as np
 
 from ..errors import UsageError
+from ..progress import Stages
 from . import oidn_device
 from .input_images import check, sample
-from .stages import Stages
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

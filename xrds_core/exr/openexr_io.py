@@ -1,10 +1,4 @@
-"""The OpenEXR library, isolated from one that the program itself brings.
-
-On Linux the OpenEXR of a program, Blender for one, lies among its global symbols, and
-the dynamic linker gives the Python module those functions in place of its own. With
-another version inside, files then cannot be written, and reading them crashes. Where
-that is so each file is read and written by a Python process of its own.
-"""
+"""How an OpenEXR file holds its pixels."""
 
 from __future__ import annotations
 
@@ -24,24 +18,67 @@ from typing import Any
 
 import numpy as np
 
-from ..atomic import scratch_folder
 from ..children import run_python
 from ..errors import PictureError
-from ..files import check_input
-from .encoding import FLOAT_ZIP, LARGEST_HALF, Pixels, fitting
-from .limits import check_claims, limit_of
-from .raw_header import readable, restore
+from ..files import check_input, scratch_folder
+from .raw_header import check_claims, limit_of, readable, restore
+
+Pixels = np.ndarray[Any, Any]
+
+CODECS = (
+    *("none", "rle", "zips", "zip", "piz"),
+    *("pxr24", "b44", "b44a", "dwaa", "dwab"),  # these lose some of the picture
+)
+
+LARGEST_HALF = 65504.0
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """16 bits for each number or 32, compressed by one of CODECS."""
+
+    half: bool = False
+    codec: str = "zip"
+
+    @property
+    def dtype(self) -> Any:
+        """NumPy's name of the number format."""
+        return np.float16 if self.half else np.float32
+
+    def plane(self, pixels: Pixels) -> Pixels:
+        """(H, W) numbers as they are written."""
+        return np.ascontiguousarray(fitting(pixels, self.dtype))
+
+
+FLOAT_ZIP = Encoding()
+
+
+def fitting(pixels: Pixels, dtype: Any) -> Pixels:
+    """Pixels in another number format; what half floats cannot hold is bounded.
+
+    Infinity stays what it is.
+    """
+    if dtype == np.float16:
+        bounded = np.clip(pixels, -LARGEST_HALF, LARGEST_HALF)
+        pixels = np.where(np.isinf(pixels), pixels, bounded)
+    return pixels.astype(dtype, copy=False)
+
 
 Window = tuple[tuple[int, int], tuple[int, int]]
+
 Attributes = dict[str, Any]
 """Of a header: texts, numbers, matrices as lists of rows, and names of views."""
 
 VIEWS = "multiView"
 """The attribute with the names of a file's views, the one without names first."""
+
 _FAULTS = (RuntimeError, ValueError, TypeError, MemoryError)  # of a damaged file
+
 # Of a header, what a file with other channels has anew.
 _OF_CHANNELS = {"channels", "name", "type", "tiles", "chunkCount", "version"}
+
 _LESS = 0.9  # of what DWA may hold, where it is decoded as infinite
+
 _stderr = threading.Lock()
 
 

@@ -16,13 +16,11 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..atomic import replacing
 from ..errors import PictureError
+from ..files import replacing
 from . import openexr_io
-from .channels import Channels
-from .encoding import FLOAT_ZIP, Encoding
-from .openexr_io import Attributes, Part, Window
-from .views import by_view, with_view
+from .channels import Channels, by_view, with_view
+from .openexr_io import FLOAT_ZIP, Attributes, Encoding, Part, Window
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import sys
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from ctypes import CDLL, POINTER, c_double, c_float, c_int32, c_int64, c_void_p, sizeof
 from functools import cache
 from pathlib import Path
 from struct import unpack_from
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -16,17 +18,21 @@ from ..errors import XRDSError
 from .structures import IN_ORDER, Area, Neighbour, Packing, Pass, Reprojection, Target
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import DTypeLike, NDArray
 
+
 FOLDER = Path(__file__).parent / "lib"
+
 _SYSTEMS = {
     "linux": ("linux", ".so"),
     "win32": ("windows", ".dll"),
     "darwin": ("macos", ".dylib"),
 }
+
 _MACHINES = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
+
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "level": (c_int32, ()),
     "limit_level": (None, (c_int32,)),
@@ -160,3 +166,65 @@ class Arrays:
         array = (c_void_p * max(len(addresses), 1))(*addresses)
         self._kept.append(array)
         return array
+
+
+Item = TypeVar("Item")
+
+Result = TypeVar("Result")
+
+_ROWS = 128  # of a band
+
+
+def processors() -> int:
+    """Return how many this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def in_threads(
+    work: Callable[[Item], Result], items: Sequence[Item], threads: int | None = None
+) -> list[Result]:
+    """Return the results of `work`, in the order of the items.
+
+    `threads`: all processors by default. No thread works any more when this ends, by an
+    interrupt or several as well: what it writes into is freed then.
+    """
+    count = min(threads or processors(), len(items))
+    if count <= 1:
+        return [work(item) for item in items]
+    pool = ThreadPoolExecutor(count)
+    futures: list[Future[Result]] = []
+    try:
+        for item in items:
+            futures.append(pool.submit(work, item))  # noqa: PERF401 (an interrupt keeps it)
+        return [future.result() for future in futures]
+    finally:
+        try:
+            _end(futures)
+        finally:
+            pool.shutdown()
+
+
+def _end(futures: Sequence[Future[Result]]) -> None:
+    """Cancel what has not begun and wait for the rest, however often interrupted.
+
+    Threads cannot be joined for that: one whose join was interrupted counts as ended.
+    """
+    interrupt: KeyboardInterrupt | None = None
+    left = futures
+    while left:
+        try:
+            for future in left:
+                future.cancel()
+            wait(left)
+            left = [future for future in left if not future.done()]
+        except KeyboardInterrupt as again:
+            interrupt = again
+    if interrupt is not None:
+        raise interrupt
+
+
+def bands(height: int) -> list[tuple[int, int]]:
+    """Return the rows of a picture in bands: first and last (excluded)."""
+    return [(top, min(top + _ROWS, height)) for top in range(0, height, _ROWS)]

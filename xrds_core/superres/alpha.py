@@ -10,8 +10,7 @@ import numpy as np
 from torch.nn import functional
 
 from ..arrays import Array
-from .front_end import upsample_alpha, upsample_bilinear
-from .layout import to_picture, to_planes
+from .front_end import to_picture, to_planes, upsample_alpha, upsample_bilinear
 
 _BAND = 64  # low-resolution rows at a time bound the memory of what is in between
 

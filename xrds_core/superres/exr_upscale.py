@@ -12,7 +12,7 @@ import torch
 
 from ..errors import UsageError
 from ..exr import CYCLES, Names, read_beauty, read_guides, write_picture
-from ..exr.encoding import FLOAT_ZIP, Encoding
+from ..exr.openexr_io import FLOAT_ZIP, Encoding
 from ..files import check_output, check_place
 from ..progress import Callback
 from ..version import package_version

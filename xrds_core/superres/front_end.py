@@ -20,24 +20,31 @@ from torch.nn import functional
 from ..arrays import Array
 from ..errors import UsageError
 from ..holes import fill_holes
-from .layout import to_picture, to_planes
 from .regression import ALBEDO_EPSILON, explain
 
 ArrayOrTensor = TypeVar("ArrayOrTensor", Array, Tensor)
 
 TRANSFER_GAIN = 10.0
+
 EXPOSURE_KEY = 0.18
+
 EXPOSURE_RANGE = (1e-36, 1e36)  # times the gain, still a normal float32
+
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec.709
 
 _MOST_BINS = 16  # along each axis
+
 # A sun or fireflies in a few bins must not make night of all others, so it is not the
 # brightest bin that the others are held against.
 _TYPICAL_BRIGHT = 0.95  # quantile of the bins with light
+
 _FARTHEST_BIN = 1e4  # times brighter or darker: such bins say nothing of the exposure
+
 _LARGEST = np.float32(3.4e38)  # blended tiles may round up and stay finite
+
 # Of k e x: its square, over the epsilons that networks divide by, is a float32 still.
 _LARGEST_EXPOSED = 1e18
+
 LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
 
 
@@ -219,3 +226,18 @@ def upsample_alpha(low_alpha: Array, guide_alpha: Array, scale: int) -> Array:
     block = functional.interpolate(low, scale_factor=float(scale), mode="nearest")
     equal = (block == guide) & ((guide == 0.0) | (guide == 1.0))
     return to_picture(torch.where(equal, guide, alpha))[:height, :width, 0]
+
+
+def to_planes(picture: Array) -> Tensor:
+    """Return (H, W, C) as a float32 tensor (1, C, H, W) over the same memory.
+
+    The channels stay side by side in it: convolutions add up such tensors in another
+    order than those of separate planes, and so round otherwise.
+    """
+    pixels = torch.from_numpy(np.ascontiguousarray(picture, np.float32))
+    return pixels.permute(2, 0, 1)[None]
+
+
+def to_picture(planes: Tensor) -> Array:
+    """Return a tensor (1, C, H, W) on any device as an array (H, W, C)."""
+    return np.ascontiguousarray(planes[0].permute(1, 2, 0).cpu().numpy())

@@ -12,10 +12,9 @@ from torch import Tensor
 from ..arrays import Array, float_array
 from ..errors import PictureError, UsageError
 from ..holes import clean_alpha, fill_holes
-from .front_end import clean_radiance, pad_guide, transfer
+from .front_end import clean_radiance, pad_guide, to_planes, transfer
 from .guide_filter import FEW_SAMPLES
 from .guide_noise import Quiet
-from .layout import to_planes
 from .tiling import Tile
 
 _SCALES = (1, 2, 4, 8, 16)  # to propose in a message

@@ -12,23 +12,27 @@ import torch
 from torch import Tensor
 
 from ..arrays import Array
-from ..devices import (
+from ..errors import OutOfMemory, WeightsError
+from ..progress import Callback, Progress
+from . import guide_noise, tiling
+from .alpha import finish
+from .cost import Cost, measure, watched
+from .devices import (
     choose_device,
     choose_precision,
     device_name,
     free_memory,
     is_out_of_memory,
 )
-from ..errors import OutOfMemory, WeightsError
-from ..progress import Callback, Progress
-from . import guide_noise, tiling
-from .alpha import finish
-from .cost import Cost, measure, watched
-from .front_end import LARGEST_TRANSFERRED, choose_exposure, inverse_transfer
+from .front_end import (
+    LARGEST_TRANSFERRED,
+    choose_exposure,
+    inverse_transfer,
+    to_picture,
+)
 from .guide_filter import filter_guides
 from .idle import Area, busy_area, write_base
 from .inputs import Inputs, check
-from .layout import to_picture
 from .network import XRDS
 from .weights import choose_network, load_guide_filter
 

@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.command import streams
+from xrds_blender.command import console
 from xrds_blender.planning.settings import Network
-from xrds_core.atomic import write_json
-from xrds_core.time_left import duration
+from xrds_core.files import write_json
+from xrds_core.progress import duration
 
 from ..csv_table import write_table
 from ..progress import report_line
@@ -84,7 +84,7 @@ def bench(
         timing,
         picker,
     )
-    with streams.stdout_to(folder.directory / "blender.log"):
+    with console.stdout_to(folder.directory / "blender.log"):
         shots = find_shots(scenes, windows, references, resolution)
         parts = [SceneBench(shot, chosen) for shot in shots]
         _report_missing(networks, presets)

@@ -15,8 +15,8 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.settings import Network
-from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
+from xrds_core.files import write_json
 
 from .. import metrics
 from ..progress import silent

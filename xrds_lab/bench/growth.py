@@ -18,7 +18,7 @@ import numpy as np
 
 from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
-from xrds_core.native.threads import processors
+from xrds_core.native.library import processors
 
 from . import machine, tasks
 from .inputs import Request

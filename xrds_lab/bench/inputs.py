@@ -15,8 +15,8 @@ import numpy as np
 
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
 from xrds_core.arrays import Array
-from xrds_core.atomic import replacing
 from xrds_core.errors import SceneError
+from xrds_core.files import replacing
 
 from ..cards.cycles import render_on
 

@@ -6,8 +6,8 @@ import json
 from contextlib import contextmanager, nullcontext
 from typing import TYPE_CHECKING
 
-from xrds_core.atomic import read_json, replacing
 from xrds_core.errors import Cancelled
+from xrds_core.files import read_json, replacing
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

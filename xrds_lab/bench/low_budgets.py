@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.command import streams
+from xrds_blender.command import console
 from xrds_blender.planning.settings import Denoising
-from xrds_core.atomic import replacing, write_json
+from xrds_core.files import replacing, write_json
 
 from ..progress import report_line
 from . import machine, workload
@@ -95,7 +95,7 @@ def low_budgets(
         reference_samples,
         picker=False,
     )
-    with streams.stdout_to(folder.directory / "blender.log"):
+    with console.stdout_to(folder.directory / "blender.log"):
         shots = find_shots(scenes, windows, references, resolution)
         parts = [SceneBench(shot, settings) for shot in shots]
         meter = workload.Meter(sum(part.estimate() for part in parts))

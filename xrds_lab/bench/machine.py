@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.native.threads import processors
+from xrds_core.native.library import processors
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

@@ -7,12 +7,12 @@ from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.choosing.probing import probe, with_guides
 from xrds_blender.planning import budget
 from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Mode
 from xrds_blender.planning.settings import Settings as RenderSettings
-from xrds_core.atomic import read_json, write_json
+from xrds_blender.render.probing import probe, with_guides
+from xrds_core.files import read_json, write_json
 
 from . import tasks, workload
 from .inputs import Folder, open_scene

@@ -28,7 +28,7 @@ from xrds_blender.planning.settings import (
     Mode,
     Settings,
 )
-from xrds_core.atomic import read_json, write_json
+from xrds_core.files import read_json, write_json
 
 from .. import metrics
 

@@ -13,9 +13,9 @@ import numpy as np
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Network
 from xrds_blender.planning.settings import Denoising as Mode
 from xrds_core import denoising, exr
-from xrds_core.atomic import replacing
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError
+from xrds_core.files import replacing
 from xrds_core.superres import front_end
 
 from .. import metrics

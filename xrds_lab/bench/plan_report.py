@@ -17,10 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_blender.planning.plan import GUIDE_CACHE, SAVINGS
-from xrds_core.atomic import read_json, replacing, write_json
 from xrds_core.children import run_python
 from xrds_core.errors import SceneError, UsageError, XRDSError
-from xrds_core.files import check_input, check_output
+from xrds_core.files import check_input, check_output, read_json, replacing, write_json
 
 from .. import metrics
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 from . import analysis, plots
 from .crops import viewer

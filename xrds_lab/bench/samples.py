@@ -16,7 +16,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising, Network
-from xrds_core.atomic import write_json
+from xrds_core.files import write_json
 
 from ..progress import silent
 from .inputs import kept

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 from ..metrics import to_srgb
 from .crops import largest

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning.settings import DEFAULT_DENOISING
-from xrds_core.atomic import read_json, write_json
+from xrds_core.files import read_json, write_json
 
 from . import machine
 from .inputs import OFF, Mode, open_scene

@@ -28,8 +28,8 @@ from .stages import (
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from xrds_blender.frame.picture import Picture
     from xrds_blender.planning.settings import Network
+    from xrds_blender.render.picture import Picture
     from xrds_core.arrays import Array
 
     from .inputs import Arrays
@@ -88,9 +88,9 @@ def frame(
     Every frame renders its own guides. `other` is the time outside all stages;
     weights are loaded before. `adaptive` tells how Cycles samples adaptively.
     """
-    from xrds_blender.frame.networks import load_upscaler
     from xrds_blender.interface.registration import ensure_registered
-    from xrds_blender.shot.render import render_scene
+    from xrds_blender.render.loading import load_upscaler
+    from xrds_blender.render.render import render_scene
 
     ensure_registered()
     scene = open_scene(shot.path, shot.window.whole)

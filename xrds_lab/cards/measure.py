@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
+    from xrds_core.accumulation.frame import Stored
     from xrds_core.arrays import Array
-    from xrds_core.temporal.frame import Stored
 
     Row = dict[str, Any]
 
@@ -104,9 +104,9 @@ def _sample(
     scene: Any, case: Case, numbers: Sequence[int]
 ) -> tuple[dict[int, Stored], float]:
     """The frames' samples, and the median of their seconds."""
-    from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.sampling import sample_frame
+    from xrds_blender.render.blender_job import call_engine
+    from xrds_blender.render.sampling import sample_frame
 
     job = render_request(scale=1, samples=case.samples, temporal_radius=REACH)
     found, seconds = {}, []
@@ -123,9 +123,9 @@ def _sample(
 
 
 def _references(scene: Any, case: Case, number: int) -> list[Array]:
-    from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.sampling import sample_frame
+    from xrds_blender.render.blender_job import call_engine
+    from xrds_blender.render.sampling import sample_frame
 
     scene.frame_set(number)
     job = render_request(scale=1, samples=case.reference_samples)
@@ -199,7 +199,7 @@ def _ours(case: Case, own: Stored, lenders: Sequence[Stored]) -> Row:
 def _whole_shot(scene: Any, case: Case) -> Row:
     """Seconds per frame of the whole shot, finished beside sampling and in turn."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot import shot
+    from xrds_blender.render import shot
 
     job = render_request(scale=1, samples=case.samples, temporal_radius=REACH)
     found = {}
@@ -213,7 +213,7 @@ def _whole_shot(scene: Any, case: Case) -> Row:
 
 def _finishing(case: Case, device: str) -> Callable[..., Any]:
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.full_size import FullSize
+    from xrds_blender.render.full_size import FullSize
 
     job = render_request(
         scale=1, samples=case.samples, temporal_radius=REACH, device=device

@@ -11,8 +11,8 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.command import streams
-from xrds_core.atomic import read_json, write_json
+from xrds_blender.command import console
+from xrds_core.files import read_json, write_json
 
 from ..bench import machine
 from ..bench.journal import Journal
@@ -58,7 +58,7 @@ def bench_devices(
     kept.mkdir(exist_ok=True)
     journal = Journal(kept / "journal.json", report_line)
     ends = time.monotonic() + 60.0 * minutes
-    with streams.stdout_to(kept / "blender.log"):
+    with console.stdout_to(kept / "blender.log"):
         cycles = find_card()
         about = {**machine.describe(), "cycles_device": cycles}
         report_line(f"Cycles on {cycles}")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from xrds_blender.command import arguments
-from xrds_blender.command.deferred import need_blender, no_lines
+from xrds_blender.command.console import need_blender, no_lines
 from xrds_blender.command.options import DEVICE_HELP
 from xrds_core.errors import UsageError, XRDSError
 from xrds_core.superres.weights_header import PRESETS

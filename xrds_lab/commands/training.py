@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from xrds_blender.command import arguments
-from xrds_blender.command.deferred import lines_of, need_blender
+from xrds_blender.command.console import lines_of, need_blender
 
 
 def _dataset(options: argparse.Namespace) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import bpy
 
-from xrds_blender.command import arguments, console, streams
+from xrds_blender.command import arguments, console
 from xrds_blender.interface.registration import ensure_registered
 
 from . import results
@@ -35,7 +35,7 @@ def _demo(options: argparse.Namespace) -> list[str]:
     out = options.out
     out.mkdir(parents=True, exist_ok=True)
     log = out / "blender.log"
-    with Countdown(options.seconds) as countdown, streams.stdout_to(log):
+    with Countdown(options.seconds) as countdown, console.stdout_to(log):
         ensure_registered()
         scene = build(*options.resolution)
         orbit(scene)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 from ..metrics import to_srgb
 from ..shots import film

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_blender.command.picture_file import save
-from xrds_core.atomic import write_json
+from xrds_core.files import write_json
 
 from .. import metrics
 from ..bench import machine

@@ -12,13 +12,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from xrds_core.arrays import Array
-from xrds_core.atomic import replacing
-from xrds_core.temporal.accumulate import Accumulated, sample_counts
-from xrds_core.temporal.frame import Stored
-from xrds_core.temporal.half_floats import floats
-from xrds_core.temporal.motion import grid, nearest, pair, reproject
-from xrds_core.temporal.vectors import Movement
+from xrds_core.accumulation.accumulate import Accumulated, sample_counts
+from xrds_core.accumulation.frame import Stored
+from xrds_core.accumulation.object_motion import Movement
+from xrds_core.accumulation.reprojection import grid, nearest, pair, reproject
+from xrds_core.arrays import Array, floats
+from xrds_core.files import replacing
 
 from ..bench.crops import largest
 from ..metrics import to_srgb

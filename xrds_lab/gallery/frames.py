@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.arrays import Array
-from xrds_core.atomic import replacing
+from xrds_core.accumulation.frame import Frame
+from xrds_core.arrays import LARGEST_HALF, Array
 from xrds_core.errors import SceneError
-from xrds_core.temporal.frame import Frame
-from xrds_core.temporal.half_floats import LARGEST_HALF
+from xrds_core.files import replacing
 
 from .. import packing
 from .stage import SIZE

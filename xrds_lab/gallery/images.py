@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from xrds_core.accumulation.frame import Stored
+from xrds_core.accumulation.reprojection import pair
+from xrds_core.accumulation.virtual_images import find_images
 from xrds_core.arrays import Array
-from xrds_core.temporal.candidates import find_images
-from xrds_core.temporal.frame import Stored
-from xrds_core.temporal.motion import pair
 
 from ..metrics import to_srgb
 from .judge import BARE, squared_error

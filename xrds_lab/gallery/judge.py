@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from xrds_core.accumulation.local_filters import block_means
 from xrds_core.arrays import Array
-from xrds_core.sequence.same_picture import block_means
 
 from ..metrics import to_srgb
 

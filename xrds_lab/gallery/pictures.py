@@ -19,13 +19,13 @@ import numpy as np
 
 import xrds_core
 from xrds_blender.planning.request import render_request
-from xrds_blender.shot import full_size
-from xrds_blender.shot.full_size import FullSize
+from xrds_blender.render import full_size
+from xrds_blender.render.full_size import FullSize
+from xrds_core.accumulation.accumulate import Accumulated
+from xrds_core.accumulation.frame import Frame, Stored, store
 from xrds_core.arrays import Array
-from xrds_core.atomic import write_json
-from xrds_core.temporal.accumulate import Accumulated
-from xrds_core.temporal.frame import Frame, Stored, store
-from xrds_core.temporal.window import Shot as Window
+from xrds_core.files import write_json
+from xrds_core.shot import Shot as Window
 
 from ..checksum import checksum
 from ..metrics import to_srgb

@@ -62,9 +62,9 @@ def render(
 
 def _render(scene: Any, request: Request, store: Store) -> None:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
-    from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.sampling import noisy_frame, sample_frame
+    from xrds_blender.render.blender_job import call_engine
+    from xrds_blender.render.sampling import noisy_frame, sample_frame
 
     if request.kind != NOISY:
         job = render_request(scale=1, samples=request.samples, seed=request.seed)
@@ -91,12 +91,12 @@ def _end_with_parent() -> None:
 
 
 def _main() -> int:
-    from xrds_blender.command import streams
+    from xrds_blender.command import console
 
     directory, asked = Path(sys.argv[1]), json.loads(sys.argv[2])
     requests, store = [Request.of(values) for values in asked], Store(directory)
     _end_with_parent()
-    with os.fdopen(os.dup(1), "w") as told, streams.stdout_to(directory / LOG):
+    with os.fdopen(os.dup(1), "w") as told, console.stdout_to(directory / LOG):
         try:
             render(requests, store, lambda n: print(n, file=told, flush=True))
         except Exception as error:  # told to the one who waits, then over

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from xrds_core.atomic import replacing, write_json
+from xrds_core.files import replacing, write_json
 
 from ..csv_table import write_table
 from .judge import BLOCK, LOSS, SHARE, WORST_LOSS

@@ -18,7 +18,7 @@ from .scenes import build, listed
 
 def main() -> int:
     """Build the scenes; 2 where something is missing."""
-    from xrds_blender.command import streams
+    from xrds_blender.command import console
 
     parser = argparse.ArgumentParser("python -m xrds_lab.held_out", description=__doc__)
     parser.add_argument(
@@ -32,7 +32,7 @@ def main() -> int:
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
     try:
-        with streams.stdout_to(options.out / "blender.log"):
+        with console.stdout_to(options.out / "blender.log"):
             for path in build(options.assets, options.out, options.scenes):
                 report_line(f"{path}")
     except XRDSError as error:

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from xrds_core.atomic import replacing
-from xrds_core.temporal.similarity import penalties
+from xrds_core.accumulation.weighted_sums import penalties
+from xrds_core.files import replacing
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -89,7 +89,7 @@ def _draw_judged(axes: Axes) -> None:
 
 
 def _weights(own: Array, others: Array) -> Array:
-    """Weigh neighbours as `xrds_core.temporal.similarity` does, for one row."""
+    """Weigh neighbours as `xrds_core.accumulation.weighted_sums` does, for one row."""
     kernel = np.ones(_AVERAGED) / _AVERAGED
     apart = np.convolve(own - others, kernel, "same")
     chance = _NOISE**2 * (1 + 1 / _NEIGHBOURS) / _AVERAGED

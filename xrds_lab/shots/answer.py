@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 from .crops import REFERENCE, SIZE, crop_key
 from .figures import DEFAULT, REACH, XRDS

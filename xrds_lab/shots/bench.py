@@ -9,9 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from xrds_blender.command import streams
-from xrds_core.atomic import write_json
+from xrds_blender.command import console
 from xrds_core.errors import UsageError
+from xrds_core.files import write_json
 
 from ..bench import machine, workload
 from ..bench.inputs import Folder
@@ -98,7 +98,7 @@ def bench_shots(
     out.mkdir(parents=True, exist_ok=True)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-shots.json", report_line)
-    with streams.stdout_to(folder.directory / "blender.log"):
+    with console.stdout_to(folder.directory / "blender.log"):
         shots = find_shots(scenes, windows, references, resolution)
         networks = Networks(None, "cpu")
         parts = [

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_core.atomic import read_json, replacing, write_json
+from xrds_core.files import read_json, replacing, write_json
 
 from ..bench.crops import largest
 from ..metrics import to_srgb

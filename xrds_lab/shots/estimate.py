@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from xrds_core.time_left import duration
+from xrds_core.progress import duration
 
 from ..bench.inputs import open_scene
 

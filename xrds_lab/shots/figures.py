@@ -16,11 +16,11 @@ import numpy as np
 import xrds_core
 from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING
-from xrds_blender.shot import full_size
-from xrds_blender.shot.full_size import FullSize
-from xrds_core.atomic import write_json
-from xrds_core.temporal.frame import Stored, store
-from xrds_core.temporal.window import Shot
+from xrds_blender.render import full_size
+from xrds_blender.render.full_size import FullSize
+from xrds_core.accumulation.frame import Stored, store
+from xrds_core.files import write_json
+from xrds_core.shot import Shot
 
 from ..checksum import checksum
 from ..metrics import all_metrics, to_srgb
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from xrds_blender.planning.settings import Denoising
+    from xrds_core.accumulation.frame import Frame
     from xrds_core.arrays import Array
-    from xrds_core.temporal.frame import Frame
 
     from .crops import Key
 

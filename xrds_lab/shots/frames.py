@@ -17,8 +17,8 @@ from .motions import FILE, animate
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
+    from xrds_core.accumulation.frame import Frame
     from xrds_core.arrays import Array
-    from xrds_core.temporal.frame import Frame
 
     from ..bench.journal import Journal
     from ..bench.windows import Shot
@@ -154,9 +154,9 @@ class ShotFrames:
 
 def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
-    from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.sampling import noisy_frame
+    from xrds_blender.render.blender_job import call_engine
+    from xrds_blender.render.sampling import noisy_frame
 
     job = render_request(
         scale=1,

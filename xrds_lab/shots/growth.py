@@ -13,9 +13,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import read_json, replacing, write_json
 from xrds_core.children import run_python
 from xrds_core.errors import SceneError, UsageError
+from xrds_core.files import read_json, replacing, write_json
 
 from ..bench import machine
 from ..bench.growth import power
@@ -138,11 +138,11 @@ def measured(run: Run) -> Iterator[Row]:
 def _frame(run: Run) -> Iterator[tuple[str, Row]]:
     """Accumulate and denoise the middle frame of a shot of synthetic samples."""
 
+    from xrds_core.accumulation.accumulate import accumulate
+    from xrds_core.accumulation.frame import store
+    from xrds_core.accumulation.object_motion import Movement
     from xrds_core.denoising import Denoiser
-    from xrds_core.sequence.finishing import finish_frame
-    from xrds_core.temporal.accumulate import accumulate
-    from xrds_core.temporal.frame import store
-    from xrds_core.temporal.vectors import Movement
+    from xrds_core.finish import finish_frame
 
     from .synthetic import frame
 
@@ -168,7 +168,7 @@ def _frame(run: Run) -> Iterator[tuple[str, Row]]:
 def _shot(run: Run) -> Iterator[tuple[str, Row]]:
     """Render a panning shot as `xrds render` does."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.shot import render_shot
+    from xrds_blender.render.shot import render_shot
 
     from ..bench.inputs import open_scene
     from ..bench.windows import Window
@@ -268,12 +268,12 @@ def _line(row: Row) -> str:
 def _main() -> int:
     import os
 
-    from xrds_blender.command import streams
+    from xrds_blender.command import console
 
     words = json.loads(sys.argv[1])
     run = Run(**(words | {"size": tuple(words["size"])}))
     told = os.fdopen(os.dup(1), "w")
-    with streams.stdout_to(Path(os.devnull)):
+    with console.stdout_to(Path(os.devnull)):
         rows = list(measured(run))
     print(_MARK + json.dumps(rows), file=told, flush=True)
     return 0

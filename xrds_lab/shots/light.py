@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_blender.command import streams
-from xrds_core.atomic import read_json, write_json
+from xrds_blender.command import console
+from xrds_core.accumulation.accumulate import accumulate
+from xrds_core.accumulation.frame import store
+from xrds_core.accumulation.object_motion import Movement
 from xrds_core.denoising import Denoiser
-from xrds_core.sequence.finishing import finish_frame
-from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import store
-from xrds_core.temporal.vectors import Movement
+from xrds_core.files import read_json, write_json
+from xrds_core.finish import finish_frame
 
 from .. import metrics
 from ..bench import machine
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
     from pathlib import Path
 
+    from xrds_core.accumulation.frame import Frame
     from xrds_core.arrays import Array
-    from xrds_core.light_parts.find import LightPart
-    from xrds_core.temporal.frame import Frame
+    from xrds_core.denoising.light_passes import LightPart
 
     from ..bench.windows import Shot
 
@@ -82,7 +82,7 @@ def bench_light_parts(
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-light-parts.json", report_line)
     rows: list[Row] = []
-    with streams.stdout_to(folder.directory / "blender.log"):
+    with console.stdout_to(folder.directory / "blender.log"):
         for shot in find_shots(scenes, windows, references, resolution):
             for count in samples:
                 name = f"{shot.identity}-{shot.window.label}-{count}-light-parts.json"
@@ -98,9 +98,9 @@ def bench_light_parts(
 
 
 def _render(shot: Shot, samples: int, reference_samples: int) -> _Rendered:
-    from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.sampling import noisy_frame, parts_of_layer
+    from xrds_blender.render.blender_job import call_engine
+    from xrds_blender.render.sampling import noisy_frame, parts_of_layer
 
     scene = open_scene(shot.path, shot.window)
     animate(scene, shot.window, "pan", MIDDLE, _REACH)

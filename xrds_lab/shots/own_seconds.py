@@ -18,19 +18,19 @@ from unittest.mock import patch
 
 import numpy as np
 
-from xrds_core.atomic import replacing, write_json
+from xrds_core.accumulation import accumulate as accumulation
+from xrds_core.accumulation.coarse_rejection import tile_weights
+from xrds_core.accumulation.equal_noise import IndependentFrames
+from xrds_core.accumulation.frame import Frame, Stored, store
+from xrds_core.accumulation.local_filters import find_ranges, find_rims
+from xrds_core.accumulation.object_motion import Movement
+from xrds_core.accumulation.reprojection import pair
+from xrds_core.accumulation.weighted_sums import Work
 from xrds_core.denoising import Denoiser
 from xrds_core.exr import openexr_io
-from xrds_core.native.surfaces import find_ranges, find_rims
-from xrds_core.native.threads import processors
-from xrds_core.sequence.finishing import finish_frame
-from xrds_core.temporal import accumulate as accumulation
-from xrds_core.temporal.coarse_rejection import tile_weights
-from xrds_core.temporal.equal_noise import IndependentFrames
-from xrds_core.temporal.frame import Frame, Stored, store
-from xrds_core.temporal.motion import pair
-from xrds_core.temporal.sums import Work
-from xrds_core.temporal.vectors import Movement
+from xrds_core.files import replacing, write_json
+from xrds_core.finish import finish_frame
+from xrds_core.native.library import processors
 
 from ..bench import machine
 from ..progress import report_line

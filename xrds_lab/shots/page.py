@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 from ..bench.plots import MEASURES as LABELS
 from .crops import REFERENCE, crop_key

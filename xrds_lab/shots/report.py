@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 from . import blocks, comparison
 from .figures import BEST, DEFAULT, MEDIAN, REACH, XRDS

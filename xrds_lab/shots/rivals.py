@@ -15,12 +15,12 @@ from xrds_blender.planning.settings import (
     DEFAULT_DENOISING,
     Denoising,
 )
-from xrds_core.temporal.frame import store
-from xrds_core.temporal.motion import grid, reproject, reprojection
+from xrds_core.accumulation.frame import store
+from xrds_core.accumulation.reprojection import grid, reproject, reprojection
 
 if TYPE_CHECKING:
+    from xrds_core.accumulation.frame import Frame
     from xrds_core.arrays import Array
-    from xrds_core.temporal.frame import Frame
 
 MODES: tuple[Denoising, ...] = CYCLES_DENOISING
 

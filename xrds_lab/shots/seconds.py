@@ -13,7 +13,7 @@ import time
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from xrds_blender.planning.settings import DEFAULT_DENOISING
-from xrds_core.atomic import write_json
+from xrds_core.files import write_json
 
 from ..bench.inputs import open_scene
 from ..bench.windows import Window
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from xrds_blender.planning.request import Request
-    from xrds_core.temporal.frame import Stored
+    from xrds_core.accumulation.frame import Stored
 
     from ..bench.windows import Shot
 
@@ -123,8 +123,8 @@ def timed(
 
 def _sample(scene: Any, job: Request) -> Stored:
     """One frame's samples, packed as a shot keeps them."""
-    from xrds_blender.frame.rendering import call_engine
-    from xrds_blender.shot.sampling import sample_frame
+    from xrds_blender.render.blender_job import call_engine
+    from xrds_blender.render.sampling import sample_frame
 
     made = call_engine(scene, lambda *given: sample_frame(*given, job))
     return next(iter(made.views.values()))
@@ -134,8 +134,8 @@ def _finished(
     sampled: Mapping[int, Stored], job: Request, rounds: int
 ) -> dict[str, float]:
     """Seconds of the middle frame's accumulation and denoising."""
-    from xrds_blender.shot.full_size import FullSize
-    from xrds_core.temporal.window import Shot as Window
+    from xrds_blender.render.full_size import FullSize
+    from xrds_core.shot import Shot as Window
 
     numbers = Window(tuple(sampled), job.settings.temporal_radius).neighbours(MIDDLE)
     own, lenders = sampled[MIDDLE], [sampled[number] for number in numbers]

@@ -17,10 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_blender.command import streams
+from xrds_blender.command import console
 from xrds_blender.planning.settings import DEFAULT_DENOISING
-from xrds_core.atomic import read_json, write_json
 from xrds_core.errors import UsageError
+from xrds_core.files import read_json, write_json
 
 from .. import metrics
 from ..bench import machine
@@ -122,7 +122,7 @@ def bench_same_picture(
     out.mkdir(parents=True, exist_ok=True)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-same-picture.json", report_line)
-    with streams.stdout_to(folder.directory / "blender.log"):
+    with console.stdout_to(folder.directory / "blender.log"):
         networks = Networks(None, "cpu")
         shots = find_shots(scenes, windows, references, resolution, device)
         parts = [
@@ -298,7 +298,7 @@ def _same_samples(shot: Shot, case: Case) -> Made:
 
 def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.shot import render_shot
+    from xrds_blender.render.shot import render_shot
 
     reach = frames // 2
     scene = _opened(shot, case, reach)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from xrds_core.accumulation.camera import Camera
+from xrds_core.accumulation.frame import Frame, Halves
 from xrds_core.arrays import Array
-from xrds_core.temporal.frame import Camera, Frame
-from xrds_core.temporal.halves import Halves
 
 SAMPLES = 2.0
 _FOCUS = 2.0  # clip units

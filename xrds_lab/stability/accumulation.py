@@ -20,8 +20,8 @@ from .stiff import stops
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from xrds_core.accumulation.frame import Stored
     from xrds_core.arrays import Array
-    from xrds_core.temporal.frame import Stored
 
 SAMPLES, RADIUS, REFERENCE_SAMPLES = 2, 4, 128
 
@@ -52,10 +52,10 @@ class Filmed:
 def film(name: str) -> Filmed:
     """Render a shot's frames by the product, and references of those judged."""
     from xrds_blender import run_job
-    from xrds_blender.frame.rendering import call_engine
     from xrds_blender.planning.request import render_request
     from xrds_blender.planning.settings import DEFAULT_DENOISING
-    from xrds_blender.shot.sampling import sample_frame
+    from xrds_blender.render.blender_job import call_engine
+    from xrds_blender.render.sampling import sample_frame
 
     from .moving_scenes import FRAMES, JUDGED, build, set_frame
 
@@ -119,8 +119,8 @@ def fisheye() -> Iterator[Measured]:
 def finished(frames: dict[int, Stored], number: int, radius: int) -> Array:
     """A frame (H, W, 3) as the product finishes it."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.full_size import FullSize
-    from xrds_core.temporal.window import Shot
+    from xrds_blender.render.full_size import FullSize
+    from xrds_core.shot import Shot
 
     job = render_request(scale=1, samples=SAMPLES, temporal_radius=radius, device="cpu")
     lenders = [frames[n] for n in Shot(tuple(frames), radius).neighbours(number)]
@@ -137,7 +137,7 @@ def _error(picture: Array, truth: Array, shown: float) -> Array:
 
 def ghost(frames: dict[int, Stored]) -> float:
     """Light that frames on either side of a cut lend to the other: largest change."""
-    from xrds_core.temporal.accumulate import accumulate
+    from xrds_core.accumulation.accumulate import accumulate
 
     from .moving_scenes import JUDGED
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from xrds_core.accumulation import virtual_images
+from xrds_core.accumulation.accumulate import accumulate
+from xrds_core.accumulation.frame import Stored
+from xrds_core.accumulation.weighted_sums import MARGIN
 from xrds_core.errors import PictureError
-from xrds_core.temporal import candidates
-from xrds_core.temporal.accumulate import accumulate
-from xrds_core.temporal.frame import Stored
-from xrds_core.temporal.similarity import MARGIN
-from xrds_core.temporal.window import Shot, Window
+from xrds_core.shot import Shot, Window
 
 from .accumulation import RADIUS, SAMPLES, film, finished
 from .load import growth, resident
@@ -21,7 +21,7 @@ from .measured import Measured, faults, relative_difference
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from xrds_core.temporal.accumulate import Accumulated
+    from xrds_core.accumulation.accumulate import Accumulated
 
     Frames = dict[int, Stored]
 
@@ -46,7 +46,7 @@ def spoilt(frames: Frames) -> Iterator[Measured]:
     bad = np.zeros((height, width), bool)
     bad[height // 3, :] = bad[:, width // 4] = True
     near = np.zeros_like(bad)
-    margin = MARGIN + candidates.reach((height, width))
+    margin = MARGIN + virtual_images.reach((height, width))
     near[height // 3 - margin : height // 3 + margin + 1] = True
     near[:, width // 4 - margin : width // 4 + margin + 1] = True
     wrong, changed = 0, 0.0
@@ -67,7 +67,7 @@ def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
 
     `store` marks such pixels and empties them.
     """
-    from xrds_core.temporal.frame import Frame, store
+    from xrds_core.accumulation.frame import Frame, store
 
     shape = frame.shape
     picture = frame.picture.astype(np.float32)
@@ -132,7 +132,7 @@ def crashes(frames: Frames) -> int:
 def long(frames: Frames) -> Measured:
     """Growth of memory in KiB per frame over a thousand frames, one after the other."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.shot.full_size import FullSize
+    from xrds_blender.render.full_size import FullSize
 
     originals = list(frames.values())
     job = render_request(scale=1, samples=SAMPLES, temporal_radius=RADIUS, device="cpu")

@@ -28,11 +28,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core import exr
-from xrds_core.atomic import read_json, write_json
 from xrds_core.errors import PictureError
 from xrds_core.exr.openexr_io import read
 from xrds_core.exr.raw_header import attributes_in, header_bytes
-from xrds_core.time_left import duration
+from xrds_core.files import read_json, write_json
+from xrds_core.progress import duration
 
 from ..progress import silent
 from .fuzz_shots import Twice, make_twice
@@ -150,7 +150,7 @@ def _load() -> None:
     """Load what every case needs, but no denoiser: it has threads of its own."""
     from xrds_blender.command import main  # noqa: F401
     from xrds_core.denoising import denoiser, oidn_device  # noqa: F401
-    from xrds_core.sequence import denoise  # noqa: F401
+    from xrds_core.exr import sequence  # noqa: F401
 
     with contextlib.suppress(PictureError):
         exr.attributes(os.devnull)

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from xrds_core.accumulation.frame import Frame
 from xrds_core.exr.openexr_io import write
-from xrds_core.sequence.sample_cache import Origin, write_cached_frame
-from xrds_core.temporal.frame import Frame
+from xrds_core.exr.sample_cache import Origin, write_cached_frame
 
 from . import odd_headers, odd_shots
 from .odd_shots import Case

@@ -77,7 +77,7 @@ def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
     """Growth over a shot; only in fp32, for its network is the same for Blender."""
     if subject.precision != "fp32":
         return
-    from xrds_blender.command.streams import stdout_to
+    from xrds_blender.command.console import stdout_to
 
     from .stiff_scenes import build
 
@@ -111,7 +111,7 @@ def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
 
 @contextmanager
 def _small_guide_cache() -> Iterator[None]:
-    from xrds_blender.frame import guide_cache
+    from xrds_blender.render import guide_cache
 
     usual = guide_cache.CACHE
     guide_cache.CACHE = guide_cache.GuideCache(_GUIDE_MEMORY)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_core import exr
-from xrds_core.sequence import cameras
-from xrds_core.temporal.frame import Camera, Sphere
+from xrds_core.accumulation.camera import Camera, Sphere
+from xrds_core.exr import cameras
 
 from .odd_headers import chance_attribute, insert
 

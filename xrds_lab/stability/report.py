@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from xrds_core.atomic import replacing, write_json
+from xrds_core.files import replacing, write_json
 
 from .bounds import bound
 

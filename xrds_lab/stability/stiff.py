@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from xrds_blender.planning.settings import DEFAULT_DENOISING
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 from xrds_core.superres import front_end
 
 from .. import baselines, metrics

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import xrds_core
-from xrds_core.atomic import read_json, write_json
 from xrds_core.errors import UsageError
-from xrds_core.time_left import Clock
+from xrds_core.files import read_json, write_json
+from xrds_core.progress import Clock
 
 from ..checksum import checksum
 from ..progress import silent

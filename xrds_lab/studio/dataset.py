@@ -29,7 +29,7 @@ from xrds_blender import run_job
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.arrays import Array
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 from . import framing, scenes
 from .framing import Window

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.atomic import replacing
 from xrds_core.errors import PictureError, UsageError
+from xrds_core.files import replacing
 
 from ..metrics import to_srgb
 

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from xrds_core.atomic import write_json
 from xrds_core.errors import UsageError
+from xrds_core.files import write_json
 
 from ..operations import PAPER_OUTPUT, count
 from .config import read_config

@@ -11,8 +11,8 @@ from typing import Any
 
 import torch
 
-from xrds_core.atomic import replacing
 from xrds_core.errors import WeightsError
+from xrds_core.files import replacing
 
 # What torch raises on files that are no whole checkpoint, or one of another network.
 _DAMAGED = (

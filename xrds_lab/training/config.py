@@ -13,8 +13,8 @@ from typing import Any
 
 import torch
 
-from xrds_core.devices import choose_precision
 from xrds_core.errors import UsageError
+from xrds_core.superres.devices import choose_precision
 from xrds_core.superres.network import NetworkConfig, preset_config
 
 from .crop import HIDDEN

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from xrds_core.arrays import Array
-from xrds_core.atomic import replacing
+from xrds_core.files import replacing
 
 from ..metrics import psnr, to_srgb
 

@@ -18,8 +18,8 @@ import torch
 from torch import Tensor
 from tqdm import tqdm
 
-from xrds_core.devices import choose_device
 from xrds_core.errors import Cancelled, UsageError, WeightsError
+from xrds_core.superres.devices import choose_device
 from xrds_core.superres.front_end import clean_albedo, clean_normal
 from xrds_core.superres.guide_filter import FEW_SAMPLES, GuideFilter
 

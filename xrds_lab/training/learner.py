@@ -11,8 +11,8 @@ import torch
 from torch import Tensor
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
-from xrds_core.devices import choose_precision
 from xrds_core.superres import weights
+from xrds_core.superres.devices import choose_precision
 from xrds_core.superres.network import XRDS
 
 from ..weights import save_network

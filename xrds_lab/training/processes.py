@@ -14,8 +14,8 @@ from typing import Any
 import torch
 from torch import distributed, nn
 
-from xrds_core.devices import choose_device
 from xrds_core.errors import UsageError
+from xrds_core.superres.devices import choose_device
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import Any
 
 import torch
 
-from xrds_core.atomic import read_json, replacing
 from xrds_core.errors import UsageError, XRDSError
+from xrds_core.files import read_json, replacing
 
 from .checkpoint import read_checkpoint, write_checkpoint
 from .config import TrainingConfig, read_config, to_toml

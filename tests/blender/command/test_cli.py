@@ -24,7 +24,7 @@ from xrds_core.errors import (
     WeightsError,
     XRDSError,
 )
-from xrds_core.exr.encoding import Encoding
+from xrds_core.exr.openexr_io import Encoding
 from xrds_core.superres.network import XRDS, preset_config
 from xrds_core.superres.weights import file_name
 from xrds_core.version import package_version
@@ -390,7 +390,7 @@ def test_a_signal_does_not_wait_for_c(tmp_path: Path, name: str, told: str) -> N
     import ctypes
     from pathlib import Path
     from xrds_blender.command import console
-    from xrds_core.atomic import replacing
+    from xrds_core.files import replacing
     console.end_at_once_by_signals()
     libc = ctypes.CDLL(None)
     with replacing(Path({str(tmp_path)!r}) / "frame.exr") as part:
@@ -525,7 +525,7 @@ def test_any_command_sweeps_up_what_a_killed_one_left(
     code = f"""
     import os, signal
     from pathlib import Path
-    from xrds_core.atomic import replacing
+    from xrds_core.files import replacing
     with replacing(Path({str(frames)!r}, "1.exr")) as part:
         part.write_text("half")
         os.kill(os.getpid(), signal.SIGKILL)

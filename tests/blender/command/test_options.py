@@ -11,15 +11,14 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 import xrds_core.denoising
-import xrds_core.exr.limits
+import xrds_core.denoising.light_passes
+import xrds_core.exr.cameras
+import xrds_core.exr.raw_header
+import xrds_core.exr.sequence
 import xrds_core.info
-import xrds_core.light_parts.table
-import xrds_core.sequence.cameras
-import xrds_core.sequence.denoise
 from xrds_blender.command import cameras, main, render, render_file, scene_file
-from xrds_blender.frame import torch_folder
-from xrds_blender.shot import cameras as shot_cameras
-from xrds_blender.shot import explain
+from xrds_blender.render import explain, torch_folder
+from xrds_blender.render import shot as shot_cameras
 from xrds_core import files
 from xrds_core.errors import UsageError
 
@@ -116,10 +115,10 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         (cameras, "check_output"),
         (files, "check_output"),
         (xrds_core.denoising, "Denoiser"),
-        (xrds_core.exr.limits, "allow"),
-        (xrds_core.light_parts.table, "read_renderers"),
-        (xrds_core.sequence.cameras, "read_cameras"),
-        (xrds_core.sequence.denoise, "denoise_sequence"),
+        (xrds_core.exr.raw_header, "allow"),
+        (xrds_core.denoising.light_passes, "read_renderers"),
+        (xrds_core.exr.cameras, "read_cameras"),
+        (xrds_core.exr.sequence, "denoise_sequence"),
         (xrds_core.info, "info"),
     ):
         monkeypatch.setattr(module, name, note)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from xrds_blender.command.whole_file import is_whole
+from xrds_blender.command.picture_file import is_whole
 from xrds_core import exr
 
 SIZE = (62, 40)

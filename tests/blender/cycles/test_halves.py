@@ -12,10 +12,10 @@ bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
 
 from xrds_blender.cycles.settings import has_subsets
-from xrds_blender.frame.rendering import call_engine
 from xrds_blender.planning.request import render_request
-from xrds_blender.shot import sampling
-from xrds_core.temporal.frame import Frame
+from xrds_blender.render import sampling
+from xrds_blender.render.blender_job import call_engine
+from xrds_core.accumulation.frame import Frame
 
 
 @pytest.fixture

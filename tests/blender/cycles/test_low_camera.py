@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from xrds_blender.cycles.low_camera import CameraFrame, Lens, LowGrid, Region, widened
+from xrds_blender.cycles.low_resolution import (
+    CameraFrame,
+    Lens,
+    LowGrid,
+    Region,
+    widened,
+)
 
 bpy = pytest.importorskip("bpy")
 SIDE = 48  # pixels of the windows in which shifts are measured

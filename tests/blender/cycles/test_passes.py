@@ -11,10 +11,10 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender import run_job
-from xrds_blender.cycles import clock, session  # bpy is asked for first
-from xrds_blender.frame.rendering import call_engine
+from xrds_blender.cycles import session  # bpy is asked for first
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.internals.borrowed import Borrowed, PipelineSettings
+from xrds_blender.render.blender_job import call_engine
 from xrds_core.errors import Cancelled, SceneError
 
 Build = Callable[..., Any]
@@ -37,7 +37,7 @@ def test_a_frame_in_tiles_is_denoised_after_its_last_sample(
 ) -> None:
     """As Cycles 4.5 tells it; only what comes before the first sample is sync."""
     now = 0.0
-    monkeypatch.setattr(clock.time, "perf_counter", lambda: now)
+    monkeypatch.setattr(session.time, "perf_counter", lambda: now)
     lines = (
         "house, ViewLayer | Updating Scene BVH",
         "house, ViewLayer | Sample 0/1",
@@ -47,7 +47,7 @@ def test_a_frame_in_tiles_is_denoised_after_its_last_sample(
         "house | ViewLayer | Denoising",
         "house | ViewLayer | Finishing",
     )
-    with clock.StageClock() as heard:
+    with session.StageClock() as heard:
         for line in lines:
             now += 1.0
             heard._hear(f"Fra:1 Mem:45.07M (Peak 319.10M) | {line}")

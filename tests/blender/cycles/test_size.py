@@ -9,7 +9,7 @@ import pytest
 
 from xrds_blender import run_job
 from xrds_blender.cycles.passes import CyclesPasses
-from xrds_blender.cycles.size import frame_size, picture_size
+from xrds_blender.cycles.view import frame_size, picture_size
 
 SIZES = [(1280, 720), (1920, 1080), (333, 777)]
 

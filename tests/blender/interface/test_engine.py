@@ -16,9 +16,9 @@ bpy = pytest.importorskip("bpy")
 from compositing import compositor
 
 from xrds_blender import render, run_job
-from xrds_blender.frame.denoisers import in_process
 from xrds_blender.planning.request import Machine
 from xrds_blender.planning.settings import Denoising
+from xrds_blender.render.loading import in_process
 from xrds_core.errors import UsageError, WeightsError
 
 BLENDER_5 = bpy.app.version >= (5, 0)
@@ -281,12 +281,12 @@ def test_missing_weights_are_one_clear_line(life: Any, tmp_path: Path) -> None:
 def test_missing_weights_end_f12_with_an_error_and_no_file(
     life: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from xrds_blender.frame import networks
+    from xrds_blender.render import loading
 
     def load(*_: Any) -> None:
         raise WeightsError("no weights, on purpose")
 
-    monkeypatch.setattr(networks, "_load", load)
+    monkeypatch.setattr(loading, "_load", load)
     life.render.engine = "XRDS"
     life.render.filepath = str(tmp_path / "none.png")
     with pytest.raises(RuntimeError, match=r"^Error: no weights, on purpose\n$"):

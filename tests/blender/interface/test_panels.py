@@ -13,31 +13,29 @@ import bpy
 import pytest
 
 import xrds_blender
-from xrds_blender.choosing import history
-from xrds_blender.choosing.modes import estimates as estimates_of
 from xrds_blender.cycles.settings import has_subsets
-from xrds_blender.frame import stages
 from xrds_blender.interface import (
+    live_picture,
     machine,
     operators,
     preferences,
     properties,
     registration,
-    status_bar,
     translations,
 )
 from xrds_blender.interface.panel import (
-    animation,
     cycles_panels,
+    messages,
     panels,
     paragraph,
-    remarks,
     summary,
 )
 from xrds_blender.internals.lifetimes import FILE, PROCESS
 from xrds_blender.planning import estimates
 from xrds_blender.planning.estimates import Capabilities
 from xrds_blender.planning.settings import Mode, Network
+from xrds_blender.render import history, stages
+from xrds_blender.render.choose import estimates as estimates_of
 
 
 @pytest.fixture(autouse=True)
@@ -289,20 +287,20 @@ def test_an_animation_comes_first() -> None:
     assert told[:5] == ["Animation, 20 frames", "Cycles", "?", "XRDS", "?"]
     assert told[5:7] == ["Picture", "cleaner"]
     said = " ".join(told)
-    assert animation.UNKNOWN in said
-    assert animation.STILLS in said
+    assert summary.UNKNOWN in said
+    assert summary.STILLS in said
     assert "Neighbouring Frames" in rows(scene)
     scene.camera.data.type = "PANO"
     told = drawn(panels.XRDS_PT_settings)
     assert told[told.index("XRDS") + 3] == "same"
-    assert animation.ALONE in " ".join(told)
+    assert summary.ALONE in " ".join(told)
     assert "Neighbouring Frames" not in rows(scene)
 
 
-def expected(scene: bpy.types.Scene) -> animation.Expected:
+def expected(scene: bpy.types.Scene) -> summary.Expected:
     request = properties.request_of(scene.xrds)
     found = estimates_of(scene, request.settings, ALL, summary.is_shot(scene, request))
-    return animation.expected(scene, request, ALL, found)
+    return summary.expected(scene, request, ALL, found)
 
 
 def test_seconds_of_an_animation_are_those_of_its_frames() -> None:
@@ -367,7 +365,7 @@ def test_cycles_users_see_it_too() -> None:
 
 def remarks_of(at_hand: Capabilities) -> list[tuple[str, str]]:
     scene = bpy.context.scene
-    return remarks.remarks(scene, properties.request_of(scene.xrds), at_hand)
+    return messages.remarks(scene, properties.request_of(scene.xrds), at_hand)
 
 
 def test_panel_says_what_is_missing() -> None:
@@ -379,16 +377,16 @@ def test_panel_says_what_is_missing() -> None:
     scene.view_layers[0].use_pass_glossy_direct = True
     noisy = replace(ALL, denoiser=False, cycles_denoiser=False)
     told = remarks_of(noisy)
-    assert ("ERROR", remarks.NOISY_INPUT) in told
+    assert ("ERROR", messages.NOISY_INPUT) in told
     assert any("Light passes" in text for _, text in told)
     scene.xrds.mode = "x4"
     assert ("ERROR", estimates.WEIGHTS_ARE_MISSING) in remarks_of(ALL)
     scene.xrds.mode = "full_size"
     assert remarks_of(noisy)[0] == ("ERROR", estimates.LIBRARY_IS_MISSING)
     scene.xrds.mode, scene.cycles.use_denoising = "cycles_only", True
-    assert remarks_of(noisy)[0] == ("ERROR", remarks.CYCLES_CANNOT_DENOISE)
+    assert remarks_of(noisy)[0] == ("ERROR", messages.CYCLES_CANNOT_DENOISE)
     scene.xrds.mode, scene.xrds.use_time_budget = "automatic", True
-    assert remarks_of(noisy)[0] == ("ERROR", remarks.NO_BUDGET)
+    assert remarks_of(noisy)[0] == ("ERROR", messages.NO_BUDGET)
 
 
 @pytest.mark.parametrize(("version", "warns"), [((4, 5, 3), False), ((5, 2, 2), True)])
@@ -396,12 +394,12 @@ def test_other_denoising_passes_are_warned_of_above_scale_one(
     monkeypatch: pytest.MonkeyPatch, version: tuple[int, ...], warns: bool
 ) -> None:
     monkeypatch.setattr(
-        remarks, "bpy", SimpleNamespace(app=SimpleNamespace(version=version))
+        messages, "bpy", SimpleNamespace(app=SimpleNamespace(version=version))
     )
     settings = bpy.context.scene.xrds
     for way in ("x2", "full_size", "cycles_only"):
         settings.mode = way
-        told = ("ERROR", remarks.OTHER_PASSES) in remarks_of(ALL)
+        told = ("ERROR", messages.OTHER_PASSES) in remarks_of(ALL)
         assert told == (warns and way == "x2")
 
 
@@ -513,19 +511,19 @@ def test_status_bar_tells_the_stage(monkeypatch: pytest.MonkeyPatch) -> None:
 
     text = ctypes.create_string_buffer(1024)  # as Blender keeps an engine's status
     engine = running_engine(text, shown)
-    status_bar.draw(Bar, None)
+    live_picture.draw_status(Bar, None)
     stages.begin(engine, stages.LOW, 1)
-    status_bar.draw(Bar, None)
+    live_picture.draw_status(Bar, None)
     text[64:82] = b"Mem | Sample 12/64"
     time.sleep(0.05)
-    status_bar.draw(Bar, None)
+    live_picture.draw_status(Bar, None)
     stages.begin(engine, stages.NETWORK, 3)
     for done in (0.25, 0.75):
         time.sleep(0.05)
         stages.reporter(engine)(done)
-        status_bar.draw(Bar, None)
+        live_picture.draw_status(Bar, None)
     stages.end()
-    status_bar.draw(Bar, None)
+    live_picture.draw_status(Bar, None)
     assert told[0] == "XRDS 1/3: Low resolution"
     assert re.fullmatch(r"XRDS 1/3: Low resolution, \d:\d\d left", told[1])
     assert re.fullmatch(r"XRDS 3/3: Network, 0:00 left", told[3])

@@ -10,15 +10,17 @@ import pytest
 from xrds_blender.internals.lifetimes import FILE
 from xrds_blender.planning import budget
 from xrds_blender.planning.estimates import (
+    GUIDE_SHARE,
     Capabilities,
     Estimate,
+    Measured,
     SceneSettings,
     automatic,
     estimates,
+    learn,
     missing,
     resolved,
 )
-from xrds_blender.planning.measured import GUIDE_SHARE, Measured, learn
 from xrds_blender.planning.settings import (
     DEFAULT_DENOISING,
     MODES,
@@ -181,7 +183,7 @@ def test_cycles_alone_reports_samples_and_denoising_as_one() -> None:
 def test_layers_of_a_scene_add_up() -> None:
     from types import SimpleNamespace
 
-    from xrds_blender.choosing import history
+    from xrds_blender.render import history
 
     FILE.end()
     settings = in_mode(Mode.FULL_SIZE)

@@ -12,8 +12,8 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender.planning.request import render_request
+from xrds_blender.render.sample_cache import _key
 from xrds_blender.scene.outer_files import outer_files
-from xrds_blender.shot.cache import _key
 
 
 @pytest.fixture

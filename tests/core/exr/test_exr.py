@@ -19,13 +19,13 @@ from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
 from xrds_core.exr import (
     Names,
-    limits,
     openexr_io,
+    raw_header,
     read_beauty,
     read_guides,
     write_picture,
 )
-from xrds_core.exr.encoding import CODECS, LARGEST_HALF, Encoding
+from xrds_core.exr.openexr_io import CODECS, LARGEST_HALF, Encoding
 
 LAYOUTS = ("flat", "layered", "parts", "named parts")
 
@@ -407,18 +407,18 @@ def test_the_limit_can_be_raised_and_lowered(
 ) -> None:
     write(path, planes(0))
     monkeypatch.setattr(openexr_io, "_is_shadowed", lambda: shadowed)
-    monkeypatch.setattr(limits, "_allowed", 0)
-    limits.allow(4 * 6 * 3 * 4)
+    monkeypatch.setattr(raw_header, "_allowed", 0)
+    raw_header.allow(4 * 6 * 3 * 4)
     assert read_beauty(path).radiance.shape == (4, 6, 3)
-    limits.allow(4 * 6 * 3 * 4 - 1)
+    raw_header.allow(4 * 6 * 3 * 4 - 1)
     with pytest.raises(PictureError, match="claims"):
         read_beauty(path)
 
 
 def test_black_of_any_size_is_no_claim() -> None:
     """A packed picture holds no more bytes than the limit for its size allows."""
-    assert limits.limit_of(0) >= 8192 * 8192 * 4 * 4
-    assert limits.limit_of(10**8) == 10**11
+    assert raw_header.limit_of(0) >= 8192 * 8192 * 4 * 4
+    assert raw_header.limit_of(10**8) == 10**11
 
 
 def test_a_header_that_claims_too_much(path: Path) -> None:

@@ -29,15 +29,20 @@ from specification.coarse_rejection import compared
 from specification.filters import extreme
 from specification.places import SURFACE, ranges, still_places
 
+from xrds_core.accumulation.accumulate import Accumulated, accumulate
+from xrds_core.accumulation.frame import (
+    Frame,
+    Halves,
+    Stored,
+    pack_frame,
+    pack_parts,
+    pack_vectors,
+)
+from xrds_core.accumulation.local_filters import find_ranges, find_rims
+from xrds_core.accumulation.object_motion import Movement
+from xrds_core.accumulation.reprojection import Pair, pair
+from xrds_core.accumulation.weighted_sums import Work, compare_spots, find_spots
 from xrds_core.native.library import library
-from xrds_core.native.surfaces import find_ranges, find_rims
-from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.frame import Frame, Stored, pack_frame
-from xrds_core.temporal.halves import Halves
-from xrds_core.temporal.motion import Pair, pair
-from xrds_core.temporal.packing import pack_parts, pack_vectors
-from xrds_core.temporal.sums import Work, compare_spots, find_spots
-from xrds_core.temporal.vectors import Movement
 
 Array = NDArray[Any]
 

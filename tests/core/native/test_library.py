@@ -18,12 +18,12 @@ import pytest
 from native_shots import Kind, passes_of, shot
 from shots import World, camera, view
 
+from xrds_core.accumulation.accumulate import Accumulated, accumulate
+from xrds_core.accumulation.frame import Stored, store
+from xrds_core.accumulation.local_filters import find_ranges, find_rims
 from xrds_core.native import library as module
 from xrds_core.native.library import Arrays, LibraryError, file_name, library
-from xrds_core.native.surfaces import find_ranges, find_rims
-from xrds_core.temporal.accumulate import Accumulated, accumulate
-from xrds_core.temporal.frame import Stored, store
-from xrds_core.temporal.window import Shot, Window
+from xrds_core.shot import Shot, Window
 
 SUPPORT = Path(__file__).resolve().parents[2] / "support"
 PREAMBLE = f"""
@@ -31,7 +31,7 @@ import os, signal, sys, threading, time
 sys.path.insert(0, {str(SUPPORT)!r})
 import numpy as np
 from native_shots import Kind, shot
-from xrds_core.temporal.accumulate import accumulate
+from xrds_core.accumulation.accumulate import accumulate
 
 def give(target, others, threads=None):
     return accumulate(target, others, threads=threads).radiance

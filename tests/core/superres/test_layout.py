@@ -6,7 +6,7 @@ import numpy as np
 import torch
 
 import xrds_core
-from xrds_core.superres.layout import to_picture, to_planes
+from xrds_core.superres.front_end import to_picture, to_planes
 
 
 def test_a_picture_returns_as_it_was() -> None:

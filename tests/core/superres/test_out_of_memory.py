@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 import torch
 
-from xrds_core.devices import free_memory, is_out_of_memory
 from xrds_core.errors import OutOfMemory
 from xrds_core.superres import upscaler
+from xrds_core.superres.devices import free_memory, is_out_of_memory
 from xrds_core.superres.network import XRDS, preset_config
 from xrds_core.superres.upscaler import Upscaler
 

@@ -9,11 +9,10 @@ from typing import Any
 import bpy
 import numpy as np
 
+from tests.support.guides import images
+from tests.support.guides.settings import SHADE, put, split
 from xrds_lab.studio.geometry import box
 from xrds_lab.studio.nodes import solid
-
-from . import images
-from .settings import SHADE, put, split
 
 Deed = Callable[[Path], None]
 """Is given the folder of the stage's images."""

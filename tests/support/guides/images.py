@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from .things import FILE_SIZE
+from tests.support.guides.things import FILE_SIZE
 
 
 def _rewrite(path: Path, value: float) -> None:

@@ -13,11 +13,10 @@ from typing import Any
 import bpy
 import numpy as np
 
+from tests.support.guides.things import Stage, painted, saved
 from xrds_lab.studio.builder import empty_scene
 from xrds_lab.studio.geometry import box, sheet, sphere
 from xrds_lab.studio.nodes import Surface, solid
-
-from .things import Stage, painted, saved
 
 WIDTH, HEIGHT = 96, 72
 WEIGHTS = (0.1, 0.3, 0.5, 0.9)

@@ -3,6 +3,6 @@
 The library is compared with it. Everything here is float32 and (H, W) or (H, W, C).
 """
 
-from .summing import Work
+from tests.support.specification.summing import Work
 
 __all__ = ["Work"]

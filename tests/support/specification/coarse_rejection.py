@@ -6,14 +6,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from xrds_core.temporal.noise import brightness, luminance
-
-from .places import still_places
+from tests.support.specification.places import still_places
+from xrds_core.accumulation.noise import brightness, luminance
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from xrds_core.temporal.motion import Pair
+    from xrds_core.accumulation.reprojection import Pair
 
 TILE = 64  # pixels across
 

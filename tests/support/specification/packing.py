@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from xrds_core.temporal.frame import Frame
-from xrds_core.temporal.noise import guides_of
-from xrds_core.temporal.noise import luminance as of
-
-from .filters import Array
-from .similarity import noise_of_guides
+from tests.support.specification.filters import Array
+from tests.support.specification.similarity import noise_of_guides
+from xrds_core.accumulation.frame import Frame
+from xrds_core.accumulation.noise import guides_of
+from xrds_core.accumulation.noise import luminance as of
 
 LARGEST_HALF = 65504.0
 LIMIT = np.float32(4.0)  # of guides

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.temporal.candidates import Images
-from xrds_core.temporal.frame import Stored
-from xrds_core.temporal.motion import Grid, Pair, centres, grid, reproject
-
-from .filters import Array, extreme
+from tests.support.specification.filters import Array, extreme
+from xrds_core.accumulation.frame import Stored
+from xrds_core.accumulation.reprojection import Grid, Pair, centres, grid, reproject
+from xrds_core.accumulation.virtual_images import Images
 
 Shape = tuple[int, int]
 

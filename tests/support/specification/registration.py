@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .filters import Array
+from tests.support.specification.filters import Array
 
 SLOPE = np.array([1, -8, 0, 8, -1], np.float32) / 12
 BEND = np.array([-1, 16, -30, 16, -1], np.float32) / 24

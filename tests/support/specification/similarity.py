@@ -6,12 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.temporal.frame import Stored
-from xrds_core.temporal.noise import brightness as root_of_luminance
-from xrds_core.temporal.noise import guide_factor, guides_of
-from xrds_core.temporal.similarity import guide_area, penalties
-
-from .filters import Array, box, least_difference, mean, total
+from tests.support.specification.filters import (
+    Array,
+    box,
+    least_difference,
+    mean,
+    total,
+)
+from xrds_core.accumulation.frame import Stored
+from xrds_core.accumulation.noise import brightness as root_of_luminance
+from xrds_core.accumulation.noise import guide_factor, guides_of
+from xrds_core.accumulation.weighted_sums import guide_area, penalties
 
 Shape = tuple[int, int]
 

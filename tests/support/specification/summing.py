@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.temporal.candidates import Images
-from xrds_core.temporal.frame import Stored
-from xrds_core.temporal.noise import brightness as root_of_luminance
-from xrds_core.temporal.sums import Aligned, Means, Reprojected
-
-from .filters import Array, extreme
-from .places import places, rims
-from .registration import changes, moments
-from .similarity import GuideSimilarity, LightSimilarity
+from tests.support.specification.filters import Array, extreme
+from tests.support.specification.places import places, rims
+from tests.support.specification.registration import changes, moments
+from tests.support.specification.similarity import GuideSimilarity, LightSimilarity
+from xrds_core.accumulation.frame import Stored
+from xrds_core.accumulation.noise import brightness as root_of_luminance
+from xrds_core.accumulation.virtual_images import Images
+from xrds_core.accumulation.weighted_sums import Aligned, Means, Reprojected
 
 Neighbour = Aligned | Reprojected
 Judge = LightSimilarity | GuideSimilarity

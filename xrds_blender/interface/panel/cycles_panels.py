@@ -39,7 +39,7 @@ def as_cycles(context: Any, by_scene: bool = False) -> Any:
     """The context, with Cycles as its engine where it is XRDS."""
     if context.engine != ENGINE:
         return context
-    own = {"engine": CYCLES}
+    own: dict[str, Any] = {"engine": CYCLES}
     if by_scene:
         render = _Posing(context.scene.render, engine=CYCLES)
         own["scene"] = _Posing(context.scene, render=render)
@@ -110,7 +110,7 @@ def _wrap_drawing(item: Any) -> None:
 
 def _wrap_poll(item: Any) -> None:
     own = item.__dict__.get("poll")
-    function = getattr(own, "__func__", None)
+    function: Any = getattr(own, "__func__", None)
     if _asks_for_cycles(function):
         by_scene = f"{item.__name__}.poll" in _BY_SCENE
         _replace(item, "poll", own, classmethod(_posing(function, by_scene)))

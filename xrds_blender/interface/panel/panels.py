@@ -9,20 +9,20 @@ from bpy.app.handlers import persistent
 
 from xrds_core.superres.weights_header import PRESETS
 
-from ...choosing import history
-from ...choosing.capabilities import capabilities
-from ...choosing.modes import estimates
 from ...internals.engine_override import ENGINE
 from ...internals.lifetimes import FILE
 from ...planning.estimates import Capabilities, automatic
 from ...planning.request import Request
 from ...planning.settings import Mode
-from ...scene.light import has_light
-from .. import operators, presets, status_bar, translations
+from ...render import history
+from ...render.choose import estimates
+from ...render.loading import capabilities
+from ...scene.contents import has_light
+from .. import live_picture, operators, presets, translations
 from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
-from . import animation, cycles_panels, mode_table, paragraph, summary
-from .remarks import remarks
+from . import cycles_panels, mode_table, paragraph, summary
+from .messages import remarks
 
 
 class _RenderPanel:
@@ -56,8 +56,8 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
         shot = summary.is_shot(scene, request)
         found = estimates(scene, request.settings, here, shot)
         if summary.is_animation(scene):
-            expected = animation.expected(scene, request, here, found)
-            animation.draw(layout, context, expected)
+            expected = summary.expected(scene, request, here, found)
+            summary.draw(layout, context, expected)
             layout.separator()
         mode_table.draw(layout, scene, here, automatic(here), found)
         layout.use_property_split = True
@@ -119,8 +119,8 @@ class XRDS_PT_under_cycles(bpy.types.Panel):
             here = capabilities(request.machine.weights)
             shot = summary.is_shot(scene, request)
             found = estimates(scene, request.settings, here, shot)
-            expected = animation.expected(scene, request, here, found)
-            animation.draw(layout, context, expected)
+            expected = summary.expected(scene, request, here, found)
+            summary.draw(layout, context, expected)
         operators.draw(layout.column(align=True))
 
 
@@ -276,7 +276,7 @@ def register() -> None:
     for panel in CLASSES:
         bpy.utils.register_class(panel)
     cycles_panels.register()
-    bpy.types.STATUSBAR_HT_header.prepend(status_bar.draw)
+    bpy.types.STATUSBAR_HT_header.prepend(live_picture.draw_status)
     for event, handler in _handlers():
         event.append(handler)
 
@@ -285,7 +285,7 @@ def unregister() -> None:
     """Take all of it back."""
     for event, handler in _handlers():
         event.remove(handler)
-    bpy.types.STATUSBAR_HT_header.remove(status_bar.draw)
+    bpy.types.STATUSBAR_HT_header.remove(live_picture.draw_status)
     cycles_panels.unregister()
     for panel in reversed(CLASSES):
         bpy.utils.unregister_class(panel)

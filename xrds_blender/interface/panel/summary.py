@@ -2,29 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import bpy
 
-from ...choosing.history import LastRender, scene_settings
-from ...cycles.size import frame_size
-from ...planning import forecast
-from ...planning.estimates import Capabilities
+from xrds_core.progress import duration
+
+from ...cycles.view import frame_size
+from ...planning import estimates
+from ...planning.estimates import Capabilities, Estimate, resolved
 from ...planning.plan import Plan
 from ...planning.request import Request
 from ...planning.settings import Mode, Settings
-from ...shot.sampling import has_neighbours
+from ...render import history
+from ...render.choose import frame_seconds
+from ...render.history import LastRender, scene_settings
+from ...render.pace.same_picture import can_save
+from ...render.sampling import has_neighbours
+from ...scene.contents import frame_range
 from ..machine import machine
 from ..properties import DENOISE
+from . import mode_table, paragraph
 from .mode_table import NAMES
 from .paragraph import translated
 
 if TYPE_CHECKING:
-    from .facts_cache import FactsCache
+    from .messages import FactsCache
+
 
 Row = tuple[str, str]
+
 MOST_ROWS = 6
+
 _STAGES = {
     "sync": "Scene",
     "beauty": "Samples",
@@ -35,13 +47,14 @@ _STAGES = {
     "write": "Writing",
     "total": "Total",
 }
+
 _QUALITIES = {quality: label for quality, label, _ in DENOISE}
 
 
 @lru_cache(maxsize=1)
 def _facts_cache() -> FactsCache:
     """Made when a panel is first drawn: Blender starts faster without its modules."""
-    from .facts_cache import FactsCache
+    from .messages import FactsCache
 
     return FactsCache()
 
@@ -93,14 +106,14 @@ def _neighbours(scene: Any, request: Request) -> list[Row]:
     if not is_shot(scene, request):
         return []
     text = "{radius} before and after, {memory}"
-    taken = _amount(forecast.shot_memory(*size, radius, request.settings.scale))
+    taken = _amount(estimates.shot_memory(*size, radius, request.settings.scale))
     shown = translated(text, radius=radius, memory=taken)
     return [("Neighbouring Frames", shown)]
 
 
 def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
     """What a time budget will about choose."""
-    from ...choosing.chosen import foresee
+    from ...render.choose import foresee
 
     networks = sorted(here.networks) if here.torch else []
     shot = is_shot(scene, request)
@@ -119,9 +132,9 @@ def _enlarged(scene: Any, request: Request) -> list[Row]:
     facts = _facts_cache().facts(scene, bpy.context.view_layer, request.settings)
     chosen = request.plan(facts)
     size = facts.width, facts.height
-    small = forecast.low_size(*size, request.settings.scale)
+    small = estimates.low_size(*size, request.settings.scale)
     limit = machine().memory_limit
-    taken = forecast.memory(*size, *request.settings.network, limit)
+    taken = estimates.memory(*size, *request.settings.network, limit)
     guides = _sampled(*size, chosen.guide_samples)
     rows = [
         ("Low Resolution", _sampled(*small, scene.cycles.samples)),
@@ -184,3 +197,89 @@ def _size(width: int, height: int) -> str:
 def _amount(size: float) -> str:
     """Bytes as a person reads them."""
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{max(size / 1e6, 1):.0f} MB"
+
+
+UNKNOWN = "Known after a first render of a frame"
+
+EXPECTED = "Expected from the renders of this file so far"
+
+ALONE = (
+    "Frames of this camera, or without a temporal radius, cannot use each other's "
+    "samples: each is rendered by itself"
+)
+
+STILLS = "Frames help each other in animations, not in single images"
+
+
+@dataclass(frozen=True)
+class Expected:
+    """An animation before it is rendered.
+
+    `cycles` and `ours` are the seconds of a frame, None where nothing is known; the
+    latter are `at_most` so many where samples are saved. `picture` is ours beside that
+    of Cycles. `is_shot` tells whether frames use each other's samples.
+    """
+
+    frames: int
+    cycles: float | None
+    ours: float | None
+    picture: str
+    at_most: bool = False
+    is_shot: bool = True
+
+
+def expected(
+    scene: Any,
+    request: Request,
+    here: Capabilities,
+    estimated: Sequence[Estimate],
+) -> Expected:
+    """What to expect of the scene's range, in modes as `estimated` for a shot."""
+    frames = len(frame_range(scene))
+    is_shot = has_neighbours(scene, request)
+    known = history.scene_settings(scene)
+    settings = request.settings
+    cycles = resolved(replace(settings, mode=Mode.CYCLES_ONLY, denoising=None), known)
+    saves = can_save(scene, request, frames)
+    radius = settings.temporal_radius if is_shot else 0
+    ours = frame_seconds(scene, resolved(settings, known), radius)
+    if request.deadline is not None:
+        ours = request.deadline / frames
+    picture = mode_table.word_for(settings.mode, estimated, scene, here)
+    return Expected(
+        frames,
+        history.seconds(scene, cycles),
+        ours,
+        translated("same") if saves else picture,
+        saves,
+        is_shot,
+    )
+
+
+def draw(layout: Any, context: Any, found: Expected) -> None:
+    """Draw what it takes in Cycles and in XRDS, and where that is from."""
+    column = layout.column(align=True)
+    title = translated("Animation, {count} frames", count=found.frames)
+    column.label(text=title, translate=False)
+    limit = "≤ " if found.at_most else ""
+    rows = [
+        ("Cycles", _both(found.cycles, found.frames)),
+        ("XRDS", _both(found.ours, found.frames, limit)),
+        (translated("Picture"), found.picture),
+    ]
+    for name, value in rows:
+        split = column.split(factor=0.3)
+        split.label(text=name, translate=False)
+        split.label(text=value, translate=False)
+    known = None not in (found.cycles, found.ours)
+    notes = [EXPECTED if known else UNKNOWN, STILLS if found.is_shot else ALONE]
+    for note in notes:
+        paragraph.draw(layout, context, translated(note))
+
+
+def _both(seconds: float | None, frames: int, limit: str = "") -> str:
+    """The time of all frames, and of one."""
+    if seconds is None:
+        return "?"
+    whole, each = limit + duration(seconds * frames), duration(seconds)
+    return translated("{whole}, a frame {each}", whole=whole, each=each)

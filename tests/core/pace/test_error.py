@@ -1,0 +1,222 @@
+"""How many samples are as good with neighbours as more without."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from shots import World, camera, view
+
+from xrds_core.accumulation.accumulate import Accumulated, accumulate
+from xrds_core.accumulation.frame import Halves, Stored, store
+from xrds_core.accumulation.local_filters import BLOCK
+from xrds_core.accumulation.noise import Noise
+from xrds_core.pace.error import Rendered, error_ratio, gain
+from xrds_core.pace.extra_samples import ExtraSamples, enriched, with_extra
+from xrds_core.pace.worth import Ratio
+
+Array = NDArray[np.float32]
+SHAPE = (192, 256)
+
+
+def noisy(truth: Array, deviation: float, seed: int) -> Array:
+    noise = np.random.default_rng(seed).normal(0.0, deviation, truth.shape)
+    return np.asarray(truth + noise, np.float32)
+
+
+def denoised(truth: Array, deviation: float, seed: int) -> Array:
+    """What is left of noise is coarse: four pixels across."""
+    height, width, channels = truth.shape
+    error = noisy(np.zeros((height // 4, width // 4, channels), np.float32), 1.0, seed)
+    return truth + np.float32(deviation) * error.repeat(4, 0).repeat(4, 1)
+
+
+def ratio(ours: float, theirs: float, noise: float = 0.3) -> Ratio:
+    """Of pictures whose errors have these deviations; `theirs` of all samples."""
+    truth = np.full((*SHAPE, 3), 0.5, np.float32)
+    half = theirs * 2.0**0.35  # half of the samples have 2 ** 0.7 times the error
+    first, second = (
+        Rendered(noisy(truth, noise, i), denoised(truth, half, i + 10)) for i in (1, 2)
+    )
+    picture, own = denoised(truth, ours, 3), noisy(truth, noise * 1.4, 4)
+    return error_ratio(picture, own, (first, second))
+
+
+@pytest.mark.parametrize("expected", [0.25, 1.0, 4.0])
+def test_errors_are_measured_without_a_reference(expected: float) -> None:
+    found = ratio(0.05 * expected**0.5, 0.05)
+    # too high rather than too low
+    assert 0.9 * expected < found.value + found.spread < 1.3 * expected + 0.1
+
+
+def test_the_picture_of_half_of_the_samples_is_known_from_much_noise() -> None:
+    """Its error is that of half, whatever noise says."""
+    values = [ratio(0.05 * 2.0**0.35, 0.05, noise) for noise in (0.1, 0.6)]
+    for found in values:
+        assert found.value == pytest.approx(2.0**0.7, rel=0.1)
+        assert found.spread < 0.2
+
+
+def test_a_ratio_that_noise_hides_is_infinite() -> None:
+    assert ratio(0.001, 0.001, noise=3.0).value == float("inf")
+
+
+def test_radiance_beyond_all_bounds_is_survived() -> None:
+    truth = np.full((64, 64, 3), 0.5, np.float32)
+    bad = truth.copy()
+    bad[3, 4] = 3e38
+    parts = Rendered(bad, truth), Rendered(-bad, truth)
+    assert not np.isnan(error_ratio(truth, bad, parts)).any()
+
+
+def frames(moved: bool = True) -> tuple[list, Accumulated]:
+    """Three frames of a wall, the middle one with its neighbours."""
+    found = [
+        store(view(n, camera(0.3 * n if moved else 0.0), World(), noise=0.2).frame)
+        for n in (1, 2, 3)
+    ]
+    return found, accumulate(found[1], [found[0], found[2]])
+
+
+def test_what_neighbours_bring_is_counted() -> None:
+    found, accumulated = frames(moved=False)
+    gained = gain(accumulated, found[1])
+    everywhere = np.ones(gained.errors.shape, bool)
+    assert 2.0 < gained.of(everywhere) < 3.2
+    half = gain(accumulated, found[1], 0.5).of(everywhere)
+    assert half == pytest.approx(1.0 + (gained.of(everywhere) - 1.0) / 2, abs=0.1)
+    alone = gain(accumulate(found[1], []), found[1])
+    assert alone.of(everywhere) == pytest.approx(1.0)
+    assert np.allclose(alone.blocks[np.isfinite(alone.blocks)], 1.0)
+
+
+def test_more_of_the_same_is_of_no_use_where_neighbours_lend_nothing() -> None:
+    found, accumulated = frames(moved=False)
+    samples = accumulated.samples.copy()
+    columns = samples.shape[1] // 2
+    samples[:, :columns] = found[1].samples  # the left half is the frame's own alone
+    accumulated = replace(accumulated, samples=samples)
+    everywhere = np.ones(gain(accumulated, found[1]).errors.shape, bool)
+    often = [gain(accumulated, found[1], x).of(everywhere) for x in (1.0, 8.0, 1e6)]
+    assert often[0] < often[1] < often[2] < 3.2, often  # half of the error stays
+
+
+def test_blocks_whose_noise_nobody_sees_lack_nothing() -> None:
+    found, _ = frames(moved=False)
+    noise = found[1].noise
+    assert noise is not None
+    root = noise.brightness.astype(np.float32).reshape(found[1].shape)
+    apart = root * np.float32(0.01)
+    apart[: BLOCK + 4] = root[: BLOCK + 4] * np.float32(0.0005)  # noise is smoothed
+    guides = noise.guides.astype(np.float32)
+    noise = Noise.of(root.ravel(), apart.ravel(), guides)
+    own = replace(found[1], noise=noise)
+    blocks = gain(accumulate(own, []), own).blocks
+    assert np.isinf(blocks[0]).all()
+    assert np.allclose(blocks[1:], 1.0)
+
+
+def extra(samples: Array, value: float) -> ExtraSamples:
+    light = np.full((*samples.shape, 3), value, np.float32)
+    return ExtraSamples(light, light, light, np.ones_like(samples), samples)
+
+
+def test_extra_samples_count_by_their_number() -> None:
+    found, accumulated = frames()
+    samples = np.zeros(found[1].shape, np.float32)
+    samples[:BLOCK] = 3.0
+    alone = accumulate(found[1], [])
+    result = with_extra(accumulated, alone, extra(samples, 7.0))
+    assert result.radiance is not None
+    assert accumulated.radiance is not None
+    share = 3.0 / (accumulated.samples[:BLOCK] + 3.0)
+    before = accumulated.radiance[:BLOCK]
+    expected = before + (7.0 - before) * share[..., None]
+    assert np.allclose(result.radiance[:BLOCK], expected, atol=1e-5)
+    assert np.array_equal(result.radiance[BLOCK:], accumulated.radiance[BLOCK:])
+    assert np.array_equal(result.samples, accumulated.samples + samples)
+
+
+def test_extra_samples_that_are_not_finite_are_left_out() -> None:
+    found, accumulated = frames()
+    samples = np.ones(accumulated.samples.shape, np.float32)
+    more = extra(samples, 7.0)
+    more.radiance[5, 6] = np.nan
+    result = with_extra(accumulated, accumulate(found[1], []), more)
+    assert result.radiance is not None
+    assert accumulated.radiance is not None
+    assert np.array_equal(result.radiance[5, 6], accumulated.radiance[5, 6])
+    assert np.isfinite(result.radiance).all()
+
+
+@pytest.mark.parametrize("worth", [0.0, 0.5])
+def test_neighbours_count_by_their_worth_beside_extra_samples(worth: float) -> None:
+    found, accumulated = frames(moved=False)
+    alone = accumulate(found[1], [])
+    more = extra(np.full(found[1].shape, 3.0, np.float32), 7.0)
+    result = with_extra(accumulated, alone, more, worth)
+    assert result.albedo is not None
+    counts = 1.0, worth * (accumulated.samples - 1.0), 3.0
+    beside = accumulated.samples[..., None]
+    neighbours = (accumulated.albedo * beside - alone.albedo) / (beside - 1.0)
+    parts = alone.albedo, neighbours, more.albedo
+    expected = (
+        sum(x * np.asarray(n)[..., None] for x, n in zip(parts, counts, strict=True))
+        / (sum(counts)[..., None])
+    )
+    assert np.allclose(result.albedo, expected, atol=1e-4)
+
+
+def test_extra_samples_are_the_frames_own_from_then_on() -> None:
+    found, _ = frames()
+    frame, samples = found[1], np.zeros(found[1].shape, np.float32)
+    samples[:BLOCK] = 3.0
+    more = enriched(frame, accumulate(frame, []), extra(samples, 7.0))
+    assert more.counts is not None
+    counts = more.counts.reshape(frame.shape)
+    assert (counts[:BLOCK] == 4.0).all()
+    assert (counts[BLOCK:] == frame.samples).all()
+    assert more.samples == pytest.approx(counts.mean())
+    light, before = (x.picture[:, :3].reshape(*x.shape, 3) for x in (more, frame))
+    assert np.allclose(light[:BLOCK], before[:BLOCK] / 4 + 7.0 * 3 / 4, atol=1e-2)
+    assert np.array_equal(light[BLOCK:], before[BLOCK:])
+    assert more.noise is not None
+    assert frame.noise is not None
+    assert np.array_equal(more.noise.difference, frame.noise.difference)
+    assert np.allclose(more.noise.brightness, frame.noise.brightness, rtol=1e-6)
+    whole = enriched(
+        frame, accumulate(frame, []), extra(np.full(frame.shape, 3.0, np.float32), 7.0)
+    )
+    assert whole.counts is None
+    assert whole.samples == 4.0
+
+
+def test_a_frame_with_extra_samples_shows_the_light_of_its_neighbours() -> None:
+    """Roots of a pixel's light are darker the noisier it is; its light is the same."""
+    rng = np.random.default_rng(5)
+
+    def stored(number: int, noise: int) -> Stored:
+        """A frame whose halves have light of so many equal parts each."""
+        frame = view(number, camera(0.05 * number), World()).frame
+        size = 2, noise, *frame.depth.shape, 1
+        found = (rng.exponential(size=size) ** 3 / 6).mean(axis=1)  # a few are bright
+        light = (frame.radiance * found).astype(np.float32)
+        both = Halves(light, *(np.stack([x, x]) for x in (frame.albedo, frame.normal)))
+        mean = light.mean(axis=0)
+        return store(replace(frame, radiance=mean, samples=4.0, halves=both))
+
+    own, other, more = (stored(n, noise) for n, noise in ((1, 1), (2, 1), (2, 32)))
+    alone = accumulate(more, [])
+    assert alone.radiance is not None
+    samples = np.full(own.shape, 64.0, np.float32)
+    extra = ExtraSamples(
+        alone.radiance, alone.albedo, alone.normal, np.ones_like(samples), samples
+    )
+    rich = enriched(other, accumulate(other, []), extra)
+    shares = [
+        (accumulate(own, [x]).samples.mean() - own.samples) / x.samples
+        for x in (other, rich)
+    ]
+    assert shares[1] == pytest.approx(shares[0], rel=0.05), shares

@@ -1,1 +1,0 @@
-"""Which mode, quality and samples: what is requested becomes what is rendered."""

@@ -1,1 +1,0 @@
-"""One frame, from a scene to a picture."""

@@ -1,0 +1,244 @@
+"""The frames of an animation, sampled by the engine inside the render of one of them.
+
+Blender asks for one frame after the other. Inside the render of a frame its neighbours
+are evaluated and sampled too, those ahead as well; none is sampled twice.
+"""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from xrds_core.arrays import Array
+from xrds_core.shot import Neighbourhood, Shot, Window
+
+from ..cycles import session
+from ..cycles.passes import CyclesPasses
+from ..scene.contents import cuts, frame_range, requested_passes
+from . import stages
+from .methods import Method
+from .pace.choose import pace_of
+from .pace.more import Part, render_more
+from .sampling import Sampled, can_continue, first_sample
+
+_Passes = dict[tuple[str, str], Array]
+
+# Passes that the first sample of a sequence writes alone, and the layer's switches.
+_OF_ONE_SAMPLE = {
+    "z": {"Depth"},
+    "position": {"Position"},
+    "object_index": {"IndexOB", "Object Index"},
+    "material_index": {"IndexMA", "Material Index"},
+}
+
+
+@dataclass(frozen=True)
+class _Call:
+    """One call of `RenderEngine.render()`, and the passes of its layer.
+
+    It is for a frame's `number`; `last` is the last frame that is sampled in it.
+    """
+
+    engine: Any
+    depsgraph: Any
+    passes: CyclesPasses
+    number: int
+    last: int | None
+
+
+@dataclass
+class EngineFrames:
+    """The frames of one view layer of an animation, for one render job.
+
+    `ahead` are Cycles' own passes of frames that were sampled before their turn.
+    `count` is how many were sampled since `began`.
+    """
+
+    method: Method
+    window: Window[Sampled] = field(init=False)
+    ahead: dict[int, _Passes] = field(default_factory=dict)
+    began: float = field(default_factory=time.perf_counter)
+    count: int = 0
+    _call: _Call | None = None
+
+    @classmethod
+    def of(
+        cls, scene: Any, method: Method, beside: Method | None = None
+    ) -> EngineFrames:
+        """The frames of a scene's range; `beside` is another layer's method."""
+        found = cls(method)
+        numbers = frame_range(scene)
+        radius, begins = method.request.settings.temporal_radius, cuts(scene, numbers)
+        shot = Shot(tuple(numbers), radius, begins)
+        method.pace = pace_of(
+            scene,
+            method.request,
+            shot,
+            layers=max(1, sum(layer.use for layer in scene.view_layers)),
+            beside=None if beside is None else beside.pace,
+        )
+        found.window = Window(shot, found._load)
+        return found
+
+    def neighbourhood(self, engine: Any, depsgraph: Any) -> Neighbourhood[Sampled]:
+        """The frame that Blender asks for, with its neighbours.
+
+        The render result then holds the frame's own passes.
+        """
+        number = depsgraph.scene_eval.frame_current
+        self._show(depsgraph.scene_eval)
+        for old in [n for n in self.ahead if n < number]:
+            del self.ahead[old]
+        missing = self.window.missing(number)
+        if not missing:
+            session.allocate(engine)
+        with CyclesPasses(engine, depsgraph) as passes:
+            last = missing[-1] if missing else None
+            self._call = _Call(engine, depsgraph, passes, number, last)
+            try:
+                found = self._whole(number)
+            finally:
+                self._call = None
+                go_to(engine, depsgraph, number)
+                if number in self.ahead:
+                    passes.put_back(self.ahead.pop(number))
+            return self._completed(engine, depsgraph, found)
+
+    def sample_next(self, engine: Any, depsgraph: Any) -> None:
+        """Sample what the frame after this one needs, while this one is finished.
+
+        The render result afterwards holds the passes that it held before. Raises
+        Cancelled when the user stops it.
+        """
+        number = depsgraph.scene_eval.frame_current
+        later = [n for n in self.window.shot.frames if n > number]
+        missing = self.window.missing(min(later)) if later else []
+        if not missing:
+            return
+        with CyclesPasses(engine, depsgraph) as passes:
+            before = passes.all_passes()
+            self._call = _Call(engine, depsgraph, passes, number, None)
+            try:
+                for each in missing:
+                    self.window.load(each)
+            finally:
+                self._call = None
+                go_to(engine, depsgraph, number)
+                passes.put_back(before)
+
+    def _completed(
+        self, engine: Any, depsgraph: Any, found: Neighbourhood[Sampled]
+    ) -> Neighbourhood[Sampled]:
+        """The frame with more samples where it lacks them."""
+        method = self.method
+
+        def more(part: Part) -> Any:
+            scene = depsgraph.scene_eval
+            place = scene.frame_current // scene.frame_step
+            return render_more(engine, depsgraph, method.request, place, part)
+
+        others = list(found.neighbours.values())
+        own = method.complete(found.own, others, more)
+        if own.views is not found.own.views:  # it lends what it has got as well
+            self.window.replace(found.number, replace(own, gathered={}))
+        return replace(found, own=own)
+
+    def _whole(self, number: int) -> Neighbourhood[Sampled]:
+        """A frame with its neighbours, sampled again where these lack what it lacks."""
+        call, found = self._call, self.window.neighbourhood(number)
+        assert call is not None
+        assert found is not None
+        if not self.method.lacks(found.own, list(found.neighbours.values())):
+            return found
+        go_to(call.engine, call.depsgraph, number)
+        self.ahead.pop(number, None)  # its own passes are rendered now
+        own = self._sample(between=False)
+        self.window.replace(number, own)
+        return replace(found, own=own)
+
+    def _show(self, scene: Any) -> None:
+        """Show how far the animation is; frames ahead are sampled already."""
+        number, end, step = scene.frame_current, scene.frame_end, scene.frame_step
+        newest = self.window.newest
+        seconds = None
+        if self.count:
+            each = (time.perf_counter() - self.began) / self.count
+            last = number - step if newest is None else newest
+            seconds = each * ((end - last) // step + 1)
+        stages.begin_frame(number, (end - number) // step, seconds)
+
+    def _load(self, number: int) -> Sampled:
+        """Sample a frame, and keep its passes where others overwrite them."""
+        call = self._call
+        assert call is not None
+        go_to(call.engine, call.depsgraph, number)
+        sampled = self._sample(self.window.shot.is_between(number))
+        self.count += 1
+        if number >= call.number != call.last:
+            self.ahead[number] = call.passes.all_passes()
+        return sampled
+
+    def _sample(self, between: bool) -> Sampled:
+        """Sample the frame that the dependency graph is at.
+
+        Under a camera that stands still frames continue one sequence, as `place_of`
+        says. Passes that its first sample alone writes are then rendered by
+        themselves, for each frame: that nothing moves in them is seldom sure.
+        """
+        call = self._call
+        assert call is not None
+        engine, depsgraph, passes = call.engine, call.depsgraph, call.passes
+        scene = depsgraph.scene_eval
+        if not can_continue(scene, self.method.request):
+            return self.method.sample(engine, depsgraph, between=between)
+        place = scene.frame_current // scene.frame_step
+        sampled = self.method.sample(engine, depsgraph, place)
+        requested = _OF_ONE_SAMPLE.keys() & set(
+            requested_passes(depsgraph.view_layer_eval)
+        )
+        if requested:
+            others = passes.all_passes()
+            first_sample(engine, depsgraph, self.method.request, place)
+            names = set().union(*(_OF_ONE_SAMPLE[each] for each in requested))
+            own = {k: x for k, x in passes.all_passes().items() if k[1] in names}
+            passes.put_back(others | own)
+        return sampled
+
+
+_ADD_ON = __name__.partition(".")[0]
+
+
+def go_to(engine: Any, depsgraph: Any, number: int) -> None:
+    """Evaluate another frame; nothing where the dependency graph is there already."""
+    scene = depsgraph.scene_eval
+    if number == scene.frame_current:
+        return
+    scene = scene.original
+    engine.frame_set(number, 0.0)
+    handlers = _scripts()
+    for handler in handlers:
+        _call(handler, scene)
+    if handlers:  # what they changed is evaluated as well
+        engine.frame_set(number, 0.0)
+
+
+def _scripts() -> list[Callable[..., Any]]:
+    """What others than this add-on have Blender call before a frame is rendered."""
+    import bpy
+
+    ours = f"{_ADD_ON}."
+    handlers = bpy.app.handlers.render_pre
+    return [x for x in handlers if not getattr(x, "__module__", "").startswith(ours)]
+
+
+def _call(handler: Callable[..., Any], scene: Any) -> None:
+    """As Blender does: with one argument or two; an error is reported, no more."""
+    code = getattr(handler, "__code__", None)
+    arguments = [scene] if code and code.co_argcount == 1 else [scene, None]
+    try:
+        handler(*arguments)
+    except Exception:  # of somebody else's code
+        traceback.print_exc()

@@ -1,0 +1,145 @@
+"""What makes pictures of frames: one object of a method serves a whole shot.
+
+Every method samples a frame, by itself or as a neighbour of others, and finishes its
+picture from these samples. A still is a frame without neighbours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from xrds_core.arrays import Array
+
+from ..cycles import session
+from ..cycles.samples import render_once
+from ..cycles.settings import COMBINED
+from ..planning.request import Request
+from . import stages
+from .pace.interface import Pace
+from .pace.more import More
+from .picture import Picture, peak_memory
+from .sampling import Sampled
+
+Report = Callable[[float], bool]
+"""Takes how far a stage is, from 0 to 1; False once the user has stopped it."""
+
+
+class Method:
+    """Cycles alone, full size or super-resolution.
+
+    Raises XRDSError, when it is made, where what it needs cannot be loaded.
+    """
+
+    last_stage = (stages.DENOISE, 2, 2)
+    """The last stage: its name, its number and how many there are."""
+
+    def __init__(self, request: Request) -> None:
+        self.request, self.settings = request, request.settings
+        self.pace: Pace | None = None
+
+    def sample(
+        self,
+        engine: Any,
+        depsgraph: Any,
+        place: int | None = None,
+        between: bool = False,
+    ) -> Sampled:
+        """Render the frame that the dependency graph is at.
+
+        The result then holds its passes. `place` is as in `sampling_of`; what other
+        frames show as well may be missing of one that lies `between` two. Raises
+        Cancelled when the user stops it; what there is then is kept as the
+        request says.
+        """
+        raise NotImplementedError
+
+    def lacks(self, own: Sampled, others: Sequence[Sampled]) -> bool:
+        """Whether what is missing of a frame is not shown by others after all."""
+        return False
+
+    def complete(self, own: Sampled, others: Sequence[Sampled], more: More) -> Sampled:
+        """The frame with all that it is finished from; `more` renders more samples.
+
+        Raises Cancelled when the user stops their render.
+        """
+        return own
+
+    def begin_finishing(self, engine: Any) -> Report:
+        """Show the last stage; returns what shows how far it is."""
+        stages.begin(engine, *self.last_stage)
+        return stages.reporter(engine)
+
+    def finish(
+        self,
+        own: Sampled,
+        others: Sequence[Sampled],
+        view: str,
+        report: Report | None = None,
+    ) -> Picture:
+        """The picture of one view, with the samples of its neighbours.
+
+        Its seconds are of finishing alone. Raises Cancelled where `report` says so.
+        """
+        raise NotImplementedError
+
+    def light_passes(self, own: Sampled, view: str) -> dict[str, Array]:
+        """Light passes of a low-resolution render by name, enlarged as they are."""
+        return {}
+
+    def stopped(self, own: Sampled) -> dict[str, Array]:
+        """What the user sees of a frame that was stopped, by view, (H, W, 4).
+
+        The frame's own samples, denoised as quickly as can be.
+        """
+        return {}
+
+
+class CyclesOnly(Method):
+    """What Cycles renders is the picture."""
+
+    def sample(
+        self,
+        engine: Any,
+        depsgraph: Any,
+        place: int | None = None,
+        between: bool = False,
+    ) -> Sampled:
+        name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
+        number = depsgraph.scene_eval.frame_current
+        clock = render_once(
+            engine,
+            depsgraph,
+            samples=self.settings.samples,
+            seed=self.request.seed,
+            denoiser=self.settings.cycles_denoising,
+        )
+        result = engine.get_result()
+        layer, size = result.layers[name], (result.resolution_x, result.resolution_y)
+        views = [view.name for view in result.views] or [""]
+        pictures = {v: session.read_pass(layer, COMBINED, v, size) for v in views}
+        return Sampled(number, pictures, {"sync": clock.sync, "beauty": clock.render})
+
+    def finish(
+        self,
+        own: Sampled,
+        others: Sequence[Sampled],
+        view: str,
+        report: Report | None = None,
+    ) -> Picture:
+        return Picture.of(
+            own.views[view],
+            seconds={},
+            plan=self.request.plan().decisions,
+            peak_memory=peak_memory(),
+        )
+
+    def complete(self, own: Sampled, others: Sequence[Sampled], more: More) -> Sampled:
+        """The frame with all that it is finished from; `more` renders more samples.
+
+        Raises Cancelled when the user stops their render.
+        """
+        return own
+
+    def begin_finishing(self, engine: Any) -> Report:
+        return lambda _: True

@@ -1,0 +1,176 @@
+"""How large the error of a frame with its neighbours is, measured as it is rendered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from xrds_core.accumulation.accumulate import sample_counts
+from xrds_core.accumulation.frame import Stored
+from xrds_core.accumulation.local_filters import block_means
+from xrds_core.arrays import Array
+from xrds_core.pace.error import Rendered, error_ratio, root_noise
+from xrds_core.pace.extra_samples import ExtraSamples, mean_of
+from xrds_core.pace.worth import Ratio
+
+from ...cycles.low_resolution import Region
+from ...cycles.settings import LOOKS_EVERY, first_look
+from ..sampling import Sampled
+from .interface import Finishing
+from .more import Part, measured_regions, nothing, pixels_of, put
+
+Render = Callable[[Part], dict[str, ExtraSamples]]
+"""Renders more samples of a frame, by view."""
+
+
+class Measured(NamedTuple):
+    """What was measured in some regions of a frame, and the samples that it took.
+
+    `ratio` is the squared error of its picture over that of all samples; `extra` are by
+    view; denoising a frame of this size by itself takes so many seconds. `asked` (H, W)
+    are the samples that the file takes, 0 elsewhere.
+    """
+
+    regions: list[Region]
+    ratio: Ratio
+    extra: dict[str, ExtraSamples]
+    denoising: float
+    asked: Array
+
+
+def measure(
+    method: Finishing,
+    own: Sampled,
+    others: Sequence[Sampled],
+    samples: int,
+    exposure: float,
+    more: Render,
+    least: int | None = None,
+) -> Measured:
+    """Compare an accumulated frame with one of all `samples` without neighbours.
+
+    In `measured_regions`, by two renders of half of the samples each, of two seeds:
+    halves of one sequence would not be independent. White is a luminance of 1 /
+    `exposure`. Under a noise threshold a pixel takes at `least` so many.
+    """
+    view, length = next(iter(own.views)), max(1, samples // 2)
+    shape = own.views[view].shape
+    regions = measured_regions(shape)
+    cells: list[list[Rendered]] = []
+    seconds = 0.0
+    extra: dict[str, ExtraSamples] = {}
+    for region in regions:
+        place = None if (region.height, region.width) == shape else region
+        halves = [more(Part(length, 0.5, place, sequence=-i)) for i in (1, 2)]
+        started = time.perf_counter()
+        cells.append([_rendered(method, each[view]) for each in halves])
+        seconds += time.perf_counter() - started
+        for name in own.views:
+            found = mean_of([each[name] for each in halves])
+            put(extra.setdefault(name, nothing(shape, found.parts)), region, found)
+    parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
+    area = sum(region.width * region.height for region in regions)
+    # with the neighbours' samples: what may be wrong in them has nothing to do with
+    # what denoising takes, and the frame's own few are far noisier
+    noisy = own.gathered[view].radiance
+    assert noisy is not None
+    places = [pixels_of(region) for region in regions]
+    # a part by itself, as its halves are
+    together = [method.radiance(own, others, view, place) for place in places]
+    both = extra[view].samples
+    asked = both if least is None else counts_of_file(both, least, samples)
+    asked = np.where(both > 0.0, asked, np.float32(0.0))
+    ratio = error_ratio(
+        np.concatenate(together),
+        np.concatenate([noisy[place] for place in places]),
+        parts,
+        exposure,
+        float(both.sum() / 2 / asked.sum()),
+    )
+    denoising = seconds / 2 * shape[0] * shape[1] / area
+    return Measured(regions, ratio, extra, denoising, asked)
+
+
+def _rendered(method: Finishing, samples: ExtraSamples) -> Rendered:
+    radiance = samples.radiance
+    return Rendered(radiance, method.denoised(radiance, samples.albedo, samples.normal))
+
+
+def _joined(cells: Sequence[Rendered]) -> Rendered:
+    """One picture of several, one below the other."""
+    return Rendered(
+        np.concatenate([x.noisy for x in cells]),
+        np.concatenate([x.denoised for x in cells]),
+    )
+
+
+# Fewer samples than this, on the mean, are taken evenly: both halves of a frame under a
+# threshold have at least one step, and two to differ in. So where a file takes 48, its
+# halves would take 64.
+_FEW = 4 * LOOKS_EVERY
+
+
+def counts_of_file(both: Array, least: int, most: int) -> Array:
+    """Samples that pixels take in the file, from those of two renders of a half each.
+
+    `both` is how many these have taken together. Where each stopped as soon as it
+    could, so does the file. `least` and `most` are the samples of a pixel that the file
+    allows.
+    """
+    soonest = first_look(least)
+    at_once = both < 2 * first_look(least // 2) + 1  # counts are not quite whole
+    asked = np.where(at_once, np.float32(soonest), both)
+    return np.clip(asked, min(soonest, most), most)
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """What the file's noise threshold asks for, as one of its frames has shown.
+
+    `samples` on the mean; a pixel takes `noise` times the variance of one sample of it,
+    within the `least` and the `most` that any has taken.
+    """
+
+    samples: float
+    least: float
+    most: float
+    noise: float
+
+    def is_few(self, share: float) -> bool:
+        """Whether such a share of the samples is sooner taken evenly."""
+        return share * self.samples < _FEW
+
+    def density(self, frame: Stored) -> Array:
+        """Samples that the file takes in each block of a frame, over the mean."""
+        asked = np.clip(self.noise * _noise(frame), self.least, self.most)
+        return block_means(asked) / self.samples
+
+
+def learn(frame: Stored, asked: Array) -> Threshold:
+    """Learn from a frame what its file asks for.
+
+    `asked` (H, W) are the samples that each pixel takes in the file, 0 where that is
+    not known.
+    """
+    known = asked > 0.0
+    counts, noise = asked[known], _noise(frame)[known]
+    least, most, mean = (float(f(counts)) for f in (np.min, np.max, np.mean))
+    low, high = 0.0, most / max(float(noise.mean()), 1e-12)
+    for _ in range(40):  # by bisection: as many on the mean
+        middle = (low + high) / 2
+        if np.clip(middle * noise, least, most).mean() < mean:
+            low = middle
+        else:
+            high = middle
+    return Threshold(mean, least, most, low)
+
+
+def _noise(frame: Stored) -> Array:
+    """Variance (H, W) of one sample."""
+    height, width = frame.shape
+    counts = sample_counts(frame, slice(None), height * width)
+    return root_noise(frame) * counts.reshape(frame.shape)

@@ -1,0 +1,178 @@
+"""More samples of a frame of a shot, of all of it or of parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from xrds_core.accumulation.accumulate import accumulate
+from xrds_core.accumulation.local_filters import BLOCK
+from xrds_core.pace.extra_samples import ExtraSamples, enriched, mean_of, with_extra
+
+from ...cycles.halves import more_samples
+from ...cycles.low_resolution import Region
+from ...cycles.samples import Samples
+from ...planning.request import Request
+from .. import stages
+from ..sampling import Sampled, is_even, sampling_of
+
+
+@dataclass(frozen=True)
+class Part:
+    """More samples of a frame: `length` of a sequence that has a number.
+
+    With `begin` they are of one that all frames share, after so many taken of it. Where
+    `each` is not 0 they are of several with so many: Cycles syncs the scene again for
+    another number than it had before.
+
+    Where the file has a noise threshold, pixels stop at `share` of what it asks for.
+    `region` is a part of the picture, None all of it.
+    """
+
+    length: int
+    share: float
+    region: Region | None = None
+    begin: int | None = None
+    each: int = 0
+    sequence: int = 1
+
+
+More = Callable[[Part], tuple[dict[str, ExtraSamples], dict[str, float]]]
+"""Renders more samples of a frame, by view, and says in how many seconds."""
+
+
+def render_more(
+    engine: Any, depsgraph: Any, request: Request, place: int | None, part: Part
+) -> tuple[dict[str, ExtraSamples], dict[str, float]]:
+    """Render more samples of the frame that the dependency graph is at.
+
+    `place` is as in `sampling_of`. The result has the passes afterwards that it had
+    before. Raises Cancelled when the user stops it.
+    """
+    how = sampling_of(engine, depsgraph, request, place)
+    even = is_even(depsgraph.scene_eval, request)
+    each = part.each if even else 0
+    parts = how.further(part.length, part.begin, part.sequence, each)
+    share = None if even else part.share
+    stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
+    try:
+        found, seconds = more_samples(
+            engine,
+            depsgraph,
+            parts,
+            region=part.region,
+            share=share,
+            light=how.light,
+        )
+    finally:
+        stages.end()
+    return {v: mean_of([_extra(x[v]) for x in found]) for v in found[0]}, seconds
+
+
+def _extra(samples: Samples) -> ExtraSamples:
+    picture = samples.picture
+    assert samples.counts is not None
+    return ExtraSamples(
+        np.ascontiguousarray(picture[..., :3]),
+        samples.albedo,
+        samples.normal,
+        picture[..., 3],
+        samples.counts,
+        dict(samples.parts),
+    )
+
+
+def with_more(
+    own: Sampled, extra: Mapping[str, ExtraSamples], weight: float
+) -> Sampled:
+    """A frame with extra samples; beside them neighbours' count with a weight."""
+    views, gathered = dict(own.views), dict(own.gathered)
+    for view, more in extra.items():
+        alone = accumulate(own.views[view], [])
+        gathered[view] = with_extra(own.gathered[view], alone, more, weight)
+        views[view] = enriched(own.views[view], alone, more)
+    return replace(own, views=views, gathered=gathered) if extra else own
+
+
+def nothing(shape: tuple[int, int], parts: Iterable[str]) -> ExtraSamples:
+    """No samples anywhere."""
+    radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
+    alpha, samples = np.zeros((2, *shape), np.float32)
+    dark = {name: np.zeros_like(radiance) for name in parts}
+    return ExtraSamples(radiance, albedo, normal, alpha, samples, dark)
+
+
+def put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:
+    """Write the samples of a region into those of the whole picture."""
+    place = pixels_of(region)
+    for name in ("radiance", "albedo", "normal", "alpha", "samples"):
+        getattr(whole, name)[place] = getattr(part, name)
+    for name, pixels in part.parts.items():
+        whole.parts[name][place] = pixels
+
+
+def together(
+    one: Mapping[str, ExtraSamples], two: Mapping[str, ExtraSamples]
+) -> dict[str, ExtraSamples]:
+    """Both, by view."""
+    names = one.keys() | two.keys()
+    return {v: mean_of([x[v] for x in (one, two) if v in x]) for v in names}
+
+
+_LEAST_AREA = 200_000  # pixels that are measured in, where there are more
+
+
+def measured_regions(shape: tuple[int, int]) -> list[Region]:
+    """The parts of a picture (H, W) that show how large its errors are.
+
+    Two strips from top to bottom, a quarter of a large picture and half of a smaller
+    one; all where that would leave too few blocks.
+    """
+    height, width = shape
+    for share in (0.25, 0.5):
+        across = int(width * share / 2) // BLOCK * BLOCK
+        if across >= BLOCK and across * height * 2 >= _LEAST_AREA:
+            middles = (width // 4, 3 * width // 4)
+            starts = [(x - across // 2) // BLOCK * BLOCK for x in middles]
+            return [Region(x, 0, across, height) for x in starts]
+    return [Region(0, 0, width, height)]
+
+
+def blocks_beside(
+    blocks: NDArray[np.bool_], regions: Sequence[Region]
+) -> list[NDArray[np.bool_]]:
+    """The blocks that are not in any of these strips, left, between and right."""
+    if not regions:
+        return [blocks]
+    places = [_columns_of(region) for region in regions]
+    ends = [0, *(x.stop for x in places)]
+    starts = [*(x.start for x in places), blocks.shape[1]]
+    found = []
+    for first, last in zip(ends, starts, strict=True):
+        part = np.zeros_like(blocks)
+        part[:, first:last] = blocks[:, first:last]
+        found.append(part)
+    return found
+
+
+def pixels_of(region: Region) -> tuple[slice, slice]:
+    """Its rows and columns."""
+    rows = slice(region.y, region.y + region.height)
+    return rows, slice(region.x, region.x + region.width)
+
+
+def _columns_of(region: Region) -> slice:
+    """The columns of blocks that a region covers; it begins with one."""
+    return slice(region.x // BLOCK, -(-(region.x + region.width) // BLOCK))
+
+
+def region_of(rows: slice, columns: slice, shape: tuple[int, int]) -> Region:
+    """A rectangle of blocks, in pixels of the picture."""
+    top, left = rows.start * BLOCK, columns.start * BLOCK
+    bottom = min(rows.stop * BLOCK, shape[0])
+    right = min(columns.stop * BLOCK, shape[1])
+    return Region(left, top, right - left, bottom - top)

@@ -1,0 +1,176 @@
+"""A shot from outside of Blender's own animation render: one Blender job per frame.
+
+A frame is finished when its last neighbour is there: their noisy samples are moved
+along with what they show, and the sum is denoised once and, above scale 1, enlarged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from xrds_core.accumulation.camera import Camera
+from xrds_core.errors import SceneError
+from xrds_core.shot import Shot, Window, place_of
+
+from ..cycles import session
+from ..cycles.view import cameras_of
+from ..planning.request import Request
+from ..scene.contents import cuts
+from . import stages
+from .blender_job import call_engine
+from .choose import Chosen, choose_for_shot
+from .methods import Method
+from .overlap import Overlap, samples_on_card
+from .pace.choose import pace_of
+from .pace.more import Part, render_more
+from .picture import Picture, joined
+from .render import method_of
+from .sample_cache import SampleCache
+from .sampling import Sampled
+
+
+def render_shot(
+    scene: Any,
+    request: Request,
+    frames: Sequence[int],
+    is_done: Callable[[int], bool] = lambda _: False,
+    cache: SampleCache | None = None,
+) -> Iterator[tuple[int, Picture]]:
+    """Render frames of a scene, each with its neighbours' samples, in order.
+
+    Frames that `is_done` says are there are neighbours alone, and only where they are
+    needed. A `cache` stores the samples of every frame rendered; what it has already is
+    not rendered again, and may lie beyond the ends of these frames. Where Cycles has a
+    card, a frame is finished while the next one is sampled. Yields numbers and
+    pictures; the scene stays at the last frame rendered.
+    What the request leaves open is chosen at the first frame to render. Raises what
+    `render` raises.
+    """
+    todo = tuple(number for number in frames if not is_done(number))
+    chosen = _chosen(scene, request, todo)
+    request = chosen.request
+    method = method_of(chosen, None if cache is None else cache.write)
+    radius = request.settings.temporal_radius
+    cached = cache.beside(frames, radius) if cache else []
+    there = tuple(sorted({*frames, *cached}))
+    shot = Shot(todo, radius, cuts(scene, there), others=there)
+
+    def load(number: int) -> Sampled | None:
+        if cache and (found := cache.read(number)):
+            return found
+        if number not in frames:
+            return None
+        return _sample(scene, method, frames, number, shot.is_between(number))
+
+    if not cache:
+        method.pace = pace_of(scene, request, shot)
+    window = Window(shot, load)
+    # more samples of a frame are rendered, and judged, before it is finished
+    is_on = method.pace is None and samples_on_card(scene)
+    with Overlap[tuple[int, Picture]](is_on) as overlap:
+        for found in window:
+            number, own = found.number, found.own
+            if is_done(number):  # another machine was quicker
+                continue
+            others = list(found.neighbours.values())
+            own = _completed(scene, method, frames, own, others)
+            if own.views is not found.own.views:  # it lends what it has got as well
+                window.replace(number, replace(own, gathered={}))
+            if method.lacks(own, others):
+                own = _sample(scene, method, frames, number)
+            yield from overlap.put(partial(_finished, method, chosen, own, others))
+        yield from overlap.rest()
+
+
+def _finished(
+    method: Method, chosen: Chosen, own: Sampled, others: Sequence[Sampled]
+) -> tuple[int, Picture]:
+    pictures = {view: method.finish(own, others, view) for view in own.views}
+    picture = joined(pictures, own.seconds)
+    picture.seconds["total"] = sum(picture.seconds.values())
+    return own.number, chosen.described(picture)
+
+
+def _completed(
+    scene: Any,
+    method: Method,
+    frames: Sequence[int],
+    own: Sampled,
+    others: Sequence[Sampled],
+) -> Sampled:
+    """The frame with more samples where it lacks them."""
+
+    def more(part: Part) -> Any:
+        scene.frame_set(own.number)
+
+        def work(engine: Any, depsgraph: Any) -> Any:
+            session.allocate(engine)
+            place = place_of(own.number, frames)
+            return render_more(engine, depsgraph, method.request, place, part)
+
+        return call_engine(scene, work)
+
+    return method.complete(own, others, more)
+
+
+def _chosen(scene: Any, request: Request, todo: Sequence[int]) -> Chosen:
+    if request.goal is None or not todo:
+        return Chosen(request)
+    scene.frame_set(todo[0])
+    return call_engine(
+        scene, lambda engine, graph: choose_for_shot(engine, graph, request)
+    )
+
+
+def cache_samples(
+    scene: Any, request: Request, frames: Sequence[int], cache: SampleCache
+) -> Iterator[int]:
+    """Render the samples of frames that are not cached yet; yields their numbers.
+
+    Raises what `render` raises.
+    """
+    method = method_of(Chosen(request), cache.write)
+    for number in frames:
+        if cache.read(number) is None:
+            _sample(scene, method, frames, number)
+            yield number
+
+
+def _sample(
+    scene: Any,
+    method: Method,
+    frames: Sequence[int],
+    number: int,
+    between: bool = False,
+) -> Sampled:
+    """Sample a frame of a shot, alike whatever part of the shot `frames` are."""
+    scene.frame_set(number)
+    place = place_of(number, frames)
+
+    def work(engine: Any, depsgraph: Any) -> Sampled:
+        try:
+            return method.sample(engine, depsgraph, place, between)
+        finally:
+            stages.end()
+
+    return call_engine(scene, work)
+
+
+def shot_cameras(scene: Any, frames: Iterable[int]) -> dict[int, Camera]:
+    """The cameras of some frames of a scene, of stereo the first view's.
+
+    Nothing is rendered; the scene stays at the last frame. Raises SceneError under a
+    camera that no matrix describes.
+    """
+    cameras = {}
+    for number in frames:
+        scene.frame_set(number)
+        views = call_engine(scene, cameras_of)
+        camera = next(iter(views.values()), None)
+        if camera is None or camera.sphere is not None:
+            raise SceneError(f"no matrix describes the panoramic camera of {number}")
+        cameras[number] = camera
+    return cameras

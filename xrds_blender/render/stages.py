@@ -1,0 +1,195 @@
+"""What a running render is doing now, how far it has come, and how long it will take.
+
+Cycles reports to Blender how far each of its renders is, so Blender's own bar would run
+several times. The status bar therefore shows what is worked out here, from the seconds
+of the stages so far and those that each kind of stage took before.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from xrds_core.progress import duration
+
+from ..cycles import session
+from ..internals import status
+from ..internals.lifetimes import PROCESS, RENDER_JOB
+
+LOADING = "Loading PyTorch"
+
+LOW, GUIDES, NETWORK = "Low resolution", "Guides", "Network"
+
+SAMPLES, DENOISE = "Samples", "Denoising"
+
+STAGES = (
+    "total",
+    "sync",
+    "beauty",
+    "accumulate",
+    "denoise",
+    "guides",
+    "network",
+    "write",
+)
+
+_KINDS = (LOW, GUIDES, NETWORK)
+
+_LEAST = 0.02  # of a stage, before its seconds can be estimated from what is done
+
+_LARGE = 0.1  # megapixels; of less, seconds say nothing about more
+
+
+@dataclass
+class _Run:
+    """One frame's render; times are readings of perf_counter."""
+
+    engine: Any
+    megapixels: float
+    start: float
+    stage: str = ""
+    number: int = 0
+    of: int = 0
+    since: float = 0.0
+    reported: float = 0.0
+    done: set[str] = field(default_factory=set)
+
+    @property
+    def kind(self) -> str:
+        return self.stage.partition(" of frame")[0]
+
+
+@dataclass
+class Current:
+    """The render that goes on, if any, and what of an animation is left after it."""
+
+    run: _Run | None = None
+    frames_left: str = ""
+
+
+@dataclass
+class Speeds:
+    """Seconds per megapixel of each kind of stage.
+
+    Until a stage has been measured they are those of two cores of a desktop.
+    """
+
+    seconds: dict[str, float] = field(
+        default_factory=lambda: {DENOISE: 2.5, NETWORK: 1.5}
+    )
+
+
+def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
+    """Note that the stage of this number has begun.
+
+    At scale 1 the last one is the denoiser, and all before are samples.
+    """
+    state, now = RENDER_JOB.of(Current), time.perf_counter()
+    if state.run is None:
+        result = engine.get_result()
+        pixels = result.resolution_x * result.resolution_y
+        state.run = _Run(engine, max(pixels, 1) / 1e6, now)
+    else:
+        _learn(state.run, now)
+    run = state.run
+    run.engine, run.stage, run.number, run.of = engine, stage, number, of
+    run.since, run.reported = now, 0.0
+    engine.update_stats("XRDS", stage)
+
+
+def begin_frame(number: int, left: int, seconds: float | None = None) -> None:
+    """Note which frame of an animation has begun, and what is left after it.
+
+    `seconds`: an estimate for this frame and those after it; None without one.
+    """
+    rest = "the last one" if not left else f"{left} left"
+    if seconds is not None:
+        rest += f", about {duration(seconds)}"
+    RENDER_JOB.of(Current).frames_left = f"Frame {number} ({rest}). "
+
+
+def reporter(engine: Any) -> Callable[[float], bool]:
+    """Notes how far a stage is, from 0 to 1; False once the user has stopped it."""
+
+    def report(done: float) -> bool:
+        run = RENDER_JOB.of(Current).run
+        if run is not None:
+            run.reported = done
+        engine.update_progress(done)
+        return not session.is_stopped(engine)
+
+    return report
+
+
+def end() -> None:
+    """Note that the render is over, however it ended."""
+    state = RENDER_JOB.of(Current)
+    if state.run is not None and state.run.reported >= 1.0:
+        _learn(state.run, time.perf_counter())
+    state.run, state.frames_left = None, ""
+
+
+def current() -> str | None:
+    """What is being done and how long it will take, None between renders."""
+    state = RENDER_JOB.of(Current)
+    run = state.run
+    if run is None:
+        return None
+    left = _left(run)
+    time_left = "" if left is None else f", {_clock(left)} left"
+    return f"{state.frames_left}XRDS {run.number}/{run.of}: {run.stage}{time_left}"
+
+
+def show() -> None:
+    """Set Blender's progress bar to the part of the whole render that is done.
+
+    For the main thread, while the engine renders.
+    """
+    run = RENDER_JOB.of(Current).run
+    if run is None:
+        return
+    spent, left = time.perf_counter() - run.start, _left(run)
+    part = 0.0 if left is None else spent / max(spent + left, 1e-6)
+    run.engine.update_progress(part)
+
+
+def _learn(run: _Run, now: float) -> None:
+    """Keep what a stage has taken, for the next ones of its kind."""
+    run.done.add(run.kind)
+    if run.megapixels > _LARGE:
+        PROCESS.of(Speeds).seconds[run.kind] = (now - run.since) / run.megapixels
+
+
+def _left(run: _Run) -> float | None:
+    """Seconds until the end; None where not even the first samples are there."""
+    spent = time.perf_counter() - run.since
+    part = run.reported or status.fraction(run.engine) or 0.0
+    if part > _LEAST:
+        whole = spent / part
+    elif run.kind in (known := PROCESS.of(Speeds).seconds):
+        whole = max(known[run.kind] * run.megapixels, spent)
+    else:
+        return None
+    later = [_expected(run, kind, whole) for kind in _later(run)]
+    return whole - spent + sum(later)
+
+
+def _later(run: _Run) -> list[str]:
+    """The kinds of the stages that are still to come."""
+    if run.kind in (SAMPLES, DENOISE):
+        return ([SAMPLES] * (run.of - 1) + [DENOISE])[run.number :]
+    return [k for k in _KINDS if k not in run.done and k != run.kind]
+
+
+def _expected(run: _Run, kind: str, this: float) -> float:
+    """Seconds of a stage to come; where none was measured as many as this one takes."""
+    known = PROCESS.of(Speeds).seconds.get(kind)
+    return this if known is None else known * run.megapixels
+
+
+def _clock(seconds: float) -> str:
+    """Minutes and seconds, as 1:05."""
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes}:{rest:02}"

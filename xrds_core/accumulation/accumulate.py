@@ -1,0 +1,201 @@
+"""Accumulates the noisy samples of neighbour frames on the pixels of one frame.
+
+Samples are gathered, never interpolated: each pixel takes the nearest pixel of the
+neighbour frame. Interpolation would correlate the noise of adjacent pixels, and
+denoisers mistake correlated noise for texture. How far that pixel lies from the true
+place is taken out by registration, for which a frame is gathered twice. The mean is
+weighted by sample counts, by what distance remains, which keeps fine texture sharp, and
+by a similarity weight: do both frames show the same light?
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..arrays import floats
+from ..errors import PictureError
+from ..native.library import in_threads
+from .camera import is_shot_cut
+from .coarse_rejection import tile_weights
+from .local_filters import find_ranges
+from .object_motion import Movement
+from .reprojection import pair
+from .virtual_images import find_images
+from .weighted_sums import Aligned, Means, Reprojected, Work, light_for_albedo
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from ..arrays import Array
+    from .frame import Stored
+
+
+# Standard deviation, in pixels, of the weight by distance where frames have one sample
+# per pixel; it falls with their cube root. Noise calls for a wide one, texture for a
+# narrow one: 0.7 and 0.6 were best at 1 and 2 samples, 0.2 to 0.3 at 16.
+_SOFTNESS = 0.7
+
+
+@dataclass(frozen=True)
+class Accumulated:
+    """A frame with the samples of its neighbour frames; float32, (H, W, 3) or (H, W).
+
+    `radiance` (None of guides alone), `albedo`, `normal` (in this frame's axes) and
+    `alpha` (or None) are means over `samples` (H, W) samples per pixel, NaN where no
+    frame has any. So are `parts` of the radiance, by name.
+    `rejected` is the share of the neighbours' samples that were left out: of pixels
+    that a neighbour does not show, or shows in other light. `frames` are the numbers of
+    the frames that were considered, the frame itself included: those of its shot,
+    between two shot cuts.
+    """
+
+    radiance: Array | None
+    albedo: Array
+    normal: Array
+    alpha: Array | None
+    samples: Array
+    rejected: float
+    frames: tuple[int, ...]
+    parts: Mapping[str, Array] = field(default_factory=dict)
+
+
+def accumulate(
+    target: Stored,
+    others: Sequence[Stored],
+    movement: Movement | None = None,
+    threads: int | None = None,
+) -> Accumulated:
+    """Return `target` with the samples of `others`.
+
+    `movement` caches the object motion of this shot; without it each call computes it
+    again. No samples are reused across a shot cut. Without others the result is the
+    target as it is stored. `threads`: all processors by default; the result does not
+    depend on it. Raises PictureError where the frames hold different passes.
+    """
+    others = same_shot(target, others)
+    groups = _neighbours(target, others, movement or Movement(), threads)
+    usual = light_for_albedo(target) if others and target.has_light else 0.0
+    pairs = [x.pair for group in groups for x in group if x.pair and x.is_reused]
+    images = find_images(target, pairs, partial(in_threads, threads=threads))
+    lit = _lit(target, others)
+    work = Work(target, images, usual, lit, threads)
+    # the guess's own noise counts more than texture where samples are few
+    registers = any(x.leads for x in pairs)
+    guess = work.guess(groups[0]) if registers else None
+    means = work.means(groups, guess)
+    height, width = target.shape
+    requested = sum(x.samples for x in others) * height * width
+    rejected = 1.0 - means.reused / requested if requested else 0.0
+    frames = tuple(sorted({target.number, *(x.number for x in others)}))
+    return _unpacked(target, means, lit, rejected, frames)
+
+
+def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
+    """Return the names of the parts that any of the frames has light in."""
+    frames = (target, *others)
+    return tuple(
+        name
+        for name in target.parts
+        if any(frame.parts.get(name) is not None for frame in frames)
+    )
+
+
+def _neighbours(
+    target: Stored,
+    others: Sequence[Stored],
+    movement: Movement,
+    threads: int | None,
+) -> tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]]:
+    """Return the neighbours in two groups: the nearest ones, and those farther away."""
+    rest = [x for x in others if not target.shows_same(x)]
+    motions = dict(
+        zip(map(id, rest), movement.object_motions(target, rest), strict=True)
+    )
+    extent = find_ranges(target.inverse_depth, target.shape) if rest else None
+    fall = -0.5 * target.samples ** (2 / 3) / _SOFTNESS**2
+    near = _nearest(target, others)
+
+    def neighbour(other: Stored) -> Aligned | Reprojected:
+        _check(target, other)
+        if id(other) not in motions:
+            return Aligned(other)
+        both = pair(target, other, motions[id(other)], extent)
+        return Reprojected(both, tile_weights(both), fall)
+
+    groups: tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]] = ([], [])
+    for found in in_threads(neighbour, others, threads):
+        groups[found.other.number not in near].append(found)
+    return groups
+
+
+def _check(target: Stored, other: Stored) -> None:
+    kinds = [(x.picture.shape[1], x.parts.keys()) for x in (target, other)]
+    if kinds[0] != kinds[1]:
+        raise PictureError(
+            f"frame {other.number} and frame {target.number} hold different passes:"
+            " give radiance, its parts and alpha for all frames of a shot or for none"
+        )
+
+
+def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
+    """Return the numbers of the frames just before and after, and the frame's own."""
+    before = [x.number for x in others if x.number < target.number]
+    after = [x.number for x in others if x.number > target.number]
+    return {target.number, *sorted(before)[-1:], *sorted(after)[:1]}
+
+
+def sample_counts(
+    frame: Stored, pixels: slice | NDArray[np.integer], count: int
+) -> Array:
+    """Return the sample counts of flat pixels (n,) of a frame."""
+    if frame.counts is None:
+        return np.full(count, frame.samples, np.float32)
+    return floats(frame.counts[pixels]).copy()
+
+
+def _unpacked(
+    target: Stored,
+    means: Means,
+    lit: tuple[str, ...],
+    rejected: float,
+    frames: tuple[int, ...],
+) -> Accumulated:
+    passes = list(means.passes)
+    alpha = passes.pop()[..., 0] if target.picture.shape[1] % 3 else None
+    *radiance, albedo, normal = passes
+    light = dict(zip(lit, means.parts, strict=True))
+    dark = np.zeros((*target.shape, 3), np.float32)
+    return Accumulated(
+        radiance[0] if radiance else None,
+        albedo,
+        normal,
+        alpha,
+        means.samples,
+        rejected,
+        frames,
+        {name: light.get(name, dark) for name in target.parts},
+    )
+
+
+def same_shot(target: Stored, others: Sequence[Stored]) -> list[Stored]:
+    """Return those of `others`, in their order, with no cut between them and `target`.
+
+    The views of one moment, as of a stereo pair, belong to the same shot.
+    """
+    cameras = {frame.number: frame.camera for frame in (*others, target)}
+    numbers = {target.number}
+    for step in (1, -1):
+        number = target.number
+        beyond = [n for n in cameras if (n - number) * step > 0]
+        for after in sorted(beyond, key=lambda n: n * step):
+            if is_shot_cut(cameras[number], cameras[after]):
+                break
+            numbers.add(after)
+            number = after
+    return [frame for frame in others if frame.number in numbers]

@@ -1,0 +1,400 @@
+"""One frame's samples: as rendered, and packed as a window stores them.
+
+Arrays are float32 (H, W, C), row 0 on top, radiance scene-linear. World space is the
+renderer's; a camera looks along its own -Z with X to the right and Y up (OpenGL,
+Blender). Pixel (0, 0) of an array covers [0, 1) in both directions, so that its centre
+lies at (0.5, 0.5); y grows downwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..arrays import LARGEST_HALF
+from ..errors import PictureError
+from ..native import structures
+from ..native.library import Arrays, bands, in_threads, library
+from .camera import SKY_DEPTH, Camera
+from .local_filters import extreme, find_rims
+from .noise import Noise, guide_factor, light_factor
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from ..arrays import Array
+
+    Passes = tuple[Array | None, Array, Array, Array | None]
+    Mask = NDArray[np.bool_]
+    from .noise import Noise
+
+    Matrix = NDArray[np.float64]
+
+
+_TINY = np.float32(1e-9)
+
+
+@dataclass(frozen=True)
+class Halves:
+    """The two half buffers of a frame; float32, the first axis is the half.
+
+    `radiance`, `albedo`, `normal` (2, H, W, 3) and `alpha` (2, H, W), or None, are as
+    in `Frame`, which holds the means of both. The halves are two subsets of one sample
+    sequence, or have two seeds. `shares` are their shares of the samples; `counts`
+    (2, H, W) their samples in each pixel, where they differ.
+    """
+
+    radiance: Array
+    albedo: Array
+    normal: Array
+    alpha: Array | None = None
+    shares: tuple[float, float] = (0.5, 0.5)
+    counts: Array | None = None
+
+    def share(self) -> Array:
+        """Return the first half's share of the samples: (H, W), or one number."""
+        if self.counts is None:
+            return np.asarray(self.shares[0], np.float32)
+        one, two = self.counts
+        return np.where(one > 0.0, one / np.maximum(one + two, _TINY), 0.0)
+
+    def mean(self, name: str) -> Array | None:
+        """Return the mean of both halves of a pass by its name."""
+        halves = getattr(self, name)
+        if halves is None:
+            return None
+        share = self.share()
+        if halves.ndim == 4:
+            share = share[..., None]
+        return np.asarray(halves[0] * share + halves[1] * (np.float32(1.0) - share))
+
+
+_SEED = 7
+
+
+def pack(
+    radiance: Array | None, albedo: Array, normal: Array, alpha: Array | None
+) -> tuple[NDArray[np.float16], Mask]:
+    """Return `Stored.picture` of passes as in `Frame`, and its invalid pixels (H W)."""
+    packing = _Packing((radiance, albedo, normal, alpha))
+    packing.run()
+    return packing.picture, packing.invalid
+
+
+def pack_with_noise(
+    passes: Passes, samples: float, halves: Halves | None
+) -> tuple[NDArray[np.float16], Mask, Noise]:
+    """Return the same of a frame with radiance, and its noise, 0 at invalid pixels.
+
+    The noise is that of its `halves`, where there are any.
+    """
+    packing = _Packing(passes)
+    noise = packing.run_with_noise(samples, halves)
+    return packing.picture, packing.invalid, noise
+
+
+def pack_parts(parts: Mapping[str, Array]) -> dict[str, NDArray[np.float16] | None]:
+    """Return `Stored.parts`; a part is 0 where it is not finite, the picture stays."""
+    return {name: _packed_part(part) for name, part in parts.items()}
+
+
+def _packed_part(part: Array) -> NDArray[np.float16] | None:
+    packed, has_any = _to_halves(part, keeps_infinities=False)
+    return packed if has_any else None
+
+
+def pack_vectors(vector: Array) -> NDArray[np.float16]:
+    """Return (H W, 4); infinite beyond half's range, where vectors are useless."""
+    return _to_halves(vector, keeps_infinities=True)[0]
+
+
+def pack_counts(counts: Array) -> NDArray[np.float16]:
+    """Flat, in half floats; what is no count becomes 0."""
+    counts = np.nan_to_num(counts.ravel(), posinf=0.0, neginf=0.0)
+    return np.clip(counts, 0.0, LARGEST_HALF).astype(np.float16)
+
+
+class _Packing:
+    """One frame that the library packs."""
+
+    def __init__(self, passes: Passes) -> None:
+        radiance, albedo, normal, alpha = passes
+        self._arrays = Arrays()
+        self._shape = height, width = normal.shape[:2]
+        given = [x for x in (radiance, albedo, normal) if x is not None]
+        channels = 3 * len(given) + (alpha is not None)
+        if alpha is not None:
+            given.append(alpha[..., None])
+        self.picture = np.empty((height * width, channels), np.float16)
+        self.invalid = np.empty(height * width, np.bool_)
+        self._packing = structures.Packing(
+            count=len(given),
+            width=width,
+            height=height,
+            has_light=radiance is not None,
+            picture=self.picture.ctypes.data,
+            invalid=self.invalid.ctypes.data,
+        )
+        self._packing.passes[: len(given)] = [_pass(self._arrays, x) for x in given]
+
+    def run_with_noise(self, samples: float, halves: Halves | None) -> Noise:
+        """Pack, and return the noise: of halves, or of the pixels around each one."""
+        count = len(self.invalid)
+        noise = Noise(np.empty((count, 2), np.float16), np.empty(count, np.float16))
+        self._packing.guide_factor = guide_factor(samples)
+        self._packing.noise = noise.light.ctypes.data
+        self._packing.guide_noise = noise.guides.ctypes.data
+        if halves is not None:
+            self._packing.halves[:] = [_pass(self._arrays, x) for x in halves.radiance]
+            share = halves.share()
+            if share.ndim:
+                self._packing.shares = self._arrays.at(share, np.float32, count)
+            else:
+                self._packing.share = share
+        else:
+            # the sign of a difference is random, as it would be between halves
+            signs = np.random.default_rng(_SEED).integers(0, 2, count, np.uint8)
+            self._packing.signs = self._arrays.at(signs, np.uint8, count)
+            self._packing.light_factor = light_factor(samples)
+        self.run()
+        return noise
+
+    def run(self) -> None:
+        """Pack."""
+
+        def work(rows: tuple[int, int]) -> None:
+            size = library().packing_bytes(self._packing, rows[1] - rows[0])
+            scratch = np.empty(size, np.uint8)
+            library().pack(self._packing, *rows, scratch.ctypes.data)
+
+        in_threads(work, bands(self._shape[0]))
+
+
+def _to_halves(
+    picture: Array, keeps_infinities: bool
+) -> tuple[NDArray[np.float16], bool]:
+    """Return (H W, C), and whether any number in it is not 0."""
+    height, width, channels = picture.shape
+    packed = np.empty((height * width, channels), np.float16)
+    arrays = Arrays()
+    given = _pass(arrays, picture)
+
+    def work(rows: tuple[int, int]) -> int:
+        return int(
+            library().to_halves(
+                given, width, *rows, keeps_infinities, packed.ctypes.data
+            )
+        )
+
+    return packed, any(in_threads(work, bands(height)))
+
+
+def _pass(arrays: Arrays, picture: Array) -> structures.Pass:
+    """A picture (H, W, C) as the library takes it, whatever its strides."""
+    first, strides = arrays.strided(picture)
+    return structures.Pass(first, *strides, picture.shape[2])
+
+
+# Relative to the surface's depth: how far behind it an image lies at least. Less is
+# the slope of a surface, or the edge of something.
+_BEHIND = 0.04
+
+_PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
+
+_OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "counts": ()}
+
+_OPTIONAL |= {"path_length": ()}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame as the renderer returns it; its arrays are never changed.
+
+    `radiance` is None in a frame of guides alone: the guides then decide whether two
+    frames show the same. `number` is the frame's number: `vector` points to number - 1
+    and number + 1, and frames of one number show one moment (the views of a stereo
+    pair). `samples` per pixel weight the frame against others. `normal` is in camera
+    space, but with Z pointing away from the viewer, as in Cycles' `Denoising Normal`.
+    `depth` (H, W) is the distance of the first hit from the camera, along the camera's
+    axis (of a panorama along the ray), at each pixel's centre; infinite, or above 1e9,
+    without a hit.
+
+    `still` says that nothing at all moves or changes from frame to frame, not even
+    light: frames of equal cameras differ in their noise alone.
+
+    Optional: `alpha` (H, W); `vector` (H, W, 4), Cycles' Vector pass: the surface's
+    position one frame before minus its position now, then its position now minus the
+    one a frame later, in pixels, y upwards; without it all surfaces are assumed to
+    stand still. `counts` (H, W): samples of each pixel, where they differ; `samples` is
+    their mean. `halves` are the half buffers, from which noise is estimated better than
+    from the surrounding pixels. `path_length` (H, W): the way from the camera, through
+    mirrors and glass, to what albedo and normal show (Cycles' `Denoising Depth`).
+    `subset` is the number of the part that the frame has of a sequence that frames
+    share: two with the same have the same noise. None of a sequence of its own.
+    """
+
+    number: int
+    camera: Camera
+    radiance: Array | None
+    albedo: Array
+    normal: Array
+    depth: Array
+    samples: float = 1.0
+    alpha: Array | None = None
+    vector: Array | None = None
+    still: bool = False
+    counts: Array | None = None
+    halves: Halves | None = None
+    path_length: Array | None = None
+    parts: Mapping[str, Array] = field(default_factory=dict)
+    subset: int | None = None
+
+    def __post_init__(self) -> None:
+        shapes = _PASSES | _OPTIONAL
+        arrays = [(name, getattr(self, name), shapes[name]) for name in shapes]
+        arrays += [(name, part, (3,)) for name, part in self.parts.items()]
+        for name, array, channels in arrays:
+            if array is not None and array.shape != self.shape + channels:
+                raise PictureError(
+                    f"{name} of frame {self.number} has shape {array.shape} where its "
+                    f"normal requires {self.shape + channels}: give passes of one "
+                    "render"
+                )
+        if not self.samples > 0:
+            raise PictureError(
+                f"frame {self.number} has {self.samples} samples per pixel: give the "
+                "number it was rendered with"
+            )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(H, W) of every array."""
+        return self.normal.shape[0], self.normal.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class Stored:
+    """A frame as the window stores it: flat, packed, and free of NaN.
+
+    `picture` (H W, 6 to 10) holds radiance (not in a frame of guides alone), albedo,
+    normal and alpha (if any), in half floats to save memory. `inverse_depth` (H W) is
+    1 / depth, 0 without a hit; the depth itself for an orthographic camera; NaN where
+    unknown. `invalid` (H W) is the validity mask, negated: pixels that held NaN or
+    infinities and are 0 now; None if there were none. `counts` (H W): samples of each
+    pixel where they differ. `noise` is None in a frame of guides
+    alone. `image` (H W) is as `inverse_depth`, of the image that a mirror or glass
+    shows, NaN where there is none; None if there is none anywhere. `parts` (H W, 3), by
+    name, are light that the radiance is made of; None for one that is dark everywhere.
+    """
+
+    number: int
+    camera: Camera
+    shape: tuple[int, int]
+    samples: float
+    picture: NDArray[np.float16]
+    inverse_depth: Array
+    invalid: NDArray[np.bool_] | None = None
+    vector: NDArray[np.float16] | None = None
+    still: bool = False
+    counts: NDArray[np.float16] | None = None
+    noise: Noise | None = None
+    image: Array | None = None
+    parts: Mapping[str, NDArray[np.float16] | None] = field(default_factory=dict)
+
+    @property
+    def has_light(self) -> bool:
+        """Whether there is radiance before albedo and normal."""
+        return self.picture.shape[1] >= 9
+
+    @property
+    def normals(self) -> slice:
+        """The channels of `picture` with normals; albedo lies before them."""
+        return slice(6, 9) if self.has_light else slice(3, 6)
+
+    @cached_property
+    def rims(self) -> NDArray[np.uint8]:
+        """(H W): pixels next to a nearer surface, some of whose light they contain.
+
+        0, or 1 + which of the 3x3 pixels around has the nearest surface.
+        """
+        return find_rims(self.inverse_depth, self.shape, self.camera.orthographic)
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether no pixel has a sample, as in a reprojected placeholder."""
+        return self.invalid is not None and bool(self.invalid.all())
+
+    def shows_same(self, other: Stored) -> bool:
+        """Whether two frames differ in their noise alone."""
+        return self.still and other.still and self.camera.same(other.camera)
+
+
+def pack_frame(
+    frame: Frame,
+) -> tuple[NDArray[np.float16], NDArray[np.bool_], Noise | None]:
+    """Return `Stored.picture`, its invalid pixels, and the noise, 0 at these.
+
+    There is none of guides alone.
+    """
+    passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
+    if frame.radiance is None:
+        return *pack(*passes), None
+    return pack_with_noise(passes, frame.samples, frame.halves)
+
+
+def store(frame: Frame) -> Stored:
+    """Pack a frame; pixels with NaN or infinities in any pass are invalid.
+
+    Values beyond +-65504, the largest half float, are clipped.
+    """
+    picture, invalid, noise = pack_frame(frame)
+    return Stored(
+        number=frame.number,
+        camera=frame.camera,
+        shape=frame.shape,
+        samples=frame.samples,
+        picture=picture,
+        inverse_depth=_inverse_depth(frame),
+        invalid=invalid if invalid.any() else None,
+        vector=None if frame.vector is None else pack_vectors(frame.vector),
+        still=frame.still,
+        counts=None if frame.counts is None else pack_counts(frame.counts),
+        noise=noise,
+        image=_image(frame),
+        parts=pack_parts(frame.parts),
+    )
+
+
+def _inverse_depth(frame: Frame) -> Array:
+    """Return `Stored.inverse_depth`; NaN for a depth of NaN or below 0."""
+    depth = frame.depth.ravel().astype(np.float32)
+    sky = depth > SKY_DEPTH
+    if frame.camera.orthographic:
+        # an orthographic camera sees the sky in one direction only: nothing to track
+        return np.where(sky, np.float32(np.nan), depth)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse_depth = np.where(
+            depth > 0.0, np.float32(1.0) / depth, np.float32(np.nan)
+        )
+    inverse_depth[sky] = 0.0
+    return inverse_depth
+
+
+def _image(frame: Frame) -> Array | None:
+    """Return `Stored.image`: where paths end well behind the surface they start at."""
+    if frame.path_length is None:
+        return None
+    depth = frame.depth
+    end = frame.path_length * frame.camera.depth_per_length(frame.shape)
+    with np.errstate(over="ignore", invalid="ignore"):
+        behind = end > extreme(depth, np.fmax) * np.float32(1.0 + _BEHIND)
+        behind &= (depth > 0.0) & (end < SKY_DEPTH)
+    if not behind.any():
+        return None
+    image = np.where(behind, end, np.float32(np.nan)).ravel()
+    return image if frame.camera.orthographic else np.float32(1.0) / image

@@ -1,0 +1,270 @@
+"""AOVs and light passes: what renderers call them, which a file holds, their light."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from fnmatch import fnmatchcase
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..errors import UsageError
+from ..exr.channels import Channels
+
+_SHIPPED = Path(__file__).with_name("renderers.toml")
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """A pass of light under one of its `names`; light is the pass times `colour`.
+
+    That is the pass it was divided by, under one of its names; () where there is none.
+    """
+
+    names: tuple[str, ...]
+    colour: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Renderer:
+    """The passes of light of one renderer.
+
+    `lobes` add up to the picture. So do `groups`, patterns in which * stands for
+    anything; what is `alone` adds up to nothing.
+    """
+
+    name: str
+    lobes: tuple[Lobe, ...] = ()
+    groups: tuple[str, ...] = ()
+    alone: tuple[str, ...] = ()
+
+
+def read_renderers(path: Path | None = None) -> tuple[Renderer, ...]:
+    """Return the renderers of a TOML file, before the known ones.
+
+    `renderers.toml` beside this module shows its form. Raises UsageError, with what is
+    wrong and where, for a file that has another.
+    """
+    return (_read(path) if path is not None else ()) + _shipped()
+
+
+@cache
+def _shipped() -> tuple[Renderer, ...]:
+    return _read(_SHIPPED)
+
+
+def _read(path: Path) -> tuple[Renderer, ...]:
+    try:
+        found = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise UsageError(f"cannot read the passes in {path}: {error}") from error
+    return tuple(_renderer(path, name, each) for name, each in found.items())
+
+
+def _renderer(path: Path, name: str, given: Any) -> Renderer:
+    where = f"{path}: [{name}]"
+    _check_keys(where, given, {"lobes", "groups", "alone"})
+    lobes = given.get("lobes", [])
+    if not isinstance(lobes, list):
+        raise UsageError(f"{where} lobes: give a list of tables")
+    return Renderer(
+        name,
+        tuple(_lobe(where, each) for each in lobes),
+        _texts(f"{where} groups", given.get("groups", [])),
+        _texts(f"{where} alone", given.get("alone", [])),
+    )
+
+
+def _lobe(where: str, given: Any) -> Lobe:
+    _check_keys(f"{where} lobes", given, {"names", "colour"})
+    names = _texts(f"{where} lobes: names", given.get("names", []))
+    if not names:
+        raise UsageError(f"{where} lobes: a lobe without names")
+    return Lobe(names, _texts(f"{where} lobes: colour", given.get("colour", [])))
+
+
+def _check_keys(where: str, given: Any, known: set[str]) -> None:
+    if not isinstance(given, dict):
+        raise UsageError(f"{where} is no table")
+    if unknown := sorted(given.keys() - known):
+        raise UsageError(
+            f"{where} has {unknown[0]!r}, which is not among {', '.join(sorted(known))}"
+        )
+
+
+def _texts(where: str, given: Any) -> tuple[str, ...]:
+    texts = isinstance(given, list) and all(isinstance(x, str) and x for x in given)
+    if not texts:
+        raise UsageError(f"{where}: give a list of names")
+    return tuple(given)
+
+
+NONE, GROUPS, ALL = "none", "groups", "all"
+
+
+@dataclass(frozen=True)
+class LightPart:
+    """A pass of light: its `channels` R, G, B, and those of the `colour` it is over.
+
+    `colour` is () where the pass is light as it is. Parts of one `sum` add up to the
+    picture; "" adds up to nothing. `names` are all that it is known by.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    colour: tuple[str, ...] = ()
+    sum: str = ""
+    names: tuple[str, ...] = ()
+
+    @property
+    def colour_name(self) -> str:
+        """Name of the colour among what is gathered; no part is called so."""
+        return f"{self.colour[0]}, colour" if self.colour else ""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which parts are wanted: NONE, GROUPS, ALL, or names.
+
+    `alone` are names of further passes of light, which add up to nothing.
+    """
+
+    which: tuple[str, ...] = (NONE,)
+    alone: tuple[str, ...] = ()
+    renderers: tuple[Renderer, ...] = field(default_factory=read_renderers)
+
+    def __bool__(self) -> bool:
+        return self.which != (NONE,) or bool(self.alone)
+
+
+def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPart, ...]:
+    """Return the wanted parts of one layer of a file, and of what has no layer.
+
+    Raises UsageError for names that the file does not have.
+    """
+    if not wanted:
+        return ()
+    passes = _passes(channels, layer)
+    known = max((_of(x, passes) for x in wanted.renderers), key=len)
+    named = {name: part for part in known for name in part.names}
+    found: list[LightPart] = []
+    for which in wanted.which:
+        if which == GROUPS:
+            found += [part for part in known if part.sum == GROUPS]
+        elif which == ALL:
+            found += known
+        elif which != NONE:
+            found.append(_named(channels, which, named, known))
+    for name in wanted.alone:
+        if name not in passes:
+            raise _unknown(channels, name, passes)
+        found.append(LightPart(name, passes[name], names=(name,)))
+    return tuple({part.channels: part for part in found}.values())
+
+
+def _passes(channels: Channels, layer: str) -> dict[str, tuple[str, ...]]:
+    """The channels of all colours in a layer, or in none, by the passes' names."""
+    ahead = f"{layer}." if layer else ""
+    prefixes = sorted({name.rpartition(".")[0] for name in channels.names})
+    found = ((prefix, channels.of(prefix, ("RGB", "rgb"))) for prefix in prefixes)
+    return {
+        prefix.removeprefix(ahead): tuple(names)
+        for prefix, names in found
+        if names and prefix and (prefix.startswith(ahead) or "." not in prefix)
+    }
+
+
+def _of(renderer: Renderer, passes: dict[str, tuple[str, ...]]) -> list[LightPart]:
+    """The parts that a renderer would have written."""
+    parts = []
+    for lobe in renderer.lobes:
+        name = _first(lobe.names, passes)
+        colour = _first(lobe.colour, passes)
+        if name and (colour or not lobe.colour):
+            over = passes[colour] if colour else ()
+            parts.append(LightPart(name, passes[name], over, "lobes", lobe.names))
+    taken = {part.name for part in parts}
+    for name, channels in passes.items():
+        if any(fnmatchcase(name, x) for x in renderer.groups) and name not in taken:
+            group = (name, *(_short(name, x) for x in renderer.groups))
+            parts.append(LightPart(name, channels, (), GROUPS, group))
+        elif name in renderer.alone:
+            parts.append(LightPart(name, channels, names=(name,)))
+    return parts
+
+
+def _first(names: Sequence[str], passes: Collection[str]) -> str:
+    return next((name for name in names if name in passes), "")
+
+
+def _short(name: str, pattern: str) -> str:
+    """The light group's own name."""
+    return name.removeprefix(pattern.rstrip("*"))
+
+
+def _named(
+    channels: Channels,
+    name: str,
+    named: dict[str, LightPart],
+    known: Sequence[LightPart],
+) -> LightPart:
+    exact = next((part for part in known if part.name == name), None)
+    part = exact or named.get(name)
+    if part is None:
+        raise _unknown(channels, name, [x.name for x in known])
+    return part
+
+
+def _unknown(channels: Channels, name: str, known: Collection[str]) -> UsageError:
+    there = ", ".join(sorted(known)) or "none"
+    return UsageError(f"{channels.path} has no light {name!r}; it holds {there}")
+
+
+def light_of(
+    parts: Sequence[LightPart], read: Callable[[tuple[str, ...]], Array]
+) -> dict[str, Array]:
+    """Return the light of each part (H, W, 3), by its name, and the colours by theirs.
+
+    `read` gives the pixels of three channels.
+    """
+    light: dict[str, Array] = {}
+    for part in parts:
+        pixels = read(part.channels)
+        if part.colour:
+            if part.colour_name not in light:
+                light[part.colour_name] = read(part.colour)
+            with np.errstate(over="ignore", invalid="ignore"):
+                pixels = pixels * light[part.colour_name]
+        light[part.name] = pixels
+    return light
+
+
+def passes_of(
+    parts: Sequence[LightPart], light: Mapping[str, Array]
+) -> dict[tuple[str, ...], Array]:
+    """Return the pixels of each part's channels, and of the colours'.
+
+    `light` is as `light_of` returns it.
+    """
+    found: dict[tuple[str, ...], Array] = {}
+    for part in parts:
+        pixels = light[part.name]
+        if part.colour:
+            colour = found[part.colour] = light[part.colour_name]
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                pixels = np.where(colour > 0.0, pixels / colour, np.float32(0.0))
+        found[part.channels] = pixels
+    return found
+
+
+def passes_by_name(
+    parts: Sequence[LightPart], light: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Return as `passes_of`, by the names of the passes."""
+    found = passes_of(parts, light)
+    return {channels[0].rpartition(".")[0]: x for channels, x in found.items()}

@@ -1,0 +1,360 @@
+"""Rectangles of blocks that cover what a frame lacks: each costs a call of its own."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from .accumulation.accumulate import Accumulated, accumulate, sample_counts
+from .accumulation.local_filters import BLOCK, block_means, box, extreme
+from .denoising.light_sums import added_up, completed, light_in
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Collection, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from .accumulation.frame import Stored
+    from .accumulation.object_motion import Movement
+    from .arrays import Array
+    from .denoising import Denoised, Denoiser
+    from .denoising.light_passes import LightPart
+
+
+Rectangle = tuple[slice, slice]
+"""Rows and columns."""
+
+
+def rectangles(
+    blocks: NDArray[np.bool_], call: float = 0.0, most: int = 4
+) -> list[Rectangle]:
+    """Return up to `most` rectangles of blocks that cover all that are marked.
+
+    The rectangle that gains most by it is divided in two, as long as that leaves out
+    a quarter of it, and more blocks than a `call` costs as much as.
+    """
+    found = [x for x in (_bounds(blocks),) if x is not None]
+    while found and len(found) < most:
+        splits = [(_split(blocks, each), each) for each in found]
+        (parts, gain), divided = max(splits, key=lambda x: x[0][1])
+        if not parts or gain < max(0.25 * _blocks_in(divided), call):
+            break
+        found.remove(divided)
+        found += parts
+    return found
+
+
+def _bounds(blocks: NDArray[np.bool_]) -> Rectangle | None:
+    rows, columns = (np.flatnonzero(blocks.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return None
+    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+
+
+def _split(blocks: NDArray[np.bool_], area: Rectangle) -> tuple[list[Rectangle], float]:
+    """Return the two bounds that cover the least, and how much they leave out."""
+    best: list[Rectangle] = []
+    gain = 0.0
+    for axis in (0, 1):
+        for place in range(area[axis].start + 1, area[axis].stop):
+            parts = []
+            for part in (slice(area[axis].start, place), slice(place, area[axis].stop)):
+                cut = (part, area[1]) if axis == 0 else (area[0], part)
+                inside = _bounds(blocks[cut])
+                if inside is not None:
+                    parts.append(_moved(inside, cut))
+            left_out = _blocks_in(area) - sum(map(_blocks_in, parts))
+            if len(parts) == 2 and left_out > gain:
+                best, gain = parts, left_out
+    return best, gain
+
+
+def _moved(inside: Rectangle, start: Rectangle) -> Rectangle:
+    rows, columns = (
+        slice(x.start + s.start, x.stop + s.start)
+        for x, s in zip(inside, start, strict=True)
+    )
+    return rows, columns
+
+
+def _blocks_in(rectangle: Rectangle) -> int:
+    rows, columns = rectangle
+    return int((rows.stop - rows.start) * (columns.stop - columns.start))
+
+
+# The accumulated picture has full weight from this many reused samples for each of the
+# frame's own, and this many in all: few samples say little.
+_ENOUGH, _IN_ALL = 1.0, 3.0
+
+# Where less is usual around a pixel, less is enough: a denoiser mistakes for detail
+# what has more noise than its neighbours. Full weight has what is not below the usual
+# over `_APART`. What is usual is the mean over `_USUAL` pixels across, the largest
+# within `_NEAR` of them.
+_APART, _USUAL, _NEAR = 1.5, 33, 24
+
+# What is missing in the 3x3 pixels around a pixel counts against it, times half of the
+# frame's samples, clipped to this range: the less noise there is, the more visible a
+# few noisy pixels are.
+_LEAST_FACTOR, _MOST_FACTOR = 1.0, 2.0
+
+_SMOOTH = 3  # pixels across
+
+# Beyond so many samples a denoiser bears what lacks samples along thin lines, as at
+# edges, where the frame alone would bring its noise back: a pixel to each side for each
+# doubling.
+_THICK = 4.0
+
+# Blocks that lack less than this on the mean, and lie beside none that lacks more, lose
+# nothing that is seen, and the frame alone is not denoised for them.
+_BEARABLE = 0.1
+
+_RAMP = 17  # pixels across, at the border of such blocks
+
+# The frame alone is denoised in parts where these are less than this much of it.
+_PART = 0.75
+
+AROUND = 96
+"""Pixels around a part that a denoiser's network sees."""
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A finished frame.
+
+    `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of
+    `accumulated`, or the requested region of it; `seconds`: accumulate, denoise.
+    `parts` (H, W, 3) are those of its light, which add up to the picture, and the
+    colours, by name, as in `light_of`.
+    """
+
+    denoised: Denoised
+    accumulated: Accumulated
+    seconds: dict[str, float]
+    parts: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def picture(self) -> Array:
+        """Radiance and alpha, where there is one: (H, W, 3) or (H, W, 4)."""
+        return self.denoised.radiance
+
+    def within(self, region: Rectangle) -> Finished:
+        """The same of a part of what was denoised."""
+        picture = replace(self.denoised, radiance=self.picture[region])
+        return replace(self, denoised=picture, parts=_cropped(self.parts, region))
+
+
+def finish_frame(
+    own: Stored,
+    neighbours: Sequence[Stored],
+    denoiser: Denoiser,
+    movement: Movement,
+    progress: Callable[[float], bool] | None = None,
+    *,
+    region: tuple[slice, slice] | None = None,
+    accumulated: Accumulated | None = None,
+    light: Sequence[LightPart] = (),
+) -> Finished:
+    """Accumulate the samples of `neighbours` on a frame and denoise it.
+
+    Where a frame has few samples, and few are reused, the picture is that of the frame
+    alone, also denoised: next to pixels of many samples a denoiser mistakes the noise
+    of few for detail. Where that is a small part of the picture, that part alone is
+    denoised again.
+    `region`, rows and columns, is the part to denoise: black around a crop would give
+    the denoiser a wrong exposure. `movement` is that of the shot; `accumulated` is the
+    frame with its neighbours if it is known already; `light` are the parts that are
+    denoised as well. Raises Cancelled if `progress` requests it.
+    """
+    started = time.perf_counter()
+    if accumulated is None:
+        accumulated = accumulate(own, neighbours, movement)
+    region = region or (slice(None), slice(None))
+    areas: list[_Area] = []
+    if neighbours:
+        share = _share(accumulated, own)[region]
+        areas = _lacking(share)
+    denoise_started = time.perf_counter()
+    parts = 1 + len(areas)
+    passes = _Passes.of(accumulated, light, region)
+    told = [_part(progress, number, parts) for number in range(parts)]
+    denoised = passes.denoised(denoiser, told[0])
+    if areas:
+        alone = _filled(accumulate(own, []), accumulated)
+        lacking = _Passes.of(alone, light, region, like=denoised.parts)
+        mixed = denoised.radiance.copy()
+        for area, done in zip(areas, told[1:], strict=True):
+            single = lacking.within(area.around).denoised(denoiser, done)
+            weight = share[area.place][..., None]
+            pairs = [(mixed, single.radiance)]
+            pairs += [(x, single.parts[k]) for k, x in denoised.parts.items()]
+            for whole, part in pairs:
+                inner = part[area.within]
+                whole[area.place] = inner + (whole[area.place] - inner) * weight
+        denoised = replace(denoised, radiance=mixed)
+    names = dict.fromkeys(x.colour_name for x in light if x.colour)
+    colours = {x: completed(accumulated.parts[x][region]) for x in names}
+    found = colours | added_up(denoised.radiance, denoised.parts, light, colours)
+    seconds = {
+        "accumulate": denoise_started - started,
+        "denoise": time.perf_counter() - denoise_started,
+    }
+    return Finished(denoised, accumulated, seconds, found)
+
+
+def _share(accumulated: Accumulated, own: Stored) -> Array:
+    """Return (H, W) in [0, 1]: the weight of the accumulated picture.
+
+    It depends on how many samples are reused for each of the frame's `own`.
+    """
+    samples = own.samples
+    enough = np.float32(max(_ENOUGH, _IN_ALL / samples))
+    most = _APART * (1.0 + enough)
+    alone = sample_counts(own, slice(None), len(own.picture))
+    if own.invalid is not None:
+        alone[own.invalid] = 0.0
+    alone = alone.reshape(own.shape)
+    with np.errstate(divide="ignore", invalid="ignore"):  # where the frame has none
+        times = np.clip(accumulated.samples / alone, 1.0, most)
+    times = np.where(alone > 0.0, times, most).astype(np.float32)
+    usual = extreme(box(times, _USUAL), np.fmax, _NEAR)
+    reused = np.clip((times * most / usual - 1.0) / enough, 0.0, 1.0)
+    factor = np.float32(np.clip(samples / 2.0, _LEAST_FACTOR, _MOST_FACTOR))
+    around = 1.0 - factor * (1.0 - box(reused, _SMOOTH))
+    share = np.clip(np.minimum(reused, around), 0.0, 1.0)
+    share = np.clip(box(share, _SMOOTH), 0.0, 1.0)
+    share = _closed(share, max(round(np.log2(samples / _THICK)), 0))
+    return _where_much_lacks(share)
+
+
+def _closed(share: Array, reach: int) -> Array:
+    """Return a share (H, W) without low values that reach less far to each side."""
+    for smaller in (np.fmax, np.fmin):
+        for _ in range(reach):
+            share = extreme(share, smaller)
+    return share
+
+
+def _where_much_lacks(share: Array) -> Array:
+    """Return a share (H, W), 1 in blocks that lack little."""
+    lacking = block_means(1.0 - share) > _BEARABLE
+    if not lacking.any():
+        return np.ones_like(share)
+    blocks = extreme(lacking, np.logical_or)
+    if blocks.all():
+        return share
+    pixels = blocks.repeat(BLOCK, axis=0).repeat(BLOCK, axis=1)
+    pixels = pixels[: share.shape[0], : share.shape[1]].astype(np.float32)
+    inside = np.clip(2.0 * box(pixels, _RAMP) - 1.0, 0.0, 1.0)
+    return np.asarray(1.0 - (1.0 - share) * inside)
+
+
+class _Area(NamedTuple):
+    """A `place` of a picture, what is seen `around` it, and the place `within` that."""
+
+    place: Rectangle
+    around: Rectangle
+    within: Rectangle
+
+
+def _lacking(share: Array) -> list[_Area]:
+    """Where the frame alone is needed as well; nowhere if either picture is enough."""
+    if (share == share.flat[0]).all() and float(share.flat[0]) in (0.0, 1.0):
+        return []
+    blocks = rectangles(block_means(np.less(share, 1.0)) > 0.0)
+    areas = [_area(each, share.shape) for each in blocks]
+    if sum(share[x.around].size for x in areas) < _PART * share.size:
+        return areas
+    whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
+    return [_Area(whole, whole, whole)]
+
+
+def _area(blocks: Rectangle, shape: tuple[int, ...]) -> _Area:
+    place, around, within = [], [], []
+    for part, side in zip(blocks, shape, strict=True):
+        first, last = part.start * BLOCK, min(part.stop * BLOCK, side)
+        before = max(first - AROUND, 0)
+        place.append(slice(first, last))
+        around.append(slice(before, min(last + AROUND, side)))
+        within.append(slice(first - before, last - before))
+    return _Area(*((x[0], x[1]) for x in (place, around, within)))
+
+
+def _filled(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
+    """Return the frame alone, its pixels without samples filled by reused ones."""
+    holes = alone.samples == 0.0
+    if not holes.any():
+        return alone
+
+    def fill(one: Array | None, two: Array | None) -> Array | None:
+        if one is None or two is None:
+            return None
+        return np.where(holes if one.ndim == 2 else holes[..., None], two, one)
+
+    albedo = fill(alone.albedo, accumulated.albedo)
+    normal = fill(alone.normal, accumulated.normal)
+    assert albedo is not None
+    assert normal is not None
+    return replace(
+        alone,
+        radiance=fill(alone.radiance, accumulated.radiance),
+        albedo=albedo,
+        normal=normal,
+        alpha=fill(alone.alpha, accumulated.alpha),
+        parts={
+            name: np.where(holes[..., None], accumulated.parts[name], part)
+            for name, part in alone.parts.items()
+        },
+    )
+
+
+class _Passes(NamedTuple):
+    """What is denoised: radiance, with alpha where there is one, guides, and parts."""
+
+    noisy: Array
+    albedo: Array
+    normal: Array
+    parts: dict[str, Array]
+
+    @classmethod
+    def of(
+        cls,
+        frame: Accumulated,
+        light: Sequence[LightPart],
+        region: tuple[slice, slice],
+        like: Collection[str] | None = None,
+    ) -> _Passes:
+        """Those of a region of a frame; `like` as in `light_in`."""
+        noisy = frame.radiance
+        assert noisy is not None
+        parts = light_in(noisy, frame.parts, light, like)
+        if frame.alpha is not None:
+            noisy = np.dstack((noisy, frame.alpha))
+        return cls(noisy, frame.albedo, frame.normal, parts).within(region)
+
+    def within(self, region: tuple[slice, slice]) -> _Passes:
+        """Those of a region."""
+        noisy, albedo, normal = (np.ascontiguousarray(x[region]) for x in self[:3])
+        return _Passes(noisy, albedo, normal, _cropped(self.parts, region))
+
+    def denoised(
+        self, denoiser: Denoiser, progress: Callable[[float], bool] | None
+    ) -> Denoised:
+        return denoiser(*self[:3], parts=self.parts, progress=progress)
+
+
+def _cropped(
+    passes: Mapping[str, Array], region: tuple[slice, slice]
+) -> dict[str, Array]:
+    return {name: np.ascontiguousarray(x[region]) for name, x in passes.items()}
+
+
+def _part(
+    progress: Callable[[float], bool] | None, number: int, parts: int
+) -> Callable[[float], bool] | None:
+    """Return a callback that reports the progress of one of equal parts."""
+    if progress is None or parts == 1:
+        return progress
+    return lambda done: progress((number + done) / parts)

@@ -1,0 +1,1 @@
+"""How many samples the next frame of a shot takes, found out as it is rendered."""

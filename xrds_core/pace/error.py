@@ -1,0 +1,167 @@
+"""How many samples a frame needs beside its neighbours' for the error of more.
+
+A frame of few samples, accumulated and denoised, is as good as a frame alone of more.
+How many more is measured without a reference: for two independent renders a, b that a
+picture was not made of, the mean of (picture - a)(picture - b) is its squared error,
+without bias. From there on it is enough to count what neighbours add, where there is
+noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..accumulation.accumulate import sample_counts
+from ..accumulation.local_filters import block_means, box
+from ..accumulation.noise import luminance
+from ..arrays import floats
+from .worth import FALL, Ratio
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from ..accumulation.accumulate import Accumulated
+    from ..accumulation.frame import Stored
+    from ..arrays import Array
+
+
+# Share of the blocks, those with most noise, that an error is not measured in.
+_NOISIEST = 0.01
+
+_DARKEST = 0.02  # of the mean luminance, added to the light of each channel
+
+_SMOOTH = 7  # pixels across
+
+_SEEN = 3  # pixels across: the light that an error is relative to
+
+# Standard deviation of noise that nobody sees, of the square root of luminance and
+# relative to it: 0.2 % of the light.
+_UNSEEN = 1e-3
+
+_TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """One frame's samples as rendered (H, W, 3), and denoised by themselves."""
+
+    noisy: Array
+    denoised: Array
+
+
+def error_ratio(
+    picture: Array,
+    noisy: Array,
+    parts: tuple[Rendered, Rendered],
+    exposure: float = 1.0,
+    share: float = 0.5,
+) -> Ratio:
+    """Return the squared error of a picture over that of a frame of all samples.
+
+    `parts` are a `share` of all samples each, of seeds of their own; `picture`
+    (H, W, 3) and `noisy`, the mean of samples that the parts do not have either, were
+    made without them. All are radiance. Errors count as they are seen: relative to the
+    local light of their channel, and less where it is beyond white, 1 / `exposure`. The
+    ratio is infinite where noise hides the error of all samples.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
+        ours, one = _errors(picture, noisy, parts, exposure)
+        return Ratio(*_ratio(ours, one * share**FALL))
+
+
+def _errors(
+    picture: Array, noisy: Array, parts: tuple[Rendered, Rendered], exposure: float
+) -> tuple[Array, Array]:
+    """Return the errors of the picture and of one of the parts, by blocks.
+
+    An error by two noisy renders has the product of their noises in it. So the
+    picture's is that of a part, and their difference by one render.
+    """
+    one, two = parts
+    shown = (picture + one.denoised + two.denoised) / 3
+    dark = max(float(np.nan_to_num(luminance(shown)).mean()) * _DARKEST, _TINY)
+    light = [box(np.nan_to_num(shown[..., i]), _SEEN) for i in range(3)]
+    bright = np.maximum(np.stack(light, axis=-1), 0.0) + np.float32(dark)
+    pressed = 1.0 + bright * np.float32(exposure)  # tones beyond white
+    scale = np.nan_to_num(1.0 / (bright * pressed**2), posinf=0.0)
+
+    def product(first: Array, second: Array) -> Array:
+        found = (first * second * scale).mean(-1)
+        return block_means(np.nan_to_num(found, posinf=0.0, neginf=0.0))
+
+    noise = product(one.noisy - two.noisy, one.noisy - two.noisy)
+    kept = noise <= np.quantile(noise, 1.0 - _NOISIEST)
+    half, more = np.zeros((2, *noise.shape))
+    for made, other in ((one.denoised, two.noisy), (two.denoised, one.noisy)):
+        apart = made - other
+        half += product(apart, made - noisy)
+        # the difference of two squares: noise counts once in it, and little
+        step = picture - made
+        more += product(step, step + 2.0 * apart)
+    half, more = half[kept] / 2, more[kept] / 2
+    return half + more, half
+
+
+def _ratio(one: Array, two: Array) -> tuple[float, float]:
+    """Return the ratio of two sums over blocks, and its standard error."""
+    whole = float(two.sum())
+    if whole <= 2.0 * _spread(two):
+        return float("inf"), 0.0
+    ratio = max(float(one.sum()), 0.0) / whole
+    # blocks that are hard to render are so both ways: what is left counts
+    return ratio, _spread(one - ratio * two) / whole
+
+
+def _spread(errors: Array) -> float:
+    """Return the standard error of a sum over blocks."""
+    return float(errors.std() * np.sqrt(max(errors.size, 1)))
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What neighbours bring to a frame, by blocks.
+
+    `errors` are what is left of each block's error, 1 where they bring nothing;
+    `noise` is the noise of its own samples, and `seen` whether it is ever visible.
+    """
+
+    errors: Array
+    noise: Array
+    seen: NDArray[np.bool_]
+
+    @property
+    def blocks(self) -> Array:
+        """How many times its own samples a block is worth; infinite without noise."""
+        return np.where(self.seen, self.errors ** (-1.0 / FALL), np.inf)
+
+    def of(self, blocks: NDArray[np.bool_]) -> float:
+        """How many times their own samples some blocks are worth together."""
+        error = float(np.average(self.errors[blocks], weights=self.noise[blocks]))
+        return float(max(error, _TINY) ** (-1.0 / FALL))
+
+
+def gain(accumulated: Accumulated, own: Stored, lent: float = 1.0) -> Gain:
+    """Return what a frame of its own samples has gained by accumulation.
+
+    It is what it would have gained if neighbours had lent `lent` times their samples.
+    Errors fall with `FALL`; the noise of a pixel is its weight.
+    """
+    noise = root_noise(own)
+    alone = sample_counts(own, slice(None), noise.size).reshape(own.shape)
+    reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(lent)
+    share = alone / np.maximum(alone + reused, _TINY)
+    weights, weighted = block_means(noise), block_means(noise * share**FALL)
+    assert own.noise is not None
+    light = np.square(floats(own.noise.brightness)).reshape(own.shape)
+    seen = weights > np.maximum(_UNSEEN**2 * block_means(light), 2.0 * _TINY)
+    return Gain(np.maximum(weighted / weights, _TINY), weights, seen)
+
+
+def root_noise(frame: Stored) -> Array:
+    """Return the noise (H, W) of a frame: the variance of the root of its luminance."""
+    assert frame.noise is not None
+    noise = np.square(floats(frame.noise.difference)).reshape(frame.shape)
+    return box(noise, _SMOOTH) + np.float32(_TINY)  # halves may agree by chance

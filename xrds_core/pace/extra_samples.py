@@ -1,0 +1,158 @@
+"""Samples that a frame gets beside its own, after its neighbours' were accumulated.
+
+From then on they are the frame's own: it lends them as well.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..accumulation.frame import pack, pack_counts, pack_parts
+from ..accumulation.noise import brightness
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..accumulation.accumulate import Accumulated
+    from ..accumulation.frame import Stored
+    from ..arrays import Array
+
+
+@dataclass(frozen=True)
+class ExtraSamples:
+    """Means over `samples` (H, W) more samples per pixel, 0 where there are none.
+
+    `radiance`, `albedo` and `normal` (H, W, 3), `alpha` (H, W) and `parts` are as in
+    `Frame`.
+    """
+
+    radiance: Array
+    albedo: Array
+    normal: Array
+    alpha: Array
+    samples: Array
+    parts: dict[str, Array] = field(default_factory=dict)
+
+
+def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
+    """Return the mean of several, weighted by their samples, which add up."""
+    total = np.sum([part.samples for part in parts], axis=0)
+    weights = [part.samples / np.maximum(total, np.float32(1e-9)) for part in parts]
+
+    def mean(values: Sequence[Array]) -> Array:
+        wide = (...,) + (None,) * (values[0].ndim - 2)
+        pairs = zip(values, weights, strict=True)
+        return np.sum([x * w[wide] for x, w in pairs], axis=0)
+
+    radiance, albedo, normal, alpha = (
+        mean([getattr(part, name) for part in parts])
+        for name in ("radiance", "albedo", "normal", "alpha")
+    )
+    light = {k: mean([part.parts[k] for part in parts]) for k in parts[0].parts}
+    return ExtraSamples(radiance, albedo, normal, alpha, total, light)
+
+
+def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
+    """Return a frame whose own samples are extra ones as well.
+
+    `alone` is the frame as accumulated without neighbours. `noise` stays that of the
+    samples which the frame had: the mean root of more samples is larger, and would be
+    other light beside frames that have fewer.
+    """
+    found = with_extra(alone, alone, extra)
+    rows = _rows(extra.samples)
+    width = frame.shape[1]
+    place = slice(rows.start * width, rows.stop * width)
+    picture = frame.picture.copy()
+    invalid = np.zeros(len(picture), bool)
+    if frame.invalid is not None:
+        invalid |= frame.invalid
+    light, alpha = (
+        None if x is None else x[rows] for x in (found.radiance, found.alpha)
+    )
+    guides = found.albedo[rows], found.normal[rows]
+    picture[place], invalid[place] = pack(light, *guides, alpha)
+    total = found.samples
+    is_even = bool((total == total.flat[0]).all())
+    noise = frame.noise
+    if noise is not None:
+        had = (alone.samples[rows] > 0.0).ravel().astype(np.float32)
+        noise = noise.within(had, brightness(extra.radiance[rows]).ravel(), place)
+    return replace(
+        frame,
+        samples=max(float(total.mean()), 1e-9),
+        counts=None if is_even else pack_counts(total),
+        picture=picture,
+        invalid=invalid if invalid.any() else None,
+        noise=noise,
+        parts=pack_parts(found.parts),
+    )
+
+
+def with_extra(
+    frame: Accumulated, alone: Accumulated, extra: ExtraSamples, worth: float = 1.0
+) -> Accumulated:
+    """Return a frame with extra samples; itself where these are not finite.
+
+    `alone` is the frame without its neighbours, whose samples count as `worth` of its
+    own.
+    """
+    rows = _rows(extra.samples)  # often few of many
+    usable = np.isfinite(extra.alpha[rows]) & (extra.samples[rows] > 0.0)
+    for part in (extra.radiance, extra.albedo, extra.normal):
+        usable &= np.isfinite(part[rows]).all(axis=-1)
+    neighbours = np.float32(worth)
+    counts = (
+        frame.samples[rows] * neighbours,
+        alone.samples[rows] * (np.float32(1.0) - neighbours),
+        np.where(usable, extra.samples[rows], np.float32(0.0)),
+    )
+    total = np.maximum(sum(counts), np.float32(1e-9))
+    shares = [(count / total).astype(np.float32) for count in counts]
+
+    def mean(*values: Array) -> Array:
+        whole = values[0]
+        wide = (...,) + (None,) * (whole.ndim - 2)
+        mixed = np.zeros_like(whole[rows])
+        for each, share in zip(values, shares, strict=True):
+            if share.any():
+                # NaN where there are no samples
+                mixed += np.where(share[wide] > 0.0, each[rows], 0.0) * share[wide]
+        return _with_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
+
+    def of(name: str) -> Array | None:
+        whole = getattr(frame, name)
+        return None if whole is None else mean(whole, *(getattr(x, name) for x in rest))
+
+    rest = alone, extra
+    albedo, normal = of("albedo"), of("normal")
+    assert albedo is not None
+    assert normal is not None
+    counted = np.where(usable, total, frame.samples[rows])
+    return replace(
+        frame,
+        radiance=of("radiance"),
+        albedo=albedo,
+        normal=normal,
+        alpha=of("alpha"),
+        parts={
+            name: mean(part, alone.parts[name], extra.parts[name])
+            for name, part in frame.parts.items()
+        },
+        samples=_with_rows(frame.samples, rows, counted),
+    )
+
+
+def _rows(samples: Array) -> slice:
+    """Return the rows from the first to the last one with samples."""
+    found = np.flatnonzero(samples.any(axis=1))
+    return slice(found[0], found[-1] + 1) if len(found) else slice(0, 0)
+
+
+def _with_rows(whole: Array, rows: slice, values: Array) -> Array:
+    found = whole.copy()
+    found[rows] = values
+    return found

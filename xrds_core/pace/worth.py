@@ -1,0 +1,134 @@
+"""What a sample of a neighbour is worth beside one of a frame's own, in a shot.
+
+It is measured in the first frame, again in the first one beyond its neighbours, in the
+20th, and then each time that the shot is twice as far: so chance counts less and
+less, and the seconds of measuring are soon a small part of the shot's. Where a small
+picture shows more chance than anything else, what other shots have shown counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import warn
+
+_SOON = 20  # frames; one of those before has all its neighbours
+
+# What is known before anything is measured: mean and standard deviation over the
+# choosing half of the gallery, 4 samples with neighbours against 16 without.
+_USUAL, _SPREAD = 0.45, 0.25
+
+# No ratio is better known than this, relative to it: errors do not fall quite with
+# `FALL`, nor does every measure of them see the same.
+_EXACT = 0.06
+
+_CAUTION = 0.16  # probability that it is worth less: the mean less its standard error
+
+FALL = 0.7
+"""The error of a denoised picture falls with about this power of its samples."""
+
+_STEPS = np.linspace(0.0, 1.0, 201)
+
+
+class Ratio(NamedTuple):
+    """The squared error of fewer samples with neighbours over that of all without.
+
+    `spread` is its standard error.
+    """
+
+    value: float
+    spread: float
+
+
+@dataclass
+class Worth:
+    """The worth, from 0 to 1, of the samples of neighbours in one shot."""
+
+    _likelihoods: list[np.ndarray] = field(default_factory=list)
+    _neighbours: int = 0
+    _frames: int = 0
+    _next: int = 1
+
+    def is_due(self, neighbours: int) -> bool:
+        """Count a frame; return whether it is to be measured in."""
+        self._frames += 1
+        more = neighbours >= 2 * max(self._neighbours, 1)
+        return self._frames >= self._next or more
+
+    def add(self, ratio: Ratio, share: float, gain: float, neighbours: int) -> None:
+        """Take in what was measured in a frame that has a `share` of all samples.
+
+        With its `neighbours` it has `gain` times its own. Fewer of them lie on one side
+        only, and are worth less: they no longer count.
+        """
+        if neighbours > self._neighbours:
+            self._likelihoods.clear()
+        self._neighbours = neighbours
+        self._next = max(2 * self._frames, _SOON)
+        if np.isfinite(ratio.value):
+            expected = (share * (1.0 + (gain - 1.0) * _STEPS)) ** -FALL
+            error = np.hypot(ratio.spread, _EXACT * expected)
+            away = (ratio.value - expected) / error
+            self._likelihoods.append(-0.5 * np.square(away) - np.log(error))
+
+    @property
+    def value(self) -> float:
+        """What it is at least, but for chance; 0 where noise has hidden all errors."""
+        if not self._likelihoods:
+            return 0.0
+        usual = -0.5 * np.square((_STEPS - _USUAL) / _SPREAD)
+        logarithms = usual + np.sum(self._likelihoods, axis=0)
+        below = np.cumsum(np.exp(logarithms - logarithms.max()))
+        return float(np.interp(_CAUTION, below / below[-1], _STEPS))
+
+
+_FRAMES = 5  # that are timed before anything is said
+
+_LATER = 1.1  # times Cycles' seconds, from which it is said
+
+
+@dataclass
+class Clock:
+    """Seconds of the frames of a shot, and what Cycles alone would take for them.
+
+    Cycles' denoiser takes about as long as ours for one picture: `denoising`.
+    """
+
+    denoising: float = 0.0
+    _last: float | None = None
+    _ours: list[float] = field(default_factory=list)
+    _theirs: list[float] = field(default_factory=list)
+    _is_said: bool = False
+
+    def leave_out(self, now: float) -> None:
+        """A frame was measured in, which takes longer than others.
+
+        Those before it had other samples than those that come, often more.
+        """
+        self._last = now
+        self._ours.clear()
+        self._theirs.clear()
+
+    def add(self, now: float, seconds: Mapping[str, float], share: float) -> None:
+        """Note a frame that took `seconds` by stage for a `share` of all samples.
+
+        One line is printed where frames take longer than Cycles would.
+        """
+        if self._last is not None:
+            sampling = seconds.get("beauty", 0.0) / share
+            self._ours.append(now - self._last)
+            self._theirs.append(seconds.get("sync", 0.0) + sampling + self.denoising)
+        self._last = now
+        ours, theirs = sum(self._ours), sum(self._theirs)
+        count = len(self._ours)
+        if count >= _FRAMES and ours > _LATER * theirs and not self._is_said:
+            self._is_said = True
+            warn(
+                f"Same Picture takes {ours / count:.3g} s a frame here, Cycles with "
+                f"its denoiser about {theirs / count:.3g} s: --plain is sooner, "
+                "and without Same Picture the picture is better"
+            )
