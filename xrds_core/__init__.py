@@ -1,4 +1,7 @@
-"""Guided super-resolution for path-traced pictures; no Blender needed.
+"""Final frames of path tracers, without Blender.
+
+Samples of a shot's frames are accumulated (`accumulation`) and denoised (`denoising`,
+`finish`); or few pixels are enlarged by a network (`superres`).
 
 Importing this package imports neither torch nor Blender: the public names are
 loaded on first use.

@@ -14,7 +14,7 @@ from .panel import messages
 
 
 class XRDSRender(bpy.types.RenderEngine):
-    """Cycles at low resolution, enlarged under full-resolution guides."""
+    """Cycles' samples, those of neighbouring frames as well, denoised or enlarged."""
 
     bl_idname = ENGINE
     bl_label = "XRDS"

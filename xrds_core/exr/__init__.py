@@ -1,7 +1,8 @@
-"""OpenEXR files in and out: passes as arrays, parts, headers.
+"""OpenEXR files in and out: passes as arrays, and whole shots.
 
-`render_passes` finds passes by name, `openexr_io` reads and writes files, `limits`
-bounds what the header of a hostile file may claim.
+`render_passes` finds passes by name, `openexr_io` reads and writes files, `raw_header`
+bounds what a hostile one may claim. `frame_file` reads a frame of a shot, `sequence`
+finishes all of them.
 """
 
 from __future__ import annotations

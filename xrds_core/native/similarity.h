@@ -1,4 +1,4 @@
-// How far the neighbours show what the frame itself shows: see `temporal/similarity.py`.
+// How far the neighbours show what the frame itself shows: see `accumulation/weighted_sums.py`.
 
 // An error below this many times what noise could explain is discounted.
 static const float UNSURE = 6.0f;

@@ -1,4 +1,4 @@
-// A first look at a neighbour, at some pixels of the frame: see `temporal/coarse_rejection.py`.
+// A first look at a neighbour, at some pixels of the frame: see `accumulation/coarse_rejection.py`.
 
 // Where the pixels `step` apart were, as if only the camera moved, whether they show the
 // same there, and whether they are in the neighbour at all.
