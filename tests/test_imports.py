@@ -21,8 +21,6 @@ ORDER = (
     "xrds_blender.command",
     "xrds_blender.interface",
     "xrds_blender.render",
-    "xrds_blender.choosing",
-    "xrds_blender.frame",
     "xrds_blender.cycles",
     "xrds_blender.scene",
     "xrds_blender.planning",

@@ -415,7 +415,7 @@ def test_a_signal_does_not_wait_for_c(tmp_path: Path, name: str, told: str) -> N
 STREAMS = """
 import os, signal, sys
 from pathlib import Path
-from xrds_blender.command import console, streams
+from xrds_blender.command import console
 signal.signal(signal.SIGPIPE, signal.SIG_DFL)  # as in a Blender program
 console.prepare()
 with open(sys.argv[1], "w") as picture:  # as any file that is opened afterwards

@@ -55,7 +55,7 @@ def test_a_folder_goes_first_and_is_forgotten_again(folder: Path) -> None:
     code = f"""
 import sys
 from pathlib import Path
-from xrds_blender.frame import torch_folder
+from xrds_blender.render import torch_folder
 before = list(sys.path)
 torch_folder.use(Path({str(folder)!r}))
 assert torch_folder.available().version == '2.9.1+cu128'

@@ -1,0 +1,255 @@
+"""How many files one value passes through: the walks of the source, counted.
+
+A walk follows a parameter of a function, and what is taken out of it, through every call
+that it is given to, in the order of the source; each function is entered once for each
+parameter. Where a method is called on an object of unknown class, all classes of the
+project that have a method of that name are entered. Counted are the files that are
+entered, and how often a call leads back into a file that the walk has left. Nothing is
+run: imports, definitions and calls are read.
+
+    python -m xrds_lab.pages.walks
+    python -m xrds_lab.pages.walks xrds_blender/render/shot.py render_shot scene
+"""
+
+from __future__ import annotations
+
+import ast
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+SHIPPED = ("xrds_core", "xrds_blender")
+WALKS = {
+    "a dependency graph through F12": (
+        "xrds_blender.interface.engine",
+        "XRDSRender.render",
+        "depsgraph",
+    ),
+    "a command's options": ("xrds_blender.command.render", "_render", "options"),
+    "a frame's passes to the picture": (
+        "xrds_blender.render.render",
+        "_finish",
+        "own",
+    ),
+}
+# Methods of Python's own types, which say nothing about ours.
+_COMMON = {
+    *("add", "append", "clear", "copy", "get", "items", "keys", "pop", "put", "read"),
+    *("update", "values", "write", "close", "mean", "sum", "index", "join", "set"),
+}
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@dataclass
+class _Module:
+    """A module: its functions by qualified name, and what its names mean."""
+
+    name: str
+    functions: dict[str, Function] = field(default_factory=dict)
+    classes: set[str] = field(default_factory=set)
+    names: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass
+class Walk:
+    """The files of a walk, in the order in which they are entered, with repetitions."""
+
+    stays: list[str] = field(default_factory=list)
+
+    def enter(self, module: str) -> None:
+        """Note that the walk is in a module now."""
+        if not self.stays or self.stays[-1] != module:
+            self.stays.append(module)
+
+    @property
+    def rooms(self) -> int:
+        """How many files it enters."""
+        return len(set(self.stays))
+
+    @property
+    def returns(self) -> int:
+        """How often it comes back to a file that it has left."""
+        return len(self.stays) - self.rooms
+
+
+@cache
+def modules() -> dict[str, _Module]:
+    """All shipped modules."""
+    paths = sorted(p for package in SHIPPED for p in (ROOT / package).rglob("*.py"))
+    return {module.name: module for module in map(_read, paths)}
+
+
+def _read(path: Path) -> _Module:
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    package = parts[:-1]
+    module = _Module(".".join(package if parts[-1] == "__init__" else parts))
+    tree = ast.parse(path.read_text("utf-8"))
+    for node in tree.body:
+        if isinstance(node, Function):
+            module.functions[node.name] = node
+        elif isinstance(node, ast.ClassDef):
+            module.classes.add(node.name)
+            for item in node.body:
+                if isinstance(item, Function):
+                    module.functions[f"{node.name}.{item.name}"] = item
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom):
+            base = node.module or ""
+            if node.level:
+                above = package[: len(package) - node.level + 1]
+                base = ".".join([*above, *([node.module] if node.module else [])])
+            for alias in node.names:
+                module.names[alias.asname or alias.name] = f"{base}.{alias.name}"
+    return module
+
+
+def walk(module: str, function: str, parameter: str) -> Walk:
+    """Follow a parameter of a function of a module."""
+    found = Walk()
+    _follow(found, set(), module, function, parameter)
+    return found
+
+
+def _follow(
+    found: Walk, seen: set[tuple[str, str, str]], place: str, name: str, value: str
+) -> None:
+    if (place, name, value) in seen:
+        return
+    seen.add((place, name, value))
+    module = modules()[place]
+    function = module.functions[name]
+    found.enter(place)
+    parts = _parts(function, value)
+    for call in _calls(function):
+        for target, owner in _targets(module, name, call):
+            for given in _given(modules()[target].functions[owner], call, parts):
+                _follow(found, seen, target, owner, given)
+
+
+def _calls(function: Function) -> Iterator[ast.Call]:
+    """The calls in a function, in the order of the source."""
+    calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
+    yield from sorted(calls, key=lambda call: (call.lineno, call.col_offset))
+
+
+def _parts(function: Function, value: str) -> set[str]:
+    """The names that hold a value, or what is taken out of it, in a function."""
+    held = {value}
+    for node in ast.walk(function):
+        pairs: list[tuple[ast.expr, ast.expr]] = []
+        if isinstance(node, ast.Assign):
+            pairs = [(target, node.value) for target in node.targets]
+        elif isinstance(node, ast.AnnAssign) and node.value is not None:
+            pairs = [(node.target, node.value)]
+        elif isinstance(node, ast.For | ast.comprehension):
+            pairs = [(node.target, node.iter)]
+        elif isinstance(node, ast.NamedExpr):
+            pairs = [(node.target, node.value)]
+        for target, source in pairs:
+            if _is_part(source, held):
+                held |= {x.id for x in ast.walk(target) if isinstance(x, ast.Name)}
+    return held
+
+
+def _is_part(node: ast.expr, held: set[str]) -> bool:
+    """Whether an expression is a held value, or is taken out of one."""
+    if isinstance(node, ast.Name):
+        return node.id in held
+    if isinstance(node, ast.Attribute | ast.Subscript | ast.Starred):
+        return _is_part(node.value, held)
+    if isinstance(node, ast.Tuple | ast.List):
+        return any(_is_part(item, held) for item in node.elts)
+    return False
+
+
+def _targets(module: _Module, within: str, call: ast.Call) -> list[tuple[str, str]]:
+    """The functions that a call may enter: (module, qualified name)."""
+    called = call.func
+    if isinstance(called, ast.Name):
+        if called.id in module.functions:
+            return [(module.name, called.id)]
+        if called.id in module.classes:
+            return _made(module.name, called.id)
+        return _imported(module.names.get(called.id, ""))
+    if not isinstance(called, ast.Attribute):
+        return []
+    if isinstance(called.value, ast.Name):
+        owner = called.value.id
+        if owner in {"self", "cls"}:
+            own = f"{within.partition('.')[0]}.{called.attr}"
+            if own in module.functions:
+                return [(module.name, own)]
+        elif owner in module.names:
+            return _imported(f"{module.names[owner]}.{called.attr}")
+    if called.attr in _COMMON or called.attr.startswith("__"):
+        return []
+    return [
+        (other.name, name)
+        for other in modules().values()
+        for name in other.functions
+        if name.endswith(f".{called.attr}")
+    ]
+
+
+def _imported(full: str) -> list[tuple[str, str]]:
+    """A function or class by its full name; of a package also what it hands on."""
+    place, _, name = full.rpartition(".")
+    for _ in range(3):
+        module = modules().get(place)
+        if module is None:
+            # a method of an imported class
+            above, _, owner = place.rpartition(".")
+            other = modules().get(above)
+            method = f"{owner}.{name}"
+            return [(above, method)] if other and method in other.functions else []
+        if name in module.functions:
+            return [(place, name)]
+        if name in module.classes:
+            return _made(place, name)
+        if name not in module.names:
+            return []
+        place, _, name = module.names[name].rpartition(".")
+    return []
+
+
+def _made(place: str, name: str) -> list[tuple[str, str]]:
+    made = f"{name}.__init__"
+    return [(place, made)] if made in modules()[place].functions else []
+
+
+def _given(function: Function, call: ast.Call, held: set[str]) -> Iterator[str]:
+    """The parameters that a call gives held values to."""
+    arguments = [*function.args.posonlyargs, *function.args.args]
+    if arguments and arguments[0].arg in {"self", "cls"}:
+        arguments = arguments[1:]
+    for argument, given in zip(arguments, call.args, strict=False):
+        if _is_part(given, held):
+            yield argument.arg
+    known = {x.arg for x in (*arguments, *function.args.kwonlyargs)}
+    for keyword in call.keywords:
+        if keyword.arg in known and _is_part(keyword.value, held):
+            yield keyword.arg
+
+
+def main() -> None:
+    """Print the walks, or one of a function that is named."""
+    sys.setrecursionlimit(10_000)
+    if given := sys.argv[1:]:
+        path, function, parameter = given
+        place = ".".join(Path(path).with_suffix("").parts)
+        found = walk(place, function, parameter)
+        print(f"{found.rooms} files, {found.returns} returns")
+        print(*dict.fromkeys(found.stays), sep="\n")
+        return
+    for name, start in WALKS.items():
+        found = walk(*start)
+        print(f"{name}: {found.rooms} files, {found.returns} returns")
+    print(f"{len(modules())} modules")
+
+
+if __name__ == "__main__":
+    main()
