@@ -18,7 +18,7 @@ OTHER_VENV := $(VENV)-bpy-$(OTHER_BPY)
 OTHER_RUN  := $(OTHER_VENV)/bin/python
 
 # Tests of what differs between Blenders: `make test` runs them on the second one, too.
-VERSIONS := interface/test_engine cycles/test_passes shot/test_features shot/test_full_size
+VERSIONS := interface/test_engine cycles/test_passes render/test_features render/test_full_size
 
 # The C core; what is installed anew compiles it, too.
 NATIVE  := xrds_core/native/lib/.compiled
@@ -34,7 +34,7 @@ $(NATIVE): $(SOURCES) | $(STAMP)
 	$(RUN) xrds_core/native/compile.py
 	touch $@
 
-$(STAMP): pyproject.toml setup.py xrds_lab/pyproject.toml
+$(STAMP): pyproject.toml setup.py blender_manifest.toml xrds_lab/pyproject.toml
 	test -x $(RUN) || $(PYTHON) -m venv $(VENV)
 	$(RUN) -m pip install --quiet "torch==$(TORCH)"
 	$(RUN) -m pip install --quiet --editable ".[blender,dev]" --editable ./xrds_lab "bpy==$(BPY)"

@@ -1,4 +1,6 @@
-"""The C core as a part of each build; all else is in pyproject.toml.
+"""The version and the C core of each build; all else is in pyproject.toml.
+
+The version stands in blender_manifest.toml alone.
 
 XRDS_PLATFORMS names the platforms that a wheel holds libraries for, as
 `linux-x64,windows-x64` or `all`; without it, it is the one that this runs on.
@@ -10,6 +12,7 @@ from __future__ import annotations
 import os
 import shutil
 import sys
+import tomllib
 from pathlib import Path
 from typing import ClassVar
 
@@ -95,7 +98,9 @@ def wanted() -> list[str]:
 
 
 try:
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text("utf-8"))
     setup(
+        version=manifest["version"],
         distclass=Compiled,
         cmdclass={"build": Build, "native": Native, "bdist_wheel": Wheel},
     )

@@ -28,7 +28,7 @@ from xrds_core.native.compile import chosen, compile_libraries
 
 ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = "blender_manifest.toml"
-PROJECT_FILES = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
+PROJECT_FILES = ("pyproject.toml", "setup.py", MANIFEST, "README.md", "LICENSE")
 PACKAGES = ("xrds_core", "xrds_blender")
 SIZE_LIMIT = 300_000_000  # bytes; what the extension platform means to take
 # Python inside Blender, and the Blenders that have it: from, to (not included).

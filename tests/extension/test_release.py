@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 import zipfile
 from hashlib import sha256
 from html.parser import HTMLParser
@@ -25,7 +26,7 @@ import build
 import release
 
 SITE = "https://xrds.example"
-VERSION = "0.1.0"
+VERSION = tomllib.loads((ROOT / build.MANIFEST).read_text("utf-8"))["version"]
 
 
 @pytest.fixture(scope="module")
