@@ -1,9 +1,9 @@
 """How many files one value passes through: the walks of the source, counted.
 
-A walk follows a parameter of a function, and what is taken out of it, through every call
-that it is given to, in the order of the source; each function is entered once for each
-parameter. Where a method is called on an object of unknown class, all classes of the
-project that have a method of that name are entered. Counted are the files that are
+A walk follows a parameter of a function, and what is taken out of it, through every
+call that it is given to, in the order of the source; each function is entered once for
+each parameter. Where a method is called on an object of unknown class, all classes of
+the project that have a method of that name are entered. Counted are the files that are
 entered, and how often a call leads back into a file that the walk has left. Nothing is
 run: imports, definitions and calls are read.
 
@@ -170,21 +170,15 @@ def _targets(module: _Module, within: str, call: ast.Call) -> list[tuple[str, st
     """The functions that a call may enter: (module, qualified name)."""
     called = call.func
     if isinstance(called, ast.Name):
-        if called.id in module.functions:
-            return [(module.name, called.id)]
-        if called.id in module.classes:
-            return _made(module.name, called.id)
-        return _imported(module.names.get(called.id, ""))
+        return _named(module, called.id)
     if not isinstance(called, ast.Attribute):
         return []
-    if isinstance(called.value, ast.Name):
-        owner = called.value.id
-        if owner in {"self", "cls"}:
-            own = f"{within.partition('.')[0]}.{called.attr}"
-            if own in module.functions:
-                return [(module.name, own)]
-        elif owner in module.names:
-            return _imported(f"{module.names[owner]}.{called.attr}")
+    owner = called.value.id if isinstance(called.value, ast.Name) else ""
+    if owner in module.names:
+        return _imported(f"{module.names[owner]}.{called.attr}")
+    own = f"{within.partition('.')[0]}.{called.attr}"
+    if owner in {"self", "cls"} and own in module.functions:
+        return [(module.name, own)]
     if called.attr in _COMMON or called.attr.startswith("__"):
         return []
     return [
@@ -195,25 +189,24 @@ def _targets(module: _Module, within: str, call: ast.Call) -> list[tuple[str, st
     ]
 
 
+def _named(module: _Module, name: str) -> list[tuple[str, str]]:
+    """A function or class of a module, or one that it imports."""
+    if name in module.functions:
+        return [(module.name, name)]
+    if name in module.classes:
+        return _made(module.name, name)
+    return _imported(module.names.get(name, ""))
+
+
 def _imported(full: str) -> list[tuple[str, str]]:
-    """A function or class by its full name; of a package also what it hands on."""
+    """A function, class or method by its full name, wherever it is imported from."""
     place, _, name = full.rpartition(".")
-    for _ in range(3):
-        module = modules().get(place)
-        if module is None:
-            # a method of an imported class
-            above, _, owner = place.rpartition(".")
-            other = modules().get(above)
-            method = f"{owner}.{name}"
-            return [(above, method)] if other and method in other.functions else []
-        if name in module.functions:
-            return [(place, name)]
-        if name in module.classes:
-            return _made(place, name)
-        if name not in module.names:
-            return []
-        place, _, name = module.names[name].rpartition(".")
-    return []
+    if place in modules():
+        return _named(modules()[place], name)
+    above, _, owner = place.rpartition(".")
+    method = f"{owner}.{name}"
+    known = above in modules() and method in modules()[above].functions
+    return [(above, method)] if known else []
 
 
 def _made(place: str, name: str) -> list[tuple[str, str]]:
