@@ -219,7 +219,7 @@ def network(monkeypatch: pytest.MonkeyPatch) -> list[NearestUpscaler]:
         made.append(NearestUpscaler(network.scale))
         return made[-1]
 
-    monkeypatch.setattr(loading, "_load", load)
+    monkeypatch.setattr(loading, "_load_network", load)
     return made
 
 

@@ -286,7 +286,7 @@ def test_missing_weights_end_f12_with_an_error_and_no_file(
     def load(*_: Any) -> None:
         raise WeightsError("no weights, on purpose")
 
-    monkeypatch.setattr(loading, "_load", load)
+    monkeypatch.setattr(loading, "_load_network", load)
     life.render.engine = "XRDS"
     life.render.filepath = str(tmp_path / "none.png")
     with pytest.raises(RuntimeError, match=r"^Error: no weights, on purpose\n$"):

@@ -150,7 +150,7 @@ def too_large(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: Any, **__: Any) -> None:
         raise OutOfMemory("cpu has too little memory")
 
-    monkeypatch.setattr(loading, "_load", lambda *_: fail)
+    monkeypatch.setattr(loading, "_load_network", lambda *_: fail)
 
 
 def test_too_little_memory_keeps_the_low_resolution_picture(

@@ -211,7 +211,7 @@ def test_nothing_is_promised_where_nothing_denoises(
     still_life: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(choose, "has_denoiser", lambda: False)
-    monkeypatch.setattr(choose.denoisers, "is_there", lambda: False)
+    monkeypatch.setattr(choose.loading, "has_library", lambda: False)
     with pytest.raises(XRDSError, match=r"has Open Image Denoise.*install XRDS"):
         render(still_life(64, 48), time_budget=5.0)
 
