@@ -331,7 +331,8 @@ class Stored:
 
     def shows_same(self, other: Stored) -> bool:
         """Whether two frames differ in their noise alone."""
-        return self.still and other.still and self.camera.same(other.camera)
+        same = self.camera.same(other.camera) and self.shape == other.shape
+        return self.still and other.still and same
 
 
 def pack_frame(

@@ -299,6 +299,19 @@ def test_where_nothing_moves_every_sample_counts() -> None:
     np.testing.assert_allclose(found.radiance[full], mean[full], rtol=1e-3, atol=1e-3)
 
 
+@pytest.mark.parametrize("is_part", [True, False])
+def test_where_nothing_moves_another_border_lends_what_it_shows(is_part: bool) -> None:
+    """It begins at the same pixel, so its camera is the same."""
+    shapes = (HEIGHT, WIDTH), (32, 40)
+    here, there = (
+        store(replace(view(n, camera(), shape=shape).frame, still=True))
+        for n, shape in enumerate(shapes if is_part else shapes[::-1])
+    )
+    inside = np.zeros(here.shape, bool)
+    inside[:32, :40] = True
+    assert np.array_equal(accumulate(here, [there]).samples > 1.5, inside)
+
+
 def test_where_nothing_moves_bad_pixels_lend_nothing() -> None:
     frames = [replace(view(n, camera()).frame, still=True) for n in (1, 2, 3)]
     frames[1].radiance[3, 4] = np.nan
