@@ -15,15 +15,13 @@ import numpy as np
 import pytest
 
 from xrds_blender import run_job
-from xrds_blender.command import main
 from xrds_blender.planning import budget
 from xrds_blender.planning.settings import Denoising, Mode, Network, Settings
 from xrds_core.errors import UsageError
-from xrds_core.native.library import processors
-from xrds_lab.bench import growth, inputs, low_budgets, measure, pictures, sweep, tasks
+from xrds_lab.bench import inputs, measure, pictures, sweep, tasks
 from xrds_lab.bench.bench import bench
 from xrds_lab.bench.crops import SHOWN
-from xrds_lab.bench.stages import PLAIN_FRAME, STAGES
+from xrds_lab.bench.stages import STAGES
 from xrds_lab.bench.sweep import Sweep
 from xrds_lab.bench.windows import find_shots
 
@@ -48,7 +46,6 @@ def few_modes(monkeypatch: pytest.MonkeyPatch) -> None:
         for name in ("DENOISERS", "LOW_DENOISING"):
             if hasattr(user, name):
                 monkeypatch.setattr(user, name, few)
-    monkeypatch.setattr(growth, "_core_counts", lambda: [processors()])
 
 
 class World:
@@ -81,12 +78,11 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
     # on a busy machine one stage may take many times what it takes on an idle one
     monkeypatch.setattr(measure, "MOST_OVER_BUDGET", 1e3)
     monkeypatch.setattr(sweep, "MOST_ADAPTIVE_SAMPLES", 30)
-    report = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
+    report = world.run(picker=True, budgets=(3.0,))
     out = world.folder / "out"
     assert report["failures"] == {}
     assert json.loads((out / "results.json").read_text()) == report
     _check_points(report)
-    _check_growth(report["growth"])
     _check_picker(report)
     with (out / "results.csv").open(newline="") as file:
         rows = list(csv.DictReader(file))
@@ -100,9 +96,8 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
         patch.setattr(pictures, "measured", refuse)
         patch.setattr(pictures.Pictures, "render", lambda *_: None)
         patch.setattr(tasks, "frame", refuse)
-        again = world.run(picker=True, budgets=(3.0,), growth=((32, 24), (64, 48)))
+        again = world.run(picker=True, budgets=(3.0,))
     assert again["points"] == report["points"]
-    assert again["growth"] == report["growth"]
     assert again["failures"] == {}
     # Nothing is left to foresee when the picker renders what nobody has rendered.
     more = world.run(picker=True, budgets=(3.0, 6.0))
@@ -149,15 +144,6 @@ def test_adaptive_sampling_stops_early_where_it_may(world: World) -> None:
     assert not np.array_equal(counted[1.0], fixed["radiance"])
 
 
-def _check_growth(report: dict[str, Any]) -> None:
-    sizes = {tuple(row["size"]) for row in report["rows"]}
-    assert sizes == {(32, 24), (64, 48)}
-    names = {row["task"] for row in report["rows"]}
-    assert {PLAIN_FRAME, "XRDS fast x4", "OIDN HIGH-ACCURATE alone"} <= names
-    assert all(row["seconds"] >= 0 for row in report["rows"])
-    assert report["break_even"]
-
-
 def _check_picker(report: dict[str, Any]) -> None:
     (entry,) = report["budgets"]
     assert entry["picker"]["label"].startswith(("OIDN", "XRDS"))
@@ -166,7 +152,7 @@ def _check_picker(report: dict[str, Any]) -> None:
 
 
 def _check_page(page: str, report: dict[str, Any]) -> None:
-    assert page.count("<svg") >= 4  # over all, same picture, of the scene, growth
+    assert page.count("<svg") >= 3  # over all, same picture, of the scene
     assert not re.search(r'(?:src|href)="(?!data:|#)', page)  # nothing beside it
     crops = re.search(r'class="crops">(.*?)</script>', page, re.DOTALL)
     assert crops is not None
@@ -210,22 +196,6 @@ def test_another_denoiser_is_measured_anew(
     report = world.run(timing=False)
     ours = [p for p in report["points"] if p["method"] == "full_size"]
     assert len(judged) == len(ours) > 0
-
-
-def test_budgets_below_a_sample_per_pixel(
-    world: World, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(low_budgets, "LOWERED", {4: (1, 4)})
-    monkeypatch.setattr(low_budgets, "ENLARGED", {2: (1,), 4: (1, 2), 8: (4,)})
-    out = world.folder / "low"
-    words = ["bench", str(world.scene), "--low-budgets", "--resolution", "64x48"]
-    words += ["--reference-samples", "2", "--rounds", "1", "--out", str(out)]
-    assert main.main(words) == 0
-    result = json.loads((out / "low_budgets.json").read_text())
-    assert result["failures"] == {}
-    assert {row["guides"] for row in result["rows"]} == {"rendered", "kept"}
-    lines = (out / "low_budgets.md").read_text().splitlines()
-    assert len(lines) == 2 + len(result["rows"])
 
 
 def test_the_pickers_model_is_written_and_can_be_read(world: World) -> None:

@@ -14,7 +14,6 @@ from PIL import Image
 
 from xrds_core import exr
 from xrds_core.errors import UsageError
-from xrds_core.superres import weights
 from xrds_core.superres.network import XRDS, preset_config
 from xrds_lab import metrics
 from xrds_lab.bench.evaluate import evaluate
@@ -22,7 +21,6 @@ from xrds_lab.bench.inputs import Folder, Request
 from xrds_lab.bench.journal import Strict
 from xrds_lab.bench.pictures import Networks, Pictures
 from xrds_lab.bench.rivals import ENLARGEMENTS
-from xrds_lab.bench.samples import samples_table
 from xrds_lab.bench.windows import find_shots
 from xrds_lab.weights import save_network
 
@@ -196,33 +194,3 @@ def test_rivals_are_timed_without_weights(world: World) -> None:
 def test_unknown_names_are_refused(world: World) -> None:
     with pytest.raises(UsageError, match="boat"):
         world.run(timing=True, timing_scenes=["floor", "boat"])
-
-
-def test_table_of_samples(world: World, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = world.folder / "networks"
-    folder.mkdir()
-    network = XRDS(preset_config("fast", 2))
-    save_network(network, folder / weights.file_name("fast", 2), {})
-    report = samples_table(
-        [world.scene],
-        windows=world.windows,
-        references=world.folder,
-        cache=world.cache,
-        weights=folder,
-        out=world.folder,
-    )
-    assert json.loads((world.folder / "samples.json").read_text()) == report
-    rows = {(r["method"], r["samples"], r["denoiser"]): r for r in report["records"]}
-    assert len(rows) == 5 + 2 * 4  # ours, two modes of OIDN
-    assert all(row["seconds"] > 0 for row in rows.values())
-    summary = report["summary"]
-    ours = rows["xrds", 16, "HIGH-ACCURATE"]
-    for mode, denoiser in (("default", "HIGH-ACCURATE"), ("fast", "FAST-FAST")):
-        theirs = rows["oidn", 4, denoiser]
-        cell = summary["over_oidn"][mode]["4"]
-        assert cell["gain"] == {"floor": ours["psnr"] - theirs["psnr"]}
-        assert cell["seconds"] == {"floor": ours["seconds"] / theirs["seconds"]}
-    few, some, many = summary["more_samples"]["floor"]
-    assert few < some < many + 1
-    shown = capsys.readouterr().err
-    assert f"{many - some:+.2f}" in shown or f"{some - few:+.2f}" in shown

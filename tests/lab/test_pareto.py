@@ -11,7 +11,7 @@ import pytest
 from xrds_blender.planning.settings import Denoising, Network
 from xrds_core.errors import Cancelled
 from xrds_core.native.library import processors
-from xrds_lab.bench import growth, machine, pareto, same_picture
+from xrds_lab.bench import machine, pareto, same_picture
 from xrds_lab.bench.inputs import OFF
 from xrds_lab.bench.journal import MOST_KILLS, Journal
 from xrds_lab.bench.stages import (
@@ -308,60 +308,3 @@ def test_peak_memory_is_of_the_task_alone() -> None:
     assert machine.peak() - before > megabytes << 19
     machine.forget_peak()
     assert machine.peak() - before < megabytes << 19
-
-
-# --- growth ---------------------------------------------------------------------------
-
-
-def row(task: str, pixels: int, cores: int, seconds: float) -> Any:
-    return {
-        "task": task,
-        "size": [pixels, 1],
-        "pixels": pixels,
-        "cores": cores,
-        "seconds": seconds,
-        "peak_memory": None,
-    }
-
-
-def test_exponents_are_found() -> None:
-    rows = [row("network", n, 2, 3e-6 * n**1.1) for n in (1000, 4000, 9000)]
-    (fit,) = growth.exponents([*rows, row("alone", 10, 2, 1.0)])
-    assert fit["seconds"] == pytest.approx(1.1)
-    assert fit["peak_memory"] is None
-
-
-def test_more_cores_are_extrapolated_and_marked() -> None:
-    rows = [row("network", 10, cores, 2 + 6 / cores) for cores in (1, 2)]
-    assert growth.seconds_on(rows, "network", 2) == 5
-    assert growth.seconds_on(rows, "network", 8) == pytest.approx(2.75)
-    assert growth.seconds_on(rows[:1], "network", 8) is None
-
-
-def test_break_even_sets_saved_against_paid() -> None:
-    name = "XRDS fast x2"
-    rows = []
-    for cores in (1, 2):
-        rows.append(row(PLAIN_FRAME, 10, cores, 40 / cores))
-        rows.append(row(f"whole frame, {name}, less the network", 10, cores, 8 / cores))
-        rows.append(row(name, 10, cores, 6 / cores))
-        rows.append(row("OIDN HIGH-ACCURATE alone", 10, cores, 30 / cores))
-        rows.append(row("OIDN HIGH-FAST alone", 10, cores, 2 / cores))
-    found = growth.break_even(rows, [NETWORK])
-    assert [(r["cores"], r["extrapolated"]) for r in found] == [
-        ("1", False),
-        ("2", False),
-        ("8", True),
-        ("32", True),
-    ]
-    assert found[2]["saved"] == pytest.approx(4)
-    assert found[2]["paid"] == pytest.approx(0.75)
-    assert found[1]["saved_quick"] == pytest.approx((40 - 30 + 2 - 8) / 2)
-
-
-@pytest.mark.parametrize("scene", ["plain", "cost $5 and $6", "a$^$b", r"a\$b$", "$"])
-def test_a_scene_may_have_any_name_in_a_plot(scene: str) -> None:
-    from xrds_lab.bench.plots import scene_plot
-
-    points = [point(1.0, 30.0, "xrds", scale=1), point(2.0, 31.0, "xrds", scale=1)]
-    assert b"<svg" in scene_plot(scene, points, 1.0, 40.0)

@@ -20,7 +20,6 @@ from PIL import Image
 
 from xrds_core.errors import Cancelled, UsageError, WeightsError
 from xrds_core.superres import weights
-from xrds_lab.training.ablations import TABLES, Changes, _run_name, ablate, lines
 from xrds_lab.training.config import TrainingConfig, read_config, to_toml
 from xrds_lab.training.data import Variation
 from xrds_lab.training.interruption import Interruption
@@ -447,52 +446,3 @@ def test_gain_is_over_the_better_enlargement_of_each_window() -> None:
     assert result["gains"] == {"rendered": -0.5, "shaded": -2.0}
     assert result["worst"] == {"rendered": -2.0, "shaded": -3.0}
     assert result["psnr"]["rendered"]["demodulated"] == 21.5
-
-
-# --- ablations ------------------------------------------------------------------------
-
-
-@undrawn
-def test_table_of_runs_that_differ_in_one_thing(
-    config: TrainingConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "run.toml").write_text(to_toml(config))
-    steps = ["steps = 2", "validate_every = 2"]
-    out = tmp_path / "tables"
-    result = ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps)
-    assert json.loads((out / "base.json").read_text()) == result
-    assert result["steps"] == 2
-    (pixels, kernels) = result["rows"].values()
-    for row in (pixels, kernels):
-        assert row["mean"] == pytest.approx(sum(row["psnr"]) / 2)
-        assert row["spread"] == abs(row["psnr"][0] - row["psnr"][1]) > 0
-    assert kernels["mean"] > pixels["mean"] + 3  # two steps teach nobody to paint
-    assert kernels["parameters"] != pixels["parameters"]
-    assert "kernels over" in "\n".join(lines(result))
-    monkeypatch.setattr("xrds_lab.training.train.Run.train_step", pytest.fail)
-    assert ablate(tmp_path / "run.toml", "base", out, seeds=2, changes=steps) == result
-
-
-def test_tables_share_runs_of_the_same_changes_only() -> None:
-    names: dict[str, set[Changes]] = {}
-    for variants in TABLES.values():
-        for changes in variants.values():
-            names.setdefault(_run_name(changes), set()).add(changes)
-    assert all(len(changes) == 1 for changes in names.values())
-
-
-@pytest.mark.parametrize("table", TABLES)
-def test_every_variant_of_a_table_is_a_configuration(
-    config: TrainingConfig, tmp_path: Path, table: str
-) -> None:
-    (tmp_path / "run.toml").write_text(to_toml(config))
-    found = [
-        read_config(tmp_path / "run.toml", changes)
-        for changes in TABLES[table].values()
-    ]
-    assert len({to_toml(variant) for variant in found}) == len(found)
-
-
-def test_unknown_table_is_named(config: TrainingConfig, tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="no table 'colours'; there are base, guides"):
-        ablate(tmp_path / "run.toml", "colours", tmp_path)

@@ -49,11 +49,9 @@ GROUP = "xrds.commands"
 LABORATORY = (
     "evaluate",
     "stability",
-    "plan-report",
     "bench",
     "dataset",
     "train",
-    "ablate",
     "train-filter",
 )
 

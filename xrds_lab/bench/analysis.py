@@ -15,7 +15,7 @@ from xrds_blender.planning.settings import (
     Settings,
 )
 
-from . import hindsight, pareto, same_picture
+from . import pareto, same_picture
 from .stages import PLAIN_FRAME, XRDS_FRAME, in_process_name
 from .sweep import DENOISERS, Config, xrds
 
@@ -90,8 +90,7 @@ def _budgets(
         }
         entry = {"scene": scene, "budget": multiple, "seconds": multiple * unit}
         pick = picks.get(f"{multiple:g}")
-        known = {"picker": pick, "hindsight": hindsight.best(pick, points)}
-        entries.append(entry | {"best": best} | known)
+        entries.append(entry | {"best": best, "picker": pick})
     return entries
 
 
@@ -154,9 +153,6 @@ def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
         return None
     ratios = [e["picker"]["seconds"]["total"] / e["seconds"] for e in made]
     gaps = [gap for e in made if (gap := _gap(e, None)) is not None]
-    missed = [
-        e["hindsight"]["psnr"] - e["picker"]["psnr"] for e in made if e["hindsight"]
-    ]
     behind = [
         {
             "budget": multiple,
@@ -172,8 +168,6 @@ def _picker(entries: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
         "ratios": ratios,
         "alike": _share_alike(gaps),
         "farthest_behind": max(gaps, default=None),
-        "alike_in_hindsight": _share_alike(missed),
-        "missed": max(missed, default=None),
         "budgets": behind,
     }
 

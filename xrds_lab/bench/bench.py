@@ -18,7 +18,6 @@ from xrds_core.progress import duration
 from ..csv_table import write_table
 from ..progress import report_line
 from . import analysis, machine, report, workload
-from .growth import growth as measure_growth
 from .inputs import Folder
 from .journal import Journal
 from .measure import SceneBench, Settings
@@ -48,7 +47,6 @@ def bench(
     rounds: int = ROUNDS,
     timing: bool = True,
     picker: bool = True,
-    growth: Sequence[tuple[int, int]] = (),
     noise_thresholds: Sequence[float] = NOISE_THRESHOLDS,
     coarse: bool = False,
     model: Path | None = None,
@@ -63,11 +61,11 @@ def bench(
     are as for `evaluate`; without them errors are of the whole frame, against the
     mean of two renders of `reference_samples` each. `resolution` replaces the
     files' own. `presets` None takes all whose weights are there. Without `timing`
-    only errors are measured. `growth` are frame sizes at which the first scene is
-    timed beside. `noise_thresholds` are of Cycles' adaptive sampling. `coarse` leaves
-    out what full size beats on every scene. `model` is where to write the picker's
-    model. `sweep` replaces what `presets`, `noise_thresholds` and `coarse` ask for.
-    Raises UsageError for missing files and unknown names, before anything is rendered.
+    only errors are measured. `noise_thresholds` are of Cycles' adaptive sampling.
+    `coarse` leaves out what full size beats on every scene. `model` is where to write
+    the picker's model. `sweep` replaces what `presets`, `noise_thresholds` and `coarse`
+    ask for. Raises UsageError for missing files and unknown names, before anything is
+    rendered.
     """
     out.mkdir(parents=True, exist_ok=True)
     networks = Networks(weights, device)
@@ -88,7 +86,7 @@ def bench(
         shots = find_shots(scenes, windows, references, resolution)
         parts = [SceneBench(shot, chosen) for shot in shots]
         _report_missing(networks, presets)
-        results = _measured(parts, chosen, out, growth)
+        results = _measured(parts, chosen, out)
     if model is not None:
         write_json(model, analysis.fitted(parts, results["points"]).to_json())
     return results
@@ -98,10 +96,9 @@ def _measured(
     parts: Sequence[SceneBench],
     chosen: Settings,
     out: Path,
-    growth: Sequence[tuple[int, int]],
 ) -> Report:
     """Scene by scene, with a report of those that are done after each."""
-    meter = workload.Meter(_estimate(parts, growth))
+    meter = workload.Meter(_estimate(parts))
     chosen.journal.progress = meter.write
     results: Report = {}
     try:
@@ -110,10 +107,6 @@ def _measured(
             results = _results(parts[:number], chosen)
             write(out, results)
             report.write(out, results, parts[:number])
-        if growth:
-            results["growth"] = _growth(parts[0], growth, chosen, meter)
-            write(out, results)
-            report.write(out, results, parts)
     finally:
         meter.close()
     return results
@@ -151,30 +144,12 @@ def _absent(networks: Networks) -> list[Network]:
     return [network for network in wanted if network not in networks.records]
 
 
-def _growth(
-    part: SceneBench,
-    sizes: Sequence[tuple[int, int]],
-    chosen: Settings,
-    meter: workload.Meter,
-) -> dict[str, Any]:
-    per_megapixel = part.unit() / part.megapixels
-
-    def done(megapixels: float, task: str) -> None:
-        meter.done(megapixels * per_megapixel, f"growth: {task}")
-
-    return measure_growth(part.shot, sizes, chosen, done)
-
-
-def _estimate(parts: Sequence[SceneBench], growth: Sequence[tuple[int, int]]) -> float:
+def _estimate(parts: Sequence[SceneBench]) -> float:
     """Predicted seconds of the run, printed scene by scene."""
     seconds = []
     for part in parts:
         seconds.append(part.estimate())
         report_line(f"{part.name}: about {duration(seconds[-1])}")
-    if growth:
-        first, pixels = parts[0], sum(w * h for w, h in growth) / 1e6
-        seconds.append(first.growth_estimate(pixels))
-        report_line(f"growth: at most about {duration(seconds[-1])}")
     report_line(f"all of it: about {duration(sum(seconds))}")
     return sum(seconds)
 

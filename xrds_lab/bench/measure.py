@@ -138,12 +138,6 @@ class SceneBench:
         """Megapixels of the whole frame."""
         return self.shot.window.frame_width * self.shot.window.frame_height / 1e6
 
-    def growth_estimate(self, megapixels: float) -> float:
-        """Predicted seconds of `growth` over frames of so many megapixels in all."""
-        chosen = self.settings
-        runs = chosen.rounds * (7 + 3 * len(chosen.sweep.networks)) * 3  # 1 and 2 cores
-        return runs * megapixels * self.unit() / self.megapixels / 2
-
     def _task_seconds(self, name: str) -> float:
         request = self._stopwatch.renders.get(name)
         if request is not None:

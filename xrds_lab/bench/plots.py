@@ -89,30 +89,6 @@ def gain_plot(entries: Sequence[dict[str, Any]]) -> bytes:
     return svg_of(figure, panels)
 
 
-def growth_plot(growth: dict[str, Any]) -> bytes:
-    """SVG of seconds and peak memory over pixels of the output, on all cores."""
-    figure, panels = two_panels("growth with the frame", "megapixels of the output")
-    most = max(row["cores"] for row in growth["rows"])
-    lines: dict[str, list[dict[str, Any]]] = {}
-    for row in growth["rows"]:
-        if row["cores"] == most and "less the network" not in row["task"]:
-            lines.setdefault(row["task"], []).append(row)
-    keys = (("seconds", 1.0, "seconds"), ("peak_memory", 2.0**30, "peak memory, GiB"))
-    sizes = sorted({row["pixels"] / 1e6 for row in growth["rows"]})
-    for panel, (key, unit, label) in zip(panels, keys, strict=True):
-        panel.set_ylabel(label)
-        panel.set_yscale("log")
-        panel.set_xticks(sizes, [f"{size:.2g}" for size in sizes])
-        panel.set_xticks([], minor=True)
-        _number(panel.yaxis)
-        for number, (name, rows) in enumerate(lines.items()):
-            shown = [(r["pixels"] / 1e6, r[key] / unit) for r in rows if r[key]]
-            if shown:
-                panel.plot(*zip(*shown, strict=True), color=f"C{number}", label=name,
-                           marker="osD^v<>"[number % 7], markersize=4)  # fmt: skip
-    return svg_of(figure, panels, outside=True)
-
-
 def as_text(name: str) -> str:
     """A scene's name for a plot, which takes what stands between $ for a formula."""
     return name.replace("$", r"\$")

@@ -43,8 +43,6 @@ def write(out: Path, report: Report, scenes: Sequence[SceneBench]) -> None:
             _same_picture(out, report["same_picture"]),
             _picker(report),
         ]
-    if "growth" in report:
-        sections.append(_growth(out, report["growth"]))
     by_name = {scene.name: scene for scene in scenes}
     for scene in report["scenes"]:
         name = scene["scene"]
@@ -210,12 +208,6 @@ def _picker(report: Report) -> str:
             f" {picker['alike']:.0%} were within {analysis.ALIKE} dB of the best way "
             f"of the sweep, the worst {picker['farthest_behind']:.2f} dB below it."
         )
-    if picker["alike_in_hindsight"] is not None:
-        line += (
-            f" Of the ways at full size that fitted at the speed of that very frame, "
-            f"{picker['alike_in_hindsight']:.0%} were within {analysis.ALIKE} dB of "
-            f"the best, the worst {picker['missed']:.2f} dB below it."
-        )
     rows = [
         [f"{row['budget']:g}", _gap(row["behind_best"]), _gap(row["behind_oidn"])]
         for row in picker["budgets"]
@@ -242,60 +234,6 @@ def _failures(report: Report) -> str:
         return ""
     rows = [[name, error] for name, error in report["failures"].items()]
     return f"<h2>Left out</h2>{_rows(['what', 'why'], rows)}"
-
-
-def _growth(out: Path, growth: dict[str, Any]) -> str:
-    svg = plots.growth_plot(growth)
-    (out / "growth.svg").write_bytes(svg)
-    rows = [
-        [
-            row["task"],
-            "x".join(map(str, row["size"])),
-            row["cores"],
-            f"{row['seconds']:.2f}",
-            "–" if row["peak_memory"] is None else f"{row['peak_memory'] / 2**30:.2f}",
-        ]
-        for row in growth["rows"]
-    ]
-    fits = [
-        [f["task"], f["cores"], f"{f['seconds']:.2f}", _optional(f["peak_memory"])]
-        for f in growth["exponents"]
-    ]
-    breaks = [
-        [
-            row["network"],
-            "x".join(map(str, row["size"])),
-            row["cores"] + (" (extrapolated)" if row["extrapolated"] else ""),
-            f"{row['paid']:.1f}",
-            *(_saved(row[key], row["paid"]) for key in ("saved", "saved_quick")),
-        ]
-        for row in growth["break_even"]
-    ]
-    head = ["task", "frame", "cores", "seconds", "peak GiB"]
-    return "".join(
-        [
-            f"<h2>Growth: {html.escape(growth['scene'])}</h2>",
-            _figure(svg),
-            "<p>Exponents of pixels: seconds or bytes as pixels to that power.</p>",
-            _rows(["task", "cores", "seconds", "peak memory"], fits),
-            f"<p>{html.escape(growth['note'])}</p>",
-            _rows(
-                ["network", "frame", "cores", "s paid", "s saved", "quick OIDN"], breaks
-            ),
-            f"<details><summary>All runs</summary>{_rows(head, rows)}</details>",
-        ]
-    )
-
-
-def _saved(saved: float | None, paid: float) -> str:
-    """Seconds saved, and whether they pay."""
-    if saved is None:
-        return "–"
-    return f"{saved:.1f}, {'pays' if saved > paid else 'does not pay'}"
-
-
-def _optional(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2f}"
 
 
 def _figure(svg: bytes) -> str:

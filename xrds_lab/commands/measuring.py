@@ -35,7 +35,6 @@ def add_evaluate(commands: Any) -> argparse.ArgumentParser:
         default=("fast",),
         help="as fast,balanced",
     )
-    add("--table", choices=("standard", "samples"), default="standard")
     add("--timing", action="store_true", help="also time whole frames")
     add("--timing-scenes", type=arguments.words, help="of these alone, as bmw27,house")
     add("--weights", type=Path, help="folder of weights files")
@@ -48,20 +47,7 @@ def add_evaluate(commands: Any) -> argparse.ArgumentParser:
 def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("evaluate")
     from ..bench.evaluate import evaluate
-    from ..bench.samples import samples_table
 
-    if options.table == "samples":
-        return samples_table(
-            options.scenes,
-            windows=options.windows,
-            references=options.references,
-            cache=options.cache,
-            scale=options.scale[0],
-            preset=options.preset[0],
-            out=options.out,
-            weights=options.weights,
-            progress=report_line,
-        )
     return evaluate(
         options.scenes,
         windows=options.windows,
@@ -163,42 +149,6 @@ def _fuzz(options: argparse.Namespace) -> dict[str, Any]:
     return result
 
 
-def add_plan_report(commands: Any) -> argparse.ArgumentParser:
-    """Add `xrds plan-report`."""
-    command = commands.add_parser("plan-report", help="measure what the plan saves")
-    add = command.add_argument
-    add("scenes", nargs="+", help="SCENE.blend, or a small scene of the laboratory")
-    kinds = ("still", "animation", "look-dev")
-    add(
-        "--kind",
-        type=arguments.names(kinds),
-        default=("still",),
-        help="as still,look-dev",
-    )
-    add("--scale", type=int, choices=(2, 4, 8), default=2)
-    add("--samples", type=arguments.positive, default=16)
-    add("--guide-samples", type=arguments.positive, default=4)
-    add("--resolution", type=arguments.size, metavar="WxH", default=(960, 540))
-    add("--rounds", type=arguments.positive, default=1, help="pairs of runs")
-    add("-o", "--out", type=Path, required=True, help="path of the .json and .md")
-    command.set_defaults(work=_plan_report, lines=no_lines)
-    return command
-
-
-def _plan_report(options: argparse.Namespace) -> dict[str, Any]:
-    need_blender("plan-report")
-    from ..bench.plan_report import Setting, report
-
-    setting = Setting(
-        options.scale,
-        options.samples,
-        options.guide_samples,
-        *options.resolution,
-        options.rounds,
-    )
-    return report(options.scenes, options.kind, setting, options.out, report_line)
-
-
 def add_bench(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds bench`."""
     command = commands.add_parser(
@@ -242,13 +192,6 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
     add("--rounds", type=arguments.positive, default=3, help="runs of each timed stage")
     add("--errors-only", action="store_true", help="time nothing")
     add(
-        "--growth",
-        type=arguments.sizes,
-        default=(),
-        help="frames, as 512x512,1920x1080: how seconds and memory grow; with --shots "
-        "those of finishing a frame, and of a shot of small frames",
-    )
-    add(
         "--noise-thresholds",
         type=arguments.factors,
         help="of Cycles' adaptive sampling, whose frames take long to time; "
@@ -264,11 +207,6 @@ def add_bench(commands: Any) -> argparse.ArgumentParser:
         "--coarse",
         action="store_true",
         help="few samples for super-resolution: a third of the time",
-    )
-    add(
-        "--low-budgets",
-        action="store_true",
-        help="only a table of budgets below a sample per pixel",
     )
     add("--model", type=Path, help="where to write what --time-budget goes by")
     add("--device", default="auto", help=DEVICE_HELP)
@@ -419,7 +357,6 @@ def _bench(options: argparse.Namespace) -> dict[str, Any]:
         "same_picture": _bench_same_picture,
         "light_parts": _bench_light_parts,
         "shots": _bench_shots,
-        "low_budgets": _low_budgets,
     }
     chosen = [work for name, work in kinds.items() if getattr(options, name)]
     return (chosen or [_bench_frames])[0](options)
@@ -439,7 +376,6 @@ def _bench_frames(options: argparse.Namespace) -> dict[str, Any]:
         rounds=options.rounds,
         timing=not options.errors_only,
         picker=not (options.errors_only or options.no_picker),
-        growth=options.growth,
         noise_thresholds=() if options.no_adaptive else thresholds,
         coarse=options.coarse,
         model=options.model,
@@ -484,31 +420,7 @@ def _bench_gallery(options: argparse.Namespace) -> dict[str, Any]:
     )
 
 
-def _low_budgets(options: argparse.Namespace) -> dict[str, Any]:
-    from ..bench.low_budgets import low_budgets
-
-    return low_budgets(
-        options.scenes,
-        options.out,
-        **_inputs(options),
-        presets=options.preset,
-        rounds=options.rounds,
-        weights=options.weights,
-        device=options.device,
-    )
-
-
 def _bench_shots(options: argparse.Namespace) -> dict[str, Any]:
-    if options.growth:
-        from ..shots.growth import SMALL, bench_growth
-
-        return bench_growth(
-            options.scenes[0],
-            options.out,
-            options.growth,
-            cache=options.cache,
-            small=options.resolution or SMALL,
-        )
     from ..shots.bench import Measure, bench_shots
 
     return bench_shots(

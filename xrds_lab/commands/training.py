@@ -45,15 +45,6 @@ def _train_lines(result: dict[str, Any]) -> list[str]:
     ]
 
 
-def _ablate(options: argparse.Namespace) -> dict[str, Any]:
-    from ..training.ablations import ablate
-
-    seeds, changes = options.seeds, options.changes
-    return ablate(
-        options.config, options.table, options.out, seeds=seeds, changes=changes
-    )
-
-
 def _train_filter(options: argparse.Namespace) -> dict[str, Any]:
     from ..training.guide_filter import train_guide_filter
 
@@ -84,31 +75,6 @@ def add_train(commands: Any) -> argparse.ArgumentParser:
     )
     _add_changes(command)
     command.set_defaults(work=_train, lines=_train_lines)
-    return command
-
-
-def add_ablate(commands: Any) -> argparse.ArgumentParser:
-    """Add `xrds ablate`."""
-    command = commands.add_parser(
-        "ablate", help="train networks that differ in one thing, for a table"
-    )
-    add = command.add_argument
-    add("config", type=Path, metavar="CONFIG.toml")
-    add(
-        "--table",
-        required=True,
-        help="base, guides, blocks, depth, rival, loss, input, variation",
-    )
-    add(
-        "-o",
-        "--out",
-        type=arguments.folder,
-        required=True,
-        help="folder of TABLE.json and its runs",
-    )
-    add("--seeds", type=arguments.positive, default=3, help="runs of each variant")
-    _add_changes(command)
-    command.set_defaults(work=_ablate, lines=lines_of("xrds_lab.training.ablations"))
     return command
 
 

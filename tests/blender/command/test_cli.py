@@ -80,7 +80,6 @@ def run(code: str, *words: str) -> subprocess.CompletedProcess[str]:
         ["dataset", "--out", "o", "--seed", HUGE],
         ["stability", "--out", __file__],
         ["train", "a.toml", "--out", __file__],
-        ["plan-report", "unknown", "--out", "o"],
         ["render", "a.blend", "-o", "b.exr", "--preset", "best"],
         ["render", "a.blend", "-o", "b.exr", "--exposure", "0"],
         ["render", "a.blend", "-o", "b.exr", "--memory-limit", "much"],
@@ -229,8 +228,6 @@ def test_frames_below_zero_are_a_value(
         ["info", "--weights", "none"],
         ["evaluate", "a", "--windows", LONG, "--references", "r"],
         ["train", f"{LONG}.toml", "--out", "o"],
-        ["plan-report", f"{LONG}.blend", "--out", "o"],
-        ["plan-report", "none.blend", "--out", "o"],
     ],
     ids=lambda words: " ".join(words).replace(LONG, "LONG"),
 )
