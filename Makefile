@@ -18,7 +18,7 @@ OTHER_VENV := $(VENV)-bpy-$(OTHER_BPY)
 OTHER_RUN  := $(OTHER_VENV)/bin/python
 
 # Tests of what differs between Blenders: `make test` runs them on the second one, too.
-VERSIONS := interface/test_engine cycles/test_passes render/test_features render/test_full_size
+VERSIONS := interface/test_engine cycles/test_passes rendering/test_features rendering/test_full_size
 
 # The C core; what is installed anew compiles it, too.
 NATIVE  := xrds_core/native/lib/.compiled

@@ -100,7 +100,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 @pytest.fixture(autouse=True)
 def no_guides_of_before() -> None:
     """What one test rendered is not to serve another."""
-    from xrds_blender.render import guide_cache
+    from xrds_blender.rendering import guide_cache
 
     guide_cache.CACHE.clear()
 
@@ -136,7 +136,7 @@ def stopped_in(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
     import bpy
 
     from xrds_blender.cycles import session
-    from xrds_blender.render import stages
+    from xrds_blender.rendering import stages
 
     def render(stage: str) -> None:
         with monkeypatch.context() as patch:
@@ -211,7 +211,7 @@ class NearestUpscaler:
 @pytest.fixture
 def network(monkeypatch: pytest.MonkeyPatch) -> list[NearestUpscaler]:
     """Put NearestUpscaler in the network's place; the ones made so far."""
-    from xrds_blender.render import loading
+    from xrds_blender.rendering import loading
 
     made: list[NearestUpscaler] = []
 

@@ -20,7 +20,7 @@ ORDER = (
     "xrds_blender",
     "xrds_blender.command",
     "xrds_blender.interface",
-    "xrds_blender.render",
+    "xrds_blender.rendering",
     "xrds_blender.cycles",
     "xrds_blender.scene",
     "xrds_blender.planning",

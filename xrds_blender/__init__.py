@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from .cycles.passes import CyclesPasses
-    from .render.picture import Picture
+    from .rendering.picture import Picture
 
 __all__ = ["register", "render", "run_job", "unregister"]
 
@@ -51,7 +51,7 @@ def render(scene: Any, scale: int = 1, **choices: Any) -> Picture:
     for values out of range, Cancelled when the user stops the render.
     """
     from .interface.registration import ensure_registered
-    from .render import render
+    from .rendering import render
 
     ensure_registered()
     return render.render(scene, scale, **choices)
@@ -68,7 +68,7 @@ def run_job(
     without a camera.
     """
     from .interface.registration import ensure_registered
-    from .render import blender_job
+    from .rendering import blender_job
 
     ensure_registered()
     return blender_job.run_job(scene, job, layer=layer)

@@ -253,7 +253,7 @@ bpy.data.scenes[0].cycles.use_adaptive_sampling = False
 
 SAMPLES_ARE_TAKEN = """
 import sys
-stages = sys.modules.get('xrds_blender.render.stages')
+stages = sys.modules.get('xrds_blender.rendering.stages')
 lifetimes = sys.modules.get('xrds_blender.internals.lifetimes')
 run = stages and lifetimes.RENDER_JOB.of(stages.Current).run
 status = sys.modules.get('xrds_blender.internals.status')
@@ -307,7 +307,7 @@ bpy.context.preferences.view.render_display_type = 'AREA'
     window.wait(
         """
 import sys
-stages = sys.modules.get('xrds_blender.render.stages')
+stages = sys.modules.get('xrds_blender.rendering.stages')
 stages and 'frame 2' in (stages.current() or '')
 """
     )

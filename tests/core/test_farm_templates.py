@@ -69,7 +69,7 @@ def test_progress_counts_frames_ahead(
     now = ""
     stages = SimpleNamespace(stages=SimpleNamespace(current=lambda: now))
     monkeypatch.setitem(sys.modules, "bpy", bpy)
-    monkeypatch.setitem(sys.modules, "xrds_blender.render", stages)
+    monkeypatch.setitem(sys.modules, "xrds_blender.rendering", stages)
     files = yaml.safe_load(TEMPLATE.read_text("utf-8"))["steps"][0]["script"]
     code = files["embeddedFiles"][0]["data"].replace("{{Task.Param.Frame}}", "11-14")
     bpy.ops.render.render = lambda animation: {"FINISHED"}

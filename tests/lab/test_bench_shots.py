@@ -18,7 +18,7 @@ from xrds_blender.command import main
 from xrds_blender.cycles.samples import sample_layer
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.settings import CYCLES_DENOISING
-from xrds_blender.render.blender_job import call_engine
+from xrds_blender.rendering.blender_job import call_engine
 from xrds_core.accumulation.camera import Camera
 from xrds_core.accumulation.frame import Frame
 from xrds_core.errors import SceneError, UsageError

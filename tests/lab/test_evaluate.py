@@ -143,7 +143,7 @@ def test_a_second_run_renders_nothing(
     world: World, report: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # the package's attribute of this name is the public function
-    module = importlib.import_module("xrds_blender.render.blender_job")
+    module = importlib.import_module("xrds_blender.rendering.blender_job")
     monkeypatch.setattr(module, "run_job", lambda *a, **k: pytest.fail("rendered"))
     again = world.run(scales=[2, 4], out=world.folder)
     assert again == report

@@ -12,7 +12,7 @@ pytest.importorskip("mitsuba_oidn")
 if os.name == "nt":
     pytest.skip("processes are forked", allow_module_level=True)
 
-from xrds_core.exr import sequence
+from xrds_core.shot_files import sequence
 from xrds_lab.stability.fuzz import fuzz, run, run_case
 from xrds_lab.stability.fuzz_shots import make_twice
 from xrds_lab.stability.odd_shots import Case, make_case

@@ -13,8 +13,8 @@ import shots
 from xrds_core import exr
 from xrds_core.accumulation.camera import Camera
 from xrds_core.accumulation.frame import Frame
-from xrds_core.exr import cameras, frame_file
 from xrds_core.exr.openexr_io import Part
+from xrds_core.shot_files import cameras, frame_file
 
 WINDOW = ((0, 0), (shots.WIDTH - 1, shots.HEIGHT - 1))
 CYCLES = {

@@ -33,9 +33,9 @@ def add_cameras(commands: Any) -> argparse.ArgumentParser:
 
 def _cameras(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("cameras")
-    from xrds_core.exr.cameras import to_json
+    from xrds_core.shot_files.cameras import to_json
 
-    from ..render.shot import shot_cameras
+    from ..rendering.shot import shot_cameras
     from .scene_file import open_scene
 
     resolve_paths(options)

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from xrds_core.errors import UsageError, XRDSError, warn
-from xrds_core.exr.pass_names import PASSES, PassNames
 from xrds_core.frames import in_words
+from xrds_core.shot_files.pass_names import PASSES, PassNames
 
 from ..planning.settings import QUALITIES
 from . import arguments
@@ -143,9 +143,9 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
     from xrds_core.denoising import Denoiser
     from xrds_core.denoising.light_passes import Wanted, read_renderers
     from xrds_core.exr import raw_header
-    from xrds_core.exr.cameras import read_cameras
-    from xrds_core.exr.frame_file import Reading
-    from xrds_core.exr.sequence import Files, denoise_sequence
+    from xrds_core.shot_files.cameras import read_cameras
+    from xrds_core.shot_files.frame_file import Reading
+    from xrds_core.shot_files.sequence import Files, denoise_sequence
 
     raw_header.allow(options.read_limit)
     reading = Reading(

@@ -97,7 +97,7 @@ def _render(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("plan")
-    from ..render.explain import explain
+    from ..rendering.explain import explain
     from .scene_file import frames_of, open_scene
 
     resolve_paths(options)

@@ -19,12 +19,12 @@ from ..cycles.settings import subset_of_file
 from ..cycles.view import picture_size
 from ..planning.request import Request
 from ..planning.settings import Mode
-from ..render.loading import is_ready, load_denoiser, load_upscaler
-from ..render.picture import NetworkFailed, Picture, metadata_of, record_of
-from ..render.render import render_scene
-from ..render.sample_cache import SampleCache, cache_of
-from ..render.sampling import has_neighbours
-from ..render.shot import cache_samples, render_shot
+from ..rendering.loading import is_ready, load_denoiser, load_upscaler
+from ..rendering.picture import NetworkFailed, Picture, metadata_of, record_of
+from ..rendering.render import render_scene
+from ..rendering.sample_cache import SampleCache, cache_of
+from ..rendering.sampling import has_neighbours
+from ..rendering.shot import cache_samples, render_shot
 from ..scene.contents import frame_range, moves_in_time
 from ..scene.remarks import missing, remarks
 from . import picture_file

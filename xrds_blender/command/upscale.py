@@ -58,7 +58,7 @@ def add_upscale(commands: Any) -> argparse.ArgumentParser:
 def _upscale(options: argparse.Namespace) -> dict[str, Any]:
     from xrds_core.exr import raw_header
 
-    from ..render.torch_folder import load
+    from ..rendering.torch_folder import load
 
     raw_header.allow(options.read_limit)
     return load("superres.exr_upscale").upscale_file(

@@ -55,15 +55,15 @@ class XRDSRender(bpy.types.RenderEngine):
             session.functions().render(self, depsgraph)
         else:
             with thread_guard.shared():
-                from ..render.blender_job import render_in
+                from ..rendering.blender_job import render_in
 
                 render_in(self, depsgraph, lambda: self._render_requested(depsgraph))
 
     def _render_requested(self, depsgraph: Any) -> None:
         """Render what the scene's settings describe, and report what was done."""
         from ..cycles.settings import subset_of_file
-        from ..render.picture import log_line, record_of, stamp_result
-        from ..render.render import render_frame
+        from ..rendering.picture import log_line, record_of, stamp_result
+        from ..rendering.render import render_frame
         from .properties import request_of
 
         scene, request = depsgraph.scene_eval, request_of(depsgraph.scene_eval.xrds)

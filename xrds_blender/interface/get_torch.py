@@ -14,7 +14,7 @@ import bpy
 from xrds_core.errors import UsageError
 
 from ..internals.lifetimes import PROCESS
-from ..render import torch_folder
+from ..rendering import torch_folder
 from . import machine
 
 LOOK_AGAIN = 2.0  # seconds between two looks for the result

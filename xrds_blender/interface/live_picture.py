@@ -14,7 +14,7 @@ from xrds_core.arrays import Array
 
 from ..cycles import live, session
 from ..internals.lifetimes import PROCESS
-from ..render import stages
+from ..rendering import stages
 
 
 @dataclass

@@ -14,7 +14,7 @@ from xrds_core.errors import SceneError, XRDSError
 from xrds_core.version import package_version
 
 from ..internals import engine_override
-from ..render import torch_folder
+from ..rendering import torch_folder
 
 
 class XRDS_OT_render(bpy.types.Operator):
@@ -113,7 +113,7 @@ def self_test() -> list[str]:
 
     Raises XRDSError where no picture, or a wrong one, comes out.
     """
-    from ..render.render import render
+    from ..rendering.render import render
     from .machine import machine
 
     here = machine()

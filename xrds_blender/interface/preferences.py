@@ -11,7 +11,7 @@ import bpy
 
 from xrds_core.errors import UsageError
 
-from ..render import torch_folder
+from ..rendering import torch_folder
 from . import get_torch, machine
 from .operators import XRDS_OT_self_test
 from .panel.paragraph import translated

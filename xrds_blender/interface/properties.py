@@ -10,7 +10,7 @@ from xrds_core.frames import RADIUS
 
 from ..planning.request import Request, render_request
 from ..planning.settings import Mode
-from ..render import choose
+from ..rendering import choose
 from ..scene.contents import passes_looked_at
 from .machine import machine
 from .translations import CONTEXT

@@ -1,8 +1,7 @@
-"""OpenEXR files in and out: passes as arrays, and whole shots.
+"""OpenEXR files in and out: passes as arrays, parts, headers.
 
 `render_passes` finds passes by name, `openexr_io` reads and writes files, `raw_header`
-bounds what a hostile one may claim. `frame_file` reads a frame of a shot, `sequence`
-finishes all of them.
+bounds what a hostile one may claim.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ from xrds_blender.planning import budget
 from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Mode
 from xrds_blender.planning.settings import Settings as RenderSettings
-from xrds_blender.render.probing import probe, with_guides
+from xrds_blender.rendering.probing import probe, with_guides
 from xrds_core.files import read_json, write_json
 
 from . import tasks, workload

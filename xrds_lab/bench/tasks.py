@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from xrds_blender.planning.settings import Network
-    from xrds_blender.render.picture import Picture
+    from xrds_blender.rendering.picture import Picture
     from xrds_core.arrays import Array
 
     from .inputs import Arrays
@@ -89,8 +89,8 @@ def frame(
     weights are loaded before. `adaptive` tells how Cycles samples adaptively.
     """
     from xrds_blender.interface.registration import ensure_registered
-    from xrds_blender.render.loading import load_upscaler
-    from xrds_blender.render.render import render_scene
+    from xrds_blender.rendering.loading import load_upscaler
+    from xrds_blender.rendering.render import render_scene
 
     ensure_registered()
     scene = open_scene(shot.path, shot.window.whole)

@@ -105,8 +105,8 @@ def _sample(
 ) -> tuple[dict[int, Stored], float]:
     """The frames' samples, and the median of their seconds."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.blender_job import call_engine
-    from xrds_blender.render.sampling import sample_frame
+    from xrds_blender.rendering.blender_job import call_engine
+    from xrds_blender.rendering.sampling import sample_frame
 
     job = render_request(scale=1, samples=case.samples, temporal_radius=REACH)
     found, seconds = {}, []
@@ -124,8 +124,8 @@ def _sample(
 
 def _references(scene: Any, case: Case, number: int) -> list[Array]:
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.blender_job import call_engine
-    from xrds_blender.render.sampling import sample_frame
+    from xrds_blender.rendering.blender_job import call_engine
+    from xrds_blender.rendering.sampling import sample_frame
 
     scene.frame_set(number)
     job = render_request(scale=1, samples=case.reference_samples)
@@ -199,7 +199,7 @@ def _ours(case: Case, own: Stored, lenders: Sequence[Stored]) -> Row:
 def _whole_shot(scene: Any, case: Case) -> Row:
     """Seconds per frame of the whole shot, finished beside sampling and in turn."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render import shot
+    from xrds_blender.rendering import shot
 
     job = render_request(scale=1, samples=case.samples, temporal_radius=REACH)
     found = {}
@@ -213,7 +213,7 @@ def _whole_shot(scene: Any, case: Case) -> Row:
 
 def _finishing(case: Case, device: str) -> Callable[..., Any]:
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.full_size import FullSize
+    from xrds_blender.rendering.full_size import FullSize
 
     job = render_request(
         scale=1, samples=case.samples, temporal_radius=REACH, device=device

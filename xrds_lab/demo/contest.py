@@ -12,8 +12,8 @@ from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
 from xrds_blender.planning.request import Request, render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
-from xrds_blender.render.render import render_scene
-from xrds_blender.render.shot import render_shot
+from xrds_blender.rendering.render import render_scene
+from xrds_blender.rendering.shot import render_shot
 
 from .scene import MIDDLE, SHOT
 

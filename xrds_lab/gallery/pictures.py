@@ -19,8 +19,8 @@ import numpy as np
 
 import xrds_core
 from xrds_blender.planning.request import render_request
-from xrds_blender.render import full_size
-from xrds_blender.render.full_size import FullSize
+from xrds_blender.rendering import full_size
+from xrds_blender.rendering.full_size import FullSize
 from xrds_core.accumulation.accumulate import Accumulated
 from xrds_core.accumulation.frame import Frame, Stored, store
 from xrds_core.arrays import Array

@@ -63,8 +63,8 @@ def render(
 def _render(scene: Any, request: Request, store: Store) -> None:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.blender_job import call_engine
-    from xrds_blender.render.sampling import noisy_frame, sample_frame
+    from xrds_blender.rendering.blender_job import call_engine
+    from xrds_blender.rendering.sampling import noisy_frame, sample_frame
 
     if request.kind != NOISY:
         job = render_request(scale=1, samples=request.samples, seed=request.seed)

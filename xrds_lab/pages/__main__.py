@@ -15,7 +15,9 @@ def main() -> int:
     """Write or check the pages of this checkout."""
     parser = argparse.ArgumentParser("python -m xrds_lab.pages", description=__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing")
-    parser.add_argument("--draw", action="store_true", help="the method's figure, too")
+    parser.add_argument(
+        "--draw", action="store_true", help="the figures of method and source, too"
+    )
     options = parser.parse_args()
     pages = Pages(ROOT)
     if options.check:
@@ -24,9 +26,10 @@ def main() -> int:
         return 1 if faults else 0
     pages.write()
     if options.draw:
-        from .method import draw  # needs matplotlib, which checking does not
+        from . import architecture, method  # matplotlib, which checking does not need
 
-        draw(ROOT / "docs/images/method.svg")
+        method.draw(ROOT / "docs/images/method.svg")
+        architecture.draw(ROOT / "docs/images/architecture.svg")
     return 0
 
 

@@ -8,7 +8,7 @@ entered, and how often a call leads back into a file that the walk has left. Not
 run: imports, definitions and calls are read.
 
     python -m xrds_lab.pages.walks
-    python -m xrds_lab.pages.walks xrds_blender/render/shot.py render_shot scene
+    python -m xrds_lab.pages.walks xrds_blender/rendering/shot.py render_shot scene
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ WALKS = {
     ),
     "a command's options": ("xrds_blender.command.render", "_render", "options"),
     "a frame's passes to the picture": (
-        "xrds_blender.render.render",
+        "xrds_blender.rendering.render",
         "_finish",
         "own",
     ),

@@ -16,8 +16,8 @@ import numpy as np
 import xrds_core
 from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING
-from xrds_blender.render import full_size
-from xrds_blender.render.full_size import FullSize
+from xrds_blender.rendering import full_size
+from xrds_blender.rendering.full_size import FullSize
 from xrds_core.accumulation.frame import Stored, store
 from xrds_core.files import write_json
 from xrds_core.shot import Shot

@@ -155,8 +155,8 @@ class ShotFrames:
 def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
     """One frame's samples, exactly as `xrds render` takes them for a shot."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.blender_job import call_engine
-    from xrds_blender.render.sampling import noisy_frame
+    from xrds_blender.rendering.blender_job import call_engine
+    from xrds_blender.rendering.sampling import noisy_frame
 
     job = render_request(
         scale=1,

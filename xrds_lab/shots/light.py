@@ -99,8 +99,8 @@ def bench_light_parts(
 
 def _render(shot: Shot, samples: int, reference_samples: int) -> _Rendered:
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.blender_job import call_engine
-    from xrds_blender.render.sampling import noisy_frame, parts_of_layer
+    from xrds_blender.rendering.blender_job import call_engine
+    from xrds_blender.rendering.sampling import noisy_frame, parts_of_layer
 
     scene = open_scene(shot.path, shot.window)
     animate(scene, shot.window, "pan", MIDDLE, _REACH)

@@ -123,8 +123,8 @@ def timed(
 
 def _sample(scene: Any, job: Request) -> Stored:
     """One frame's samples, packed as a shot keeps them."""
-    from xrds_blender.render.blender_job import call_engine
-    from xrds_blender.render.sampling import sample_frame
+    from xrds_blender.rendering.blender_job import call_engine
+    from xrds_blender.rendering.sampling import sample_frame
 
     made = call_engine(scene, lambda *given: sample_frame(*given, job))
     return next(iter(made.views.values()))
@@ -134,7 +134,7 @@ def _finished(
     sampled: Mapping[int, Stored], job: Request, rounds: int
 ) -> dict[str, float]:
     """Seconds of the middle frame's accumulation and denoising."""
-    from xrds_blender.render.full_size import FullSize
+    from xrds_blender.rendering.full_size import FullSize
     from xrds_core.shot import Shot as Window
 
     numbers = Window(tuple(sampled), job.settings.temporal_radius).neighbours(MIDDLE)

@@ -298,7 +298,7 @@ def _same_samples(shot: Shot, case: Case) -> Made:
 
 def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.shot import render_shot
+    from xrds_blender.rendering.shot import render_shot
 
     reach = frames // 2
     scene = _opened(shot, case, reach)

@@ -54,8 +54,8 @@ def film(name: str) -> Filmed:
     from xrds_blender import run_job
     from xrds_blender.planning.request import render_request
     from xrds_blender.planning.settings import DEFAULT_DENOISING
-    from xrds_blender.render.blender_job import call_engine
-    from xrds_blender.render.sampling import sample_frame
+    from xrds_blender.rendering.blender_job import call_engine
+    from xrds_blender.rendering.sampling import sample_frame
 
     from .moving_scenes import FRAMES, JUDGED, build, set_frame
 
@@ -119,7 +119,7 @@ def fisheye() -> Iterator[Measured]:
 def finished(frames: dict[int, Stored], number: int, radius: int) -> Array:
     """A frame (H, W, 3) as the product finishes it."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.full_size import FullSize
+    from xrds_blender.rendering.full_size import FullSize
     from xrds_core.shot import Shot
 
     job = render_request(scale=1, samples=SAMPLES, temporal_radius=radius, device="cpu")

@@ -132,7 +132,7 @@ def crashes(frames: Frames) -> int:
 def long(frames: Frames) -> Measured:
     """Growth of memory in KiB per frame over a thousand frames, one after the other."""
     from xrds_blender.planning.request import render_request
-    from xrds_blender.render.full_size import FullSize
+    from xrds_blender.rendering.full_size import FullSize
 
     originals = list(frames.values())
     job = render_request(scale=1, samples=SAMPLES, temporal_radius=RADIUS, device="cpu")

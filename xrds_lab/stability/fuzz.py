@@ -150,7 +150,7 @@ def _load() -> None:
     """Load what every case needs, but no denoiser: it has threads of its own."""
     from xrds_blender.command import main  # noqa: F401
     from xrds_core.denoising import denoiser, oidn_device  # noqa: F401
-    from xrds_core.exr import sequence  # noqa: F401
+    from xrds_core.shot_files import sequence  # noqa: F401
 
     with contextlib.suppress(PictureError):
         exr.attributes(os.devnull)

@@ -16,7 +16,7 @@ import numpy as np
 
 from xrds_core.accumulation.frame import Frame
 from xrds_core.exr.openexr_io import write
-from xrds_core.exr.sample_cache import Origin, write_cached_frame
+from xrds_core.shot_files.sample_cache import Origin, write_cached_frame
 
 from . import odd_headers, odd_shots
 from .odd_shots import Case

@@ -43,7 +43,7 @@ class FrameLoad:
 def drive(scene: Any, count: int, **choices: Any) -> list[FrameLoad]:
     """Render frames 1 to `count` and write them as PNG and EXR in turn.
 
-    `choices` are those of `xrds_blender.render`.
+    `choices` are those of `xrds_blender.rendering`.
     """
     from xrds_blender import render
     from xrds_blender.command import picture_file
@@ -111,7 +111,7 @@ def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
 
 @contextmanager
 def _small_guide_cache() -> Iterator[None]:
-    from xrds_blender.render import guide_cache
+    from xrds_blender.rendering import guide_cache
 
     usual = guide_cache.CACHE
     guide_cache.CACHE = guide_cache.GuideCache(_GUIDE_MEMORY)

@@ -13,7 +13,7 @@ import numpy as np
 
 from xrds_core import exr
 from xrds_core.accumulation.camera import Camera, Sphere
-from xrds_core.exr import cameras
+from xrds_core.shot_files import cameras
 
 from .odd_headers import chance_attribute, insert
 

@@ -12,13 +12,13 @@ bpy = pytest.importorskip("bpy")
 
 import xrds_core.denoising
 import xrds_core.denoising.light_passes
-import xrds_core.exr.cameras
 import xrds_core.exr.raw_header
-import xrds_core.exr.sequence
 import xrds_core.info
+import xrds_core.shot_files.cameras
+import xrds_core.shot_files.sequence
 from xrds_blender.command import cameras, main, render, render_file, scene_file
-from xrds_blender.render import explain, torch_folder
-from xrds_blender.render import shot as shot_cameras
+from xrds_blender.rendering import explain, torch_folder
+from xrds_blender.rendering import shot as shot_cameras
 from xrds_core import files
 from xrds_core.errors import UsageError
 
@@ -117,8 +117,8 @@ def said(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         (xrds_core.denoising, "Denoiser"),
         (xrds_core.exr.raw_header, "allow"),
         (xrds_core.denoising.light_passes, "read_renderers"),
-        (xrds_core.exr.cameras, "read_cameras"),
-        (xrds_core.exr.sequence, "denoise_sequence"),
+        (xrds_core.shot_files.cameras, "read_cameras"),
+        (xrds_core.shot_files.sequence, "denoise_sequence"),
         (xrds_core.info, "info"),
     ):
         monkeypatch.setattr(module, name, note)

@@ -13,8 +13,8 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
-from xrds_blender.render import sampling
-from xrds_blender.render.blender_job import call_engine
+from xrds_blender.rendering import sampling
+from xrds_blender.rendering.blender_job import call_engine
 from xrds_core.accumulation.frame import Frame
 
 

@@ -14,7 +14,7 @@ from xrds_blender import run_job
 from xrds_blender.cycles import session  # bpy is asked for first
 from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.internals.borrowed import Borrowed, PipelineSettings
-from xrds_blender.render.blender_job import call_engine
+from xrds_blender.rendering.blender_job import call_engine
 from xrds_core.errors import Cancelled, SceneError
 
 Build = Callable[..., Any]

@@ -18,7 +18,7 @@ from compositing import compositor
 from xrds_blender import render, run_job
 from xrds_blender.planning.request import Machine
 from xrds_blender.planning.settings import Denoising
-from xrds_blender.render.loading import in_process
+from xrds_blender.rendering.loading import in_process
 from xrds_core.errors import UsageError, WeightsError
 
 BLENDER_5 = bpy.app.version >= (5, 0)
@@ -257,7 +257,7 @@ def test_the_package_name_is_the_function_even_after_its_import(
 ) -> None:
     import xrds_blender
 
-    assert xrds_blender.render(life, 4).radiance.shape == (33, 45, 3)
+    assert xrds_blender.rendering(life, 4).radiance.shape == (33, 45, 3)
 
 
 def test_a_small_network_of_its_own_renders(life: Any, tmp_path: Path) -> None:
@@ -281,7 +281,7 @@ def test_missing_weights_are_one_clear_line(life: Any, tmp_path: Path) -> None:
 def test_missing_weights_end_f12_with_an_error_and_no_file(
     life: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from xrds_blender.render import loading
+    from xrds_blender.rendering import loading
 
     def load(*_: Any) -> None:
         raise WeightsError("no weights, on purpose")

@@ -34,8 +34,8 @@ from xrds_blender.internals.lifetimes import FILE, PROCESS
 from xrds_blender.planning import estimates
 from xrds_blender.planning.estimates import Capabilities
 from xrds_blender.planning.settings import Mode, Network
-from xrds_blender.render import history, stages
-from xrds_blender.render.choose import estimates as estimates_of
+from xrds_blender.rendering import history, stages
+from xrds_blender.rendering.choose import estimates as estimates_of
 
 
 @pytest.fixture(autouse=True)

@@ -13,7 +13,7 @@ bpy = pytest.importorskip("bpy")
 from xrds_blender.cycles import session
 from xrds_blender.internals import engine_override
 from xrds_blender.internals.lifetimes import PROCESS
-from xrds_blender.render import render
+from xrds_blender.rendering import render
 from xrds_core.errors import SceneError
 
 

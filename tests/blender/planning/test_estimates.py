@@ -183,7 +183,7 @@ def test_cycles_alone_reports_samples_and_denoising_as_one() -> None:
 def test_layers_of_a_scene_add_up() -> None:
     from types import SimpleNamespace
 
-    from xrds_blender.render import history
+    from xrds_blender.rendering import history
 
     FILE.end()
     settings = in_mode(Mode.FULL_SIZE)

@@ -12,7 +12,7 @@ import pytest
 bpy = pytest.importorskip("bpy")
 
 from xrds_blender.planning.request import render_request
-from xrds_blender.render.sample_cache import _key
+from xrds_blender.rendering.sample_cache import _key
 from xrds_blender.scene.outer_files import outer_files
 
 

@@ -15,8 +15,8 @@ from ...planning.estimates import Capabilities, missing
 from ...planning.plan import Facts, SceneFacts
 from ...planning.request import Request
 from ...planning.settings import MODES, Mode, Settings
-from ...render.choose import join_facts
-from ...render.loading import weights_headers
+from ...rendering.choose import join_facts
+from ...rendering.loading import weights_headers
 from ...scene.contents import scene_facts
 
 LIGHTS = ("diffuse", "glossy", "transmission")

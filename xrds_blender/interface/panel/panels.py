@@ -14,9 +14,9 @@ from ...internals.lifetimes import FILE
 from ...planning.estimates import Capabilities, automatic
 from ...planning.request import Request
 from ...planning.settings import Mode
-from ...render import history
-from ...render.choose import estimates
-from ...render.loading import capabilities
+from ...rendering import history
+from ...rendering.choose import estimates
+from ...rendering.loading import capabilities
 from ...scene.contents import has_light
 from .. import live_picture, operators, presets, translations
 from ..properties import DEADLINE, request_of

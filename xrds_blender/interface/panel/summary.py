@@ -17,11 +17,11 @@ from ...planning.estimates import Capabilities, Estimate, resolved
 from ...planning.plan import Plan
 from ...planning.request import Request
 from ...planning.settings import Mode, Settings
-from ...render import history
-from ...render.choose import frame_seconds
-from ...render.history import LastRender, scene_settings
-from ...render.pace.same_picture import can_save
-from ...render.sampling import has_neighbours
+from ...rendering import history
+from ...rendering.choose import frame_seconds
+from ...rendering.history import LastRender, scene_settings
+from ...rendering.pace.same_picture import can_save
+from ...rendering.sampling import has_neighbours
 from ...scene.contents import frame_range
 from ..machine import machine
 from ..properties import DENOISE
@@ -113,7 +113,7 @@ def _neighbours(scene: Any, request: Request) -> list[Row]:
 
 def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
     """What a time budget will about choose."""
-    from ...render.choose import foresee
+    from ...rendering.choose import foresee
 
     networks = sorted(here.networks) if here.torch else []
     shot = is_shot(scene, request)

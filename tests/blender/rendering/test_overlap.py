@@ -1,0 +1,152 @@
+"""Frames finished while the next ones are sampled: the same pictures, sooner."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+import pytest
+from channels import read_channels
+
+from xrds_blender.planning.request import render_request
+from xrds_blender.rendering import render as renders
+from xrds_blender.rendering import shot as shots
+from xrds_blender.rendering.full_size import FullSize
+from xrds_blender.rendering.overlap import Overlap, samples_on_card
+
+FRAMES = range(1, 6)
+
+
+def pieces() -> Iterator[Callable[[], int]]:
+    for number in range(4):
+        yield lambda number=number: number
+
+
+@pytest.mark.parametrize("is_on", [False, True])
+def test_pieces_come_in_order(is_on: bool) -> None:
+    found = []
+    with Overlap[int](is_on) as overlap:
+        for work in pieces():
+            found += overlap.put(work)
+        found += overlap.rest()
+    assert found == [0, 1, 2, 3]
+
+
+def test_one_piece_runs_beside_what_goes_on_here() -> None:
+    """Each piece ends only after something was done here; in turn none would."""
+    with Overlap[bool](True) as overlap:
+        for _ in range(4):
+            sampled = threading.Event()
+            assert all(overlap.put(lambda event=sampled: event.wait(600)))
+            sampled.set()
+        assert all(overlap.rest())
+
+
+def test_an_error_of_a_piece_reaches_the_one_who_takes_it() -> None:
+    def fail() -> int:
+        raise RuntimeError("no memory")
+
+    with Overlap[int](True) as overlap:
+        assert list(overlap.put(fail)) == []
+        with pytest.raises(RuntimeError, match="no memory"):
+            list(overlap.rest())
+
+
+def test_an_error_here_waits_for_nothing() -> None:
+    may_end, ended = threading.Event(), threading.Event()
+    overlap = Overlap[None](True)
+    list(overlap.put(lambda: may_end.wait(600) and ended.set()))
+    overlap.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
+    assert not ended.is_set()
+    may_end.set()
+
+
+def test_without_a_card_nothing_overlaps(life: Any) -> None:
+    life.cycles.device = "CPU"
+    assert not samples_on_card(life)
+    life.cycles.device = "GPU"  # but no card is chosen in the preferences
+    assert not samples_on_card(life)
+
+
+def test_a_shot_is_the_same_and_finished_while_the_next_is_sampled(
+    life: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = render_request(scale=1, samples=2, temporal_radius=1)
+    expected = dict(shots.render_shot(life, job, FRAMES))
+    threads: list[str] = []
+    finish = FullSize.finish
+
+    def noted(*args: Any, **choices: Any) -> Any:
+        threads.append(threading.current_thread().name)
+        return finish(*args, **choices)
+
+    monkeypatch.setattr(FullSize, "finish", noted)
+    monkeypatch.setattr(shots, "samples_on_card", lambda _: True)
+    found = dict(shots.render_shot(life, job, FRAMES))
+    assert list(found) == list(FRAMES)
+    for number, picture in found.items():
+        np.testing.assert_array_equal(picture.radiance, expected[number].radiance)
+    assert len(threads) == len(FRAMES)
+    assert all(name.startswith("finish") for name in threads)
+
+
+def test_an_animation_of_the_engine_is_the_same(
+    life: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Pictures and passes, with frames sampled while the one before is finished."""
+    life.render.engine = "XRDS"
+    life.xrds.mode, life.xrds.temporal_radius = "full_size", 1
+    life.frame_start, life.frame_end = 1, 5
+    life.view_layers[0].use_pass_normal = True
+    for number in (1, 5):
+        life.camera.location.x = 0.2 * number
+        life.camera.keyframe_insert("location", frame=number)
+    settings = life.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+    began: list[tuple[str, str]] = []
+    finish, sample = FullSize.finish, FullSize.sample
+
+    def noted(self: Any, own: Any, *more: Any, **choices: Any) -> Any:
+        began.append((f"finish {own.number}", threading.current_thread().name))
+        return finish(self, own, *more, **choices)
+
+    def sampled(self: Any, engine: Any, depsgraph: Any, *more: Any, **how: Any) -> Any:
+        number = depsgraph.scene_eval.frame_current
+        began.append((f"sample {number}", threading.current_thread().name))
+        return sample(self, engine, depsgraph, *more, **how)
+
+    monkeypatch.setattr(FullSize, "finish", noted)
+    monkeypatch.setattr(FullSize, "sample", sampled)
+    orders = []
+    for folder, is_on in (("turn", False), ("beside", True)):
+        monkeypatch.setattr(renders, "samples_on_card", lambda _, on=is_on: on)
+        life.render.filepath = str(tmp_path / folder / "#.exr")
+        began.clear()
+        bpy.ops.render.render(animation=True)
+        orders.append([name for name, _ in began])
+        threads = {thread for name, thread in began if name.startswith("finish")}
+        assert all(thread.startswith("finish") == is_on for thread in threads)
+    for number in FRAMES:
+        pair = [
+            read_channels(tmp_path / x / f"{number}.exr") for x in ("turn", "beside")
+        ]
+        assert pair[0].keys() == pair[1].keys()
+        for name, channel in pair[0].items():
+            np.testing.assert_array_equal(channel, pair[1][name], err_msg=name)
+    # each frame is sampled once, and a frame earlier
+    for order in orders:
+        assert sorted(x for x in order if x.startswith("sample")) == [
+            f"sample {n}" for n in FRAMES
+        ]
+    # "finish 1" is put before "sample 3" begins, and "finish 2" comes after it
+    turn, beside = orders
+    assert turn.index("sample 3") > turn.index("finish 1")
+    assert turn.index("sample 4") > turn.index("finish 2")
+    assert beside.index("sample 4") < beside.index("finish 3")
+    assert len(beside) == len(turn) == 2 * len(FRAMES)

@@ -1,0 +1,331 @@
+"""Shots with the picture of the file's own settings, from fewer samples."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from channels import read_channels
+
+bpy = pytest.importorskip("bpy")
+pytest.importorskip("mitsuba_oidn")
+
+from xrds_blender.command import main
+from xrds_blender.command.render_file import render_file
+from xrds_blender.cycles import settings
+from xrds_blender.cycles.settings import has_subsets
+from xrds_blender.planning.request import render_request
+from xrds_blender.rendering import sampling
+from xrds_blender.rendering.pace import measuring, more, same_picture
+from xrds_blender.rendering.pace.measuring import Threshold
+from xrds_blender.rendering.pace.more import blocks_beside, measured_regions, pixels_of
+from xrds_blender.rendering.sampling import Sampled
+from xrds_core.accumulation.frame import Frame, Stored
+from xrds_core.pace.worth import Ratio
+
+pytestmark = pytest.mark.skipif(
+    not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
+)
+FRAMES = [1, 2, 3, 4, 5, 6, 7]
+SAMPLES = 16
+MEASURED = [1, 4]  # the first frame, and the first beyond its neighbours
+
+
+@pytest.fixture
+def shot(blend: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The scene with enough samples to save some, in a short shot."""
+    monkeypatch.setattr(same_picture, "FEWEST_FRAMES", len(FRAMES))
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    scene = bpy.context.scene
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = SAMPLES, False
+    scene.frame_start, scene.frame_end = FRAMES[0], FRAMES[-1]
+    bpy.ops.wm.save_mainfile()
+    return blend
+
+
+def render(blend: Path, out: str, **job: Any) -> list[dict[str, Any]]:
+    request = {"scale": 1, "temporal_radius": 2, "same_picture": True} | job
+    pattern = str(blend.parent / out / "#.exr")
+    result = render_file(blend, pattern, render_request(**request), frames=FRAMES)
+    return result["frames"]
+
+
+def picture(path: Path) -> np.ndarray:
+    channels = read_channels(path)
+    return np.dstack([channels[name] for name in "RGB"])
+
+
+def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[tuple[int, int]]:
+    """Let the error of fewer samples be this.
+
+    Returns the counts that are rendered beside frames' own, and those of a sequence.
+    """
+    monkeypatch.setattr(measuring, "error_ratio", lambda *_: Ratio(ratio, 0.0))
+    lengths: list[tuple[int, int]] = []
+    inner = more.more_samples
+
+    def noted(engine: Any, depsgraph: Any, parts: Any, **more: Any) -> Any:
+        lengths.append((sum(part.length for part in parts), parts[0].whole))
+        return inner(engine, depsgraph, parts, **more)
+
+    monkeypatch.setattr(more, "more_samples", noted)
+    return lengths
+
+
+def test_fewer_samples_are_taken_where_they_are_enough(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measured(monkeypatch, 0.5)
+    shares = [frame["share"] for frame in render(shot, "same")]
+    rest = [share for n, share in zip(FRAMES, shares, strict=True) if n not in MEASURED]
+    assert min(rest) < 0.5, shares
+    assert np.mean(rest) < 0.7, shares
+    monkeypatch.undo()
+    assert {frame["share"] for frame in render(shot, "time", same_picture=False)} == {1}
+
+
+def test_all_samples_are_taken_where_neighbours_are_of_no_use(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lengths = measured(monkeypatch, float("inf"))
+    frames = render(shot, "same")
+    # the second was sampled when the first had shown that all are needed
+    shares = [{1: 1.25, 4: 2.0}.get(number, 1.0) for number in FRAMES]
+    assert [frame["share"] for frame in frames] == pytest.approx(shares)
+    # two halves in the first frame, and where neighbours lie on both sides; then the
+    # rest of those sampled before it was done
+    half = SAMPLES // 2, SAMPLES // 2
+    assert lengths[:2] == [half, half]
+    assert lengths.count(half) == 4
+    # of sequences as long as that of the frame sampled last, which has all: for another
+    # length Cycles would sync the scene again
+    assert {*lengths} == {half, (SAMPLES - SAMPLES // 4, SAMPLES)}
+
+
+def test_one_frame_that_needs_more_does_not_raise_those_of_the_rest() -> None:
+    pace = same_picture.SamePicture(SAMPLES, neighbours=8)
+    pace._worth.add(Ratio(0.8, 0.02), share=0.375, gain=4.0, neighbours=8)
+    shares = []
+    for gain in (4.0, 4.0, 4.0, 4.0, 3.2, 4.0, 4.0, 4.0, 4.0):
+        pace._choose_next(gain)
+        shares.append(pace.share)
+    assert len({*shares}) == 1, shares
+    assert 0.25 < shares[-1] < 0.5
+    needed = 1.0 / pace._equal(1.0, 4.0)
+    assert 0.0 <= shares[-1] - needed < 1.0 / SAMPLES  # the next number of samples
+    for _ in range(4):
+        pace._choose_next(2.0)
+    assert pace.share > 1.2 * shares[-1]
+    for _ in range(4):
+        pace._choose_next(1.2)
+    assert pace.share == 1.0  # where nearly all are needed
+
+
+def test_more_samples_make_the_picture_of_all(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where no neighbour is used, it is one render of all samples, but for noise."""
+    measured(monkeypatch, float("inf"))
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    for obj in bpy.data.objects:
+        obj.animation_data_clear()
+    scene = bpy.context.scene
+    for number in FRAMES:  # another camera each: nothing is reused
+        data = bpy.data.cameras.new(str(number))
+        camera = bpy.data.objects.new(str(number), data)
+        camera.matrix_world = scene.camera.matrix_world
+        camera.keyframe_insert("location", frame=1)  # else frames share a sequence
+        scene.collection.objects.link(camera)
+        scene.timeline_markers.new(str(number), frame=number).camera = camera
+    bpy.ops.wm.save_mainfile()
+    render(shot, "same")
+    render(shot, "time", same_picture=False)
+    for number in set(FRAMES) - set(MEASURED):  # which have more than all
+        pair = [
+            picture(shot.parent / out / f"{number}.exr") for out in ("same", "time")
+        ]
+        assert np.allclose(*pair, rtol=0.02, atol=2e-3)
+
+
+def test_a_noise_threshold_is_kept_and_raised(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    cycles = bpy.context.scene.cycles
+    cycles.use_adaptive_sampling, cycles.adaptive_threshold = True, 0.2
+    cycles.samples = 64
+    bpy.ops.wm.save_mainfile()
+    sampled: list[float] = []
+    is_even: list[bool] = []
+    store = sampling.store
+
+    def noted(frame: Frame, *more: Any) -> Stored:
+        sampled.append(frame.samples)
+        is_even.append(frame.counts is None)
+        return store(frame, *more)
+
+    monkeypatch.setattr(sampling, "store", noted)
+    render(shot, "time", same_picture=False)
+    all_of_them = sampled[2]  # the mean of the middle frame's pixels
+    assert not any(is_even)
+    sampled.clear()
+    is_even.clear()
+    measured(monkeypatch, 0.5)
+    asked: list[int] = []
+    set_sampling = settings.set_sampling
+
+    def keep(borrowed: Any, scene: Any, samples: int, seed: int) -> None:
+        asked.append(samples)
+        set_sampling(borrowed, scene, samples, seed)
+
+    monkeypatch.setattr(settings, "set_sampling", keep)
+    render(shot, "same")
+    assert sampled[2] < 0.6 * all_of_them
+    # Until a frame was measured in, those of the file are not known; from then on
+    # Cycles would look at a pixel's noise too seldom.
+    assert not any(is_even[:3])
+    assert all(is_even[3:])
+    assert max(asked) < 64  # Cycles lets the first of many samples stop later
+    scene = bpy.context.scene
+    assert scene.cycles.adaptive_threshold == pytest.approx(0.2)
+
+
+def test_what_is_told_is_what_a_frame_has() -> None:
+    pace = same_picture.SamePicture(64)
+    assert pace._decision(0.25).value == "25% of the file's samples"
+    # under a noise threshold the pixels decide: of what the file takes on the mean
+    pace = same_picture.SamePicture(4096, least=32)
+    pace._threshold = Threshold(54.0, 48.0, 4096.0, 1.0)
+    frame = SimpleNamespace(samples=27.0)
+    share = pace._share(Sampled(1, {"": frame}, {}), asked=0.25)
+    assert pace._decision(share).value == "50% of the file's samples"
+
+
+@pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--sample-cache c"])
+def test_what_rules_it_out_is_said(
+    what: str, shot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["render", str(shot), "-o", str(shot.parent / "#.exr"), "--same-picture"]
+    words += ["--frames", "1-7", *what.split()]
+    assert main.main(words) == 2
+    assert "--same-picture cannot be had with" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("job", "frames"),
+    [({"samples": 16}, 7), ({"temporal_radius": 0}, 7), ({}, 6), ({"scale": 2}, 7)],
+)
+def test_elsewhere_frames_have_the_samples_of_the_file(
+    job: dict[str, Any], frames: int, shot: Path
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    request = {"scale": 1, "temporal_radius": 2, "same_picture": True} | job
+    scene = bpy.context.scene
+    assert not same_picture.can_save(scene, render_request(**request), frames)
+    possible = render_request(1, temporal_radius=2, same_picture=True)
+    assert same_picture.can_save(scene, possible, len(FRAMES))
+    scene.view_layers[0].samples = 32  # a layer's own
+    assert not same_picture.can_save(scene, possible, len(FRAMES))
+
+
+def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
+    render(shot, "command", temporal_radius=4)
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    scene = bpy.context.scene
+    scene.render.engine, scene.xrds.mode = "XRDS", "full_size"
+    assert scene.xrds.animation == "same_time"
+    scene.xrds.animation = "same_picture"
+    scene.render.filepath = str(shot.parent / "engine" / "#")
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    scene.render.image_settings.color_depth = "32"
+    bpy.ops.render.render(animation=True)
+    for number in FRAMES:
+        pair = [
+            picture(shot.parent / out / f"{number}.exr")
+            for out in ("command", "engine")
+        ]
+        assert np.allclose(*pair, rtol=1e-3, atol=1e-4)
+
+
+@pytest.mark.parametrize(("frames", "is_said"), [("1-7", True), ("1-6", False)])
+def test_the_plan_of_a_shot_says_so(
+    frames: str, is_said: bool, shot: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["plan", str(shot), "--scale", "1", "--same-picture", "--frames", frames]
+    assert main.main(words) == 0
+    assert ("same picture: as few samples" in capsys.readouterr().out) == is_said
+
+
+@pytest.mark.parametrize(
+    ("shape", "share"),
+    [((1080, 1920), 0.25), ((2160, 3840), 0.25), ((540, 960), 0.5), ((300, 400), 1.0)],
+)
+def test_large_pictures_are_measured_in_parts_from_top_to_bottom(
+    shape: tuple[int, int], share: float
+) -> None:
+    regions = measured_regions(shape)
+    covered = np.zeros(shape, int)
+    for region in regions:
+        assert share == 1.0 or region.x % 32 == region.width % 32 == 0
+        assert region.height == shape[0]
+        covered[pixels_of(region)] += 1
+    assert covered.max() == 1
+    assert covered.mean() == pytest.approx(share, abs=0.04)
+    blocks = np.ones([-(-side // 32) for side in shape], bool)
+    rest = np.sum(blocks_beside(blocks, regions), axis=0)
+    assert rest.max(initial=0) == (share < 1.0)
+    for region in regions:
+        assert not rest[:, region.x // 32 : (region.x + region.width) // 32].any()
+
+
+def test_what_is_measured_is_the_picture(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All of it, without the parts of its light; or a strip of it."""
+    inner, differences = measuring.measure, []
+
+    def noted(method: Any, own: Any, others: Any, *more: Any) -> Any:
+        (view,) = own.views
+        shown = np.asarray(method.finish(own, others, view).radiance)
+        height, width = shown.shape[:2]
+        for columns in (slice(0, width), slice(0, width // 2)):
+            part = method.radiance(own, others, view, (slice(0, height), columns))
+            assert part.shape == (height, columns.stop, 3)
+            differences.append(np.abs(part - shown[:, columns]).mean() / shown.mean())
+        return inner(method, own, others, *more)
+
+    monkeypatch.setattr(same_picture, "measure", noted)
+    render(shot, "same")
+    assert len(differences) == 2 * len(MEASURED)
+    assert max(differences[::2]) == 0.0
+    assert 0.0 < max(differences[1::2]) < 0.05  # the denoiser sees less
+
+
+def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    render_settings = bpy.context.scene.render
+    render_settings.resolution_x, render_settings.resolution_y = 128, 96
+    bpy.ops.wm.save_mainfile()
+    monkeypatch.setattr("xrds_blender.rendering.pace.more._LEAST_AREA", 2000)
+    assert len(measured_regions((96, 128))) == 2
+    sizes: list[int] = []
+
+    def noted(ours: Any, noisy: Any, parts: Any, *_: Any) -> Ratio:
+        sizes.append(ours.shape[0] * ours.shape[1])
+        assert ours.shape == noisy.shape == parts[0].noisy.shape
+        return Ratio(float("inf"), 0.0)
+
+    monkeypatch.setattr(measuring, "error_ratio", noted)
+    frames = render(shot, "same")
+    assert sizes == [2 * 32 * 96] * 2
+    shares = {number: x["share"] for number, x in zip(FRAMES, frames, strict=True)}
+    # all samples everywhere; where it was measured, in half of the picture, frame 1
+    # has a quarter more, and frame 4 had them all before
+    expected = {1: 1.125, 4: 1.5}
+    for number in FRAMES:
+        assert shares[number] == pytest.approx(expected.get(number, 1.0)), shares

@@ -1,1 +1,0 @@
-"""Many frames: a window that slides over a shot."""

@@ -1,0 +1,260 @@
+"""The one path from a scene to a picture; every button and command ends here.
+
+A still is a frame without neighbours; a frame of an animation has those of its shot.
+Both are sampled and finished by the same method, and written by the same lines.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import takewhile
+from typing import Any
+
+from xrds_core.arrays import Array
+from xrds_core.errors import Cancelled
+
+from ..cycles import session
+from ..internals.lifetimes import RENDER_JOB
+from ..planning.request import Request, render_request
+from . import history, stages, torch_folder
+from .blender_job import call_engine
+from .choose import Chosen, choose_for_shot, chosen
+from .engine_frames import EngineFrames
+from .full_size import FullSize
+from .methods import CyclesOnly, Method, Report
+from .overlap import Overlap, samples_on_card
+from .picture import NetworkFailed, Picture, joined
+from .sampling import OnSampled, Sampled, has_neighbours
+from .super_resolution import SuperResolution
+
+
+@dataclass(frozen=True)
+class _Animation:
+    """A view layer's frames in one render job; `request` is what `chosen` came from."""
+
+    request: Request
+    chosen: Chosen
+    frames: EngineFrames
+
+
+@dataclass
+class Animations:
+    """Those of one render job, by scene and view layer: no edit comes between."""
+
+    by_layer: dict[tuple[str, str], _Animation] = field(default_factory=dict)
+
+
+def method_of(chosen: Chosen, on_sampled: OnSampled | None = None) -> Method:
+    """What makes pictures of a job; `on_sampled` as in `FullSize`.
+
+    Raises XRDSError where its parts cannot be loaded.
+    """
+    request = chosen.request
+    if request.settings.is_cycles_only:
+        return CyclesOnly(request)
+    if not request.settings.is_enlarged:
+        return FullSize(request, on_sampled, chosen.denoise_in_time)
+    return SuperResolution(request)
+
+
+def render(
+    scene: Any, scale: int = 1, *, layer: str | None = None, **choices: Any
+) -> Picture:
+    """As `xrds_blender.rendering`; the engine must be registered."""
+    return render_scene(scene, render_request(scale, **choices), layer)
+
+
+def render_scene(scene: Any, request: Request, layer: str | None = None) -> Picture:
+    """Render the scene's current frame, one layer of it, by itself."""
+    start = time.perf_counter()
+
+    def work(engine: Any, depsgraph: Any) -> Picture:
+        return render_alone(engine, depsgraph, request, start)
+
+    return call_engine(scene, work, layer)
+
+
+def render_frame(engine: Any, depsgraph: Any, request: Request) -> Picture:
+    """Render what Blender asks for: a frame by itself, or one of an animation.
+
+    As `render_alone`; in an animation with the samples of its neighbours.
+    """
+    if engine.is_animation:
+        scene = depsgraph.scene_eval
+        left = (scene.frame_end - scene.frame_current) // scene.frame_step
+        stages.begin_frame(scene.frame_current, left)
+        if not _renders_single_frames():
+            if has_neighbours(scene, request):
+                return _render_in_animation(engine, depsgraph, request)
+            if request.deadline is not None:
+                alone = request.with_settings(temporal_radius=0)
+                return _render_in_animation(engine, depsgraph, alone)
+    return render_alone(engine, depsgraph, request)
+
+
+def render_alone(
+    engine: Any, depsgraph: Any, request: Request, start: float | None = None
+) -> Picture:
+    """Render the layer into the engine's result; the picture is of its first view.
+
+    `start`, a reading of perf_counter, is where a time budget and the total begin.
+    Raises Cancelled when the user stops it and XRDSError where it cannot be done, then
+    with nothing written; but NetworkFailed, as for too little memory, with the
+    low-resolution picture in the result, enlarged.
+    """
+    start = time.perf_counter() if start is None else start
+    layer = history.layer_of(depsgraph)
+    alone = request.with_settings(temporal_radius=0)
+    try:
+        with chosen(engine, depsgraph, alone, start) as found:
+            if found.request.settings.is_enlarged and torch_folder.loaded() is None:
+                stages.begin(engine, stages.LOADING, 0)  # which takes some seconds
+            method = method_of(found)  # first: missing weights are to cost no render
+            own = method.sample(engine, depsgraph)
+            picture = _finish(engine, layer.name, method, own)
+    finally:
+        stages.end()
+    return _described(found, picture, layer, start)
+
+
+def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Picture:
+    """Render the frame with its neighbours; every pass but Combined is Cycles' own."""
+    start, layer = time.perf_counter(), history.layer_of(depsgraph)
+    key = layer.scene, layer.name
+    number = depsgraph.scene_eval.frame_current
+    try:
+        animations = RENDER_JOB.of(Animations).by_layer
+        animation = animations.get(key)
+        if animation is None or animation.request != request:
+            choice = choose_for_shot(engine, depsgraph, request)
+            same = (a for k, a in animations.items() if k[0] == key[0])
+            beside = next((a.frames.method for a in same if a.request == request), None)
+            scene, method = depsgraph.scene_eval, method_of(choice)
+            frames = EngineFrames.of(scene, method, beside)
+            animation = animations[key] = _Animation(request, choice, frames)
+        frames = animation.frames
+        try:
+            found = frames.neighbourhood(engine, depsgraph)
+        except Cancelled:
+            own = frames.window.get(number)
+            if own is not None:  # else its samples so far are in the result already
+                _leave_stopped(engine, key[1], frames.method, own)
+            raise
+        others = list(found.neighbours.values())
+        ahead = None
+        if frames.method.pace is None and samples_on_card(depsgraph.scene_eval):
+            ahead = partial(frames.sample_next, engine, depsgraph)
+        picture = _finish(engine, key[1], frames.method, found.own, others, ahead)
+    finally:
+        stages.end()
+    return _described(animation.chosen, picture, layer, start)
+
+
+def _described(
+    choice: Chosen, picture: Picture, layer: history.Layer, start: float
+) -> Picture:
+    """The picture with what it was rendered by and how long; it is remembered."""
+    picture = choice.described(picture)
+    picture.seconds["total"] = time.perf_counter() - start
+    assert picture.settings is not None
+    history.remember(layer, picture.settings, picture.seconds, _devices(picture))
+    return picture
+
+
+def _devices(picture: Picture) -> dict[str, str]:
+    """What the last stage of a picture ran on."""
+    assert picture.settings is not None
+    stage = "network" if picture.settings.is_enlarged else "denoise"
+    return {stage: picture.device}
+
+
+def _finish(
+    engine: Any,
+    layer_name: str,
+    method: Method,
+    own: Sampled,
+    others: Sequence[Sampled] = (),
+    ahead: Callable[[], None] | None = None,
+) -> Picture:
+    """Make the picture of each view and write it; returns the first view's.
+
+    What there is to do `ahead` is done meanwhile.
+    """
+
+    def finish(report: Report | None) -> dict[str, Picture]:
+        return {v: method.finish(own, others, v, report) for v in own.views}
+
+    try:
+        report = method.begin_finishing(engine)
+        if ahead is None:
+            pictures = finish(report)
+        else:
+            # Blender's progress is for its own thread alone
+            with Overlap[dict[str, Picture]](True) as overlap:
+                list(overlap.put(partial(finish, None)))
+                ahead()
+                (pictures,) = overlap.rest()
+        session.stop_if_cancelled(engine)
+    except NetworkFailed:
+        _write(engine, layer_name, method, own, method.stopped(own))
+        raise
+    except Cancelled:
+        _leave_stopped(engine, layer_name, method, own)
+        raise
+    started = time.perf_counter()
+    picture = joined(pictures, own.seconds)
+    combined = picture.views or dict.fromkeys(pictures, picture.pixels)
+    parts = {view: each.parts for view, each in pictures.items()}
+    _write(engine, layer_name, method, own, combined, parts)
+    picture.seconds["write"] = time.perf_counter() - started
+    return picture
+
+
+def _leave_stopped(engine: Any, layer_name: str, method: Method, own: Sampled) -> None:
+    """Leave what there is of a frame that was stopped, if the request asks for it."""
+    if method.request.finish_stopped:
+        _write(engine, layer_name, method, own, method.stopped(own))
+
+
+def _write(
+    engine: Any,
+    layer_name: str,
+    method: Method,
+    own: Sampled,
+    pictures: dict[str, Array],
+    parts: Mapping[str, Mapping[str, Array]] | None = None,
+) -> None:
+    """Write the pictures (H, W, 4) and the light passes of each view.
+
+    `parts` are those that were finished with the pictures.
+    """
+    layer = engine.get_result().layers[layer_name]
+    for view in own.views:
+        finished = (parts or {}).get(view, {})
+        for name, light in {**method.light_passes(own, view), **finished}.items():
+            session.write_pass(layer, name, view, light)
+    session.write_combined(engine, layer_name, pictures)
+
+
+def _renders_single_frames() -> bool:
+    """Whether Blender was started for frames by number alone.
+
+    Each is a render job of its own then, which could pass nothing on to the next. What
+    stands after -- is a script's, as is everything where Blender is a module.
+    """
+    if not _is_program_without_window():
+        return False
+    words = set(takewhile(lambda word: word != "--", sys.argv))
+    animates = {"-a", "--render-anim"} & words
+    return bool({"-f", "--render-frame"} & words) and not animates
+
+
+def _is_program_without_window() -> bool:
+    """Whether this is Blender in the background, not its Python module."""
+    import bpy
+
+    return bpy.app.background and bool(bpy.app.binary_path)

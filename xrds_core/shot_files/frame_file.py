@@ -1,0 +1,480 @@
+"""Reads one frame from an OpenEXR file, with all that reprojection needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..accumulation.camera import SKY_DEPTH, Camera
+from ..accumulation.frame import Frame, Halves, Stored, store
+from ..accumulation.noise import Noise
+from ..accumulation.reprojection import centres, pixels_of
+from ..denoising.light_passes import Wanted, find_parts, light_of
+from ..errors import NotReusable, PictureError, Unfit
+from ..exr import File
+from ..exr.raw_header import is_mostly_empty
+from ..frames import MOST_RADIUS, frame_path
+from . import cameras
+from .cameras import camera_of_frame, from_header, has_camera
+from .pass_names import Found, PassNames, find
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from ..arrays import Array
+    from ..denoising.light_passes import LightPart
+    from ..exr.openexr_io import Attributes, Part, Window
+
+
+SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
+
+SUBSET = "xrds/subset"
+
+NAME = "cameraLabel"
+"""Attributes: samples per pixel; a key of what the frame was rendered from; the
+temporal radius that its sample subsets are for; 1 where nothing at all moves in the
+shot; `Frame.subset`, none of a sequence of its own; the camera's name."""
+
+_DEFAULT_SAMPLES = 16
+
+_FITS = 2.0  # pixels by which a reprojected Position pass may be off
+
+_NEAREST = 1e-30  # depth of a hit, in any unit: dividing by it stays within float32
+
+_SPOTS = 4096  # pixels for which this is checked
+
+_CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # placeholder where none is needed
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Options for reading files, for what they do not say themselves.
+
+    `cameras` are those of `cameras.read_cameras`; `samples` per pixel; `normal_space`
+    and `position_space` are `world` or `camera`, None for what the passes' names say;
+    `motion_scale` are the factors that convert a motion pass of two channels to pixels
+    to the next frame, x to the right and y upwards. `halves` is a pattern of files with
+    the second half buffers: as many other samples of each frame. `light` are the parts
+    of the light that are read as well; `also` are patterns of files with further
+    passes. The picture of one without passes is called as the file without the number.
+    """
+
+    names: PassNames = field(default_factory=PassNames)
+    cameras: Mapping[int | None, dict[str, Any]] | None = None
+    samples: int | None = None
+    normal_space: str | None = None
+    position_space: str | None = None
+    motion_scale: tuple[float, float] = (1.0, 1.0)
+    halves: str | None = None
+    light: Wanted = field(default_factory=Wanted)
+    also: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class FrameFile:
+    """A frame of a file.
+
+    `stored` covers the display window and all that the picture's data window has
+    beyond it, or, of a frame that is not to be reused, the data window alone; `inner`
+    crops its arrays to the latter, `data_window`. `part` is the file's part with the
+    picture and `channels` are those of the picture, R, G, B and, where the file has
+    alpha, A. Frames with the same `key` have the same render settings; "" if unknown.
+    `radius` is the one that the file recommends, or None, and `subset` that of
+    `Frame`. `reusable` is False where the frame cannot be reprojected. `light` are the
+    parts of its light that were read; `places` says in which part of the file a channel
+    lies, and what it is called there.
+    `others` are the other views of a stereo file, `unread` says why some are not read.
+    """
+
+    stored: Stored
+    inner: tuple[slice, slice]
+    data_window: Window
+    part: int
+    channels: list[str]
+    key: str
+    radius: int | None
+    reusable: bool
+    subset: int | None = None
+    light: tuple[LightPart, ...] = ()
+    places: Mapping[str, tuple[int, str]] = field(default_factory=dict)
+    others: Mapping[str, FrameFile] = field(default_factory=dict)
+    unread: Mapping[str, str] = field(default_factory=dict)
+
+
+def read_frame(
+    path: Path, number: int, reading: Reading, *, reusable: bool = True
+) -> FrameFile:
+    """Read a frame; one that need not be `reusable` needs no camera and no depth.
+
+    Of a stereo file it is the first view, with the `others`. Raises Unfit, also
+    NotReusable, with the path and the remedy, and PictureError for an incomplete file.
+    """
+    first, *rest = File(path, _also(path, number, reading)).views()
+    frame = _read_view(first, number, reading, reusable)
+    others, unread = {}, {}
+    for file in rest:
+        try:
+            others[file.view] = _read_view(file, number, reading, frame.reusable)
+        except Unfit as error:
+            unread[file.view] = str(error)
+    return replace(frame, others=others, unread=unread)
+
+
+def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> FrameFile:
+    found = find(file.names, reading.names)
+    number_of_part, channels = _target(file, found)
+    part = file.parts[number_of_part]
+    file.window = _window(file.path, part) if reusable else part.data_window
+    camera, depth = _geometry(file, part, found, number, reading, reusable)
+    beauty = _stack(file, found.beauty)
+    light = find_parts(file.names, _layer(found), reading.light)
+    frame = Frame(
+        number=number,
+        camera=camera or _CENTRE,
+        radiance=beauty,
+        albedo=_guide(_stack(file, found.albedo)),
+        normal=_guide(_normal(file, found, camera, reading)),
+        depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
+        samples=_samples(file, part, reading),
+        alpha=file.plane(found.alpha) if found.alpha else None,
+        counts=file.plane(found.counts[0]) if found.counts else None,
+        vector=_vector(file, found, reading) if reusable else None,
+        path_length=_path_length(file, found) if reusable else None,
+        still=cameras.whole_or_none(part.attributes.get(STILL)) == 1,
+        parts=_light(file, light),
+    )
+    if reading.halves is not None:
+        frame = _with_other_half(frame, file, camera, reading)
+    stored = store(frame)
+    if reading.halves is None and found.noise:
+        stored = replace(stored, noise=_noise(file, found))
+    return FrameFile(
+        stored=stored,
+        inner=_inner(file.window, part.data_window),
+        data_window=part.data_window,
+        part=number_of_part,
+        channels=channels,
+        key=str(part.attributes.get(KEY, "")),
+        radius=cameras.whole_or_none(part.attributes.get(RADIUS), 0, MOST_RADIUS),
+        reusable=camera is not None and depth is not None,
+        subset=cameras.whole_or_none(part.attributes.get(SUBSET)),
+        light=light,
+        places={
+            name: _place(file, number_of_part, name)
+            for each in light
+            for name in (*each.channels, *each.colour)
+        },
+    )
+
+
+def _also(path: Path, number: int, reading: Reading) -> dict[str, Path]:
+    """The files that belong to a frame's, by their names without its number."""
+    found = {}
+    for pattern in reading.also:
+        other = frame_path(pattern, number)
+        if not other.is_file():
+            raise PictureError(f"there is no file {other}, which belongs to {path}")
+        found[Path(pattern).stem.partition("#")[0].rstrip("._-")] = other
+    return found
+
+
+def _place(file: File, part: int, name: str) -> tuple[int, str]:
+    """Where a channel is written to: what lies in other files is added to a `part`."""
+    there, own = file.place(name)
+    return (there, own) if there < file.own_parts else (part, name)
+
+
+def _layer(found: Found) -> str:
+    """The layer that the noisy radiance lies in; "" where it lies in none."""
+    return found.beauty[0].rpartition(".")[0].rpartition(".")[0]
+
+
+def _light(file: File, parts: Sequence[LightPart]) -> dict[str, Array]:
+    return light_of(parts, lambda names: _stack(file, list(names)))
+
+
+def _with_other_half(
+    frame: Frame, file: File, camera: Camera | None, reading: Reading
+) -> Frame:
+    """Return the mean of a frame and of its second half buffer."""
+    assert reading.halves is not None
+    path = frame_path(reading.halves, frame.number)
+    if not path.is_file():
+        raise PictureError(f"there is no file {path}, the frame's other half")
+    views = {each.view: each for each in File(path).views()}
+    other = views.get(file.view)
+    if other is None:
+        raise Unfit(f"{path} is no half of {file.path}: it lacks the view {file.view}")
+    found = find(other.names, reading.names)
+    part = other.parts[_target(other, found)[0]]
+    same_size = part.display_window == file.parts[0].display_window
+    if not same_size or (found.alpha is None) != (frame.alpha is None):
+        raise Unfit(f"{path} is no half of {file.path}: its size or alpha differs")
+    other.window = file.window
+    passes = {
+        "radiance": _stack(other, found.beauty),
+        "albedo": _guide(_stack(other, found.albedo)),
+        "normal": _guide(_normal(other, found, camera, reading)),
+    }
+    if found.alpha:
+        passes["alpha"] = other.plane(found.alpha)
+    halves = Halves(
+        **{name: np.stack((getattr(frame, name), x)) for name, x in passes.items()}
+    )
+    means: dict[str, Any] = {name: halves.mean(name) for name in passes}
+    light = find_parts(other.names, _layer(found), reading.light)
+    more = _light(other, light)
+    if more.keys() != frame.parts.keys():
+        raise Unfit(f"{path} is no half of {file.path}: its parts of the light differ")
+    means["parts"] = {k: (x + more[k]) / 2 for k, x in frame.parts.items()}
+    return replace(frame, **means, samples=2 * frame.samples, halves=halves)
+
+
+_REMEDY = {
+    "camera": "give --camera cameras.json, or --temporal-radius 0 to denoise each "
+    "frame by itself",
+    "depth": "render Position or Depth too, name it with --position or --depth, or "
+    "give --temporal-radius 0",
+}
+
+
+def _geometry(
+    file: File, part: Part, found: Found, number: int, reading: Reading, reusable: bool
+) -> tuple[Camera | None, Array | None]:
+    """Camera and depth; if not `reusable`, a camera if there is one, and no depth.
+
+    Raises NotReusable, if `reusable`, for what is missing or unusable.
+    """
+    try:
+        camera = _camera(file, part, number, reading)
+    except NotReusable:
+        if reusable:
+            raise
+        camera = None
+    if not reusable:
+        return camera, None
+    depth = None if camera is None else _depth(file, found, camera, reading)
+    if camera is None or depth is None:
+        lacking = "camera" if camera is None else "depth"
+        raise NotReusable(f"{file.path} has no {lacking}", _REMEDY[lacking])
+    return camera, depth
+
+
+def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | None:
+    """The camera from the options, or else from the header."""
+    (left, top), (right, bottom) = part.display_window
+    size = (right - left + 1, bottom - top + 1)
+    header = _header_with_camera(file, part)
+    try:
+        if reading.cameras is not None:
+            aspect = cameras.number(header.get("pixelAspectRatio", 1.0), 1e-3, 1e3)
+            camera = camera_of_frame(reading.cameras, number, size, aspect)
+        else:
+            camera = from_header(header, size)
+    except ValueError as error:
+        raise NotReusable(
+            f"{file.path}: its camera cannot be used ({error})", _REMEDY["camera"]
+        ) from error
+    if camera is None or file.window is None:
+        return None
+    (x, y), _ = file.window
+    # Blender writes `Camera`
+    name = camera.name or str(header.get(NAME) or header.get("Camera", ""))
+    return replace(camera, window=(x - left, y - top), name=name)
+
+
+def _header_with_camera(file: File, part: Part) -> Attributes:
+    """The part's header, or else that of the first part that holds a camera."""
+    headers = [part.attributes, *(each.attributes for each in file.parts)]
+    return next((x for x in headers if has_camera(x)), part.attributes)
+
+
+def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array | None:
+    """Depth (H, W) along the camera's axis, infinite without a hit."""
+    position, depth = found.position, found.depth
+    if depth and position and _is_half(file, position):
+        position = []  # half floats give positions only to centimetres
+    if not position:
+        if not depth:
+            return None
+        plane = file.plane(depth[0])
+        if found.has_length:
+            height, width = plane.shape
+            plane = plane * camera.depth_per_length((height, width))
+        return _from_depth(plane)
+    points = _stack(file, position)
+    points[~np.isfinite(points).all(axis=-1)] = 0.0
+    if reading.position_space == "camera":
+        return _from_depth(points[..., 2])
+    with np.errstate(over="ignore", invalid="ignore"):  # huge positions
+        result = camera.depth(points)
+    result[np.abs(result) < _NEAREST] = 0.0
+    if camera.sphere is None and file.is_first:  # the header has one view's camera
+        _check_fit(file, camera, points, result)
+    return result
+
+
+def _from_depth(depth: Array) -> Array:
+    """Depth; renderers write 0, infinity or a huge number where there is no hit."""
+    depth = np.abs(depth)
+    with np.errstate(invalid="ignore"):
+        hit = (depth > _NEAREST) & (depth < SKY_DEPTH)
+    return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
+
+
+def _path_length(file: File, found: Found) -> Array | None:
+    return file.plane(found.path_length[0]) if found.path_length else None
+
+
+def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
+    """Raise NotReusable if the camera does not project positions to their pixels."""
+    seen = np.flatnonzero(np.isfinite(depth.ravel()) & (depth.ravel() > 0.0))
+    if not seen.size:
+        return
+    spots = seen[:: max(1, seen.size // _SPOTS)]
+    world = points.reshape(-1, 3)[spots].astype(np.float64)
+    there = pixels_of(camera) @ np.column_stack((world, np.ones(len(world)))).T
+    x, y = centres(spots, depth.shape[1])
+    with np.errstate(all="ignore"):  # a wrong camera may be at a point, or far off
+        apart = np.hypot(there[0] / there[2] - x, there[1] / there[2] - y)
+        off = float(np.median(apart))
+    if not off < _FITS:
+        raise NotReusable(
+            f"{file.path}: its camera shows the Position pass {off:.0f} pixels beside "
+            "its pixels",
+            "give another --camera, --position-space camera, or --temporal-radius 0",
+        )
+
+
+def _normal(file: File, found: Found, camera: Camera | None, reading: Reading) -> Array:
+    """Normals in the camera's axes, Z away from the viewer, as Cycles' guides."""
+    normal = _stack(file, found.normal)
+    space = reading.normal_space
+    if space is None:
+        space = "camera" if found.has_camera_normal else "world"
+    if space == "camera" or camera is None:
+        return normal
+    turn = np.diag([1.0, 1.0, -1.0]) @ camera.view[:3, :3]
+    with np.errstate(over="ignore", invalid="ignore"):  # of vectors that are no normals
+        return normal @ turn.T.astype(np.float32)
+
+
+def _vector(file: File, found: Found, reading: Reading) -> Array | None:
+    """Cycles' Vector pass, or one of one direction: motion is assumed to be uniform."""
+    if not found.vector:
+        return None
+    motion = _stack(file, found.vector)
+    if motion.shape[-1] == 2:
+        motion = motion * np.array(reading.motion_scale, np.float32)
+        return -np.concatenate((motion, motion), axis=-1)
+    return motion
+
+
+def _noise(file: File, found: Found) -> Noise:
+    """The noise of a frame as XRDS stored it."""
+    return Noise.of(*(file.plane(name) for name in found.noise))
+
+
+def _samples(file: File, part: Part, reading: Reading) -> float:
+    """Samples per pixel: from the options, or as XRDS or Blender wrote them."""
+    if reading.samples:
+        return reading.samples
+    mean = part.attributes.get(SAMPLES)
+    if isinstance(mean, float) and 1.0 <= mean <= cameras.MOST:
+        return mean
+    values = []
+    for each in (part, *file.parts):  # renderers may tell the first part alone
+        values.append(each.attributes.get(SAMPLES))
+        values += [v for k, v in each.attributes.items() if _is_cycles_samples(k)]
+    counts = [cameras.whole_or_none(x, 1) for x in values]
+    return next((x for x in counts if x is not None), _DEFAULT_SAMPLES)
+
+
+def _is_cycles_samples(name: str) -> bool:
+    return name.startswith("cycles.") and name.endswith(".samples")
+
+
+def _target(file: File, found: Found) -> tuple[int, list[str]]:
+    """Return the part that the picture is written to, and its channels' names there.
+
+    Raises Unfit where it lies in another file than the one that is copied.
+    """
+    part, names = _target_of_all(file, found)
+    if part >= file.own_parts:
+        raise Unfit(
+            f"the picture of {file.path} lies in a file of --also: give that file as "
+            "the input, and this one by --also"
+        )
+    return part, names
+
+
+def _target_of_all(file: File, found: Found) -> tuple[int, list[str]]:
+    prefix = found.picture[0].rpartition(".")[0]
+    alpha = f"{prefix}.A" if prefix else "A"
+    wanted = [*found.picture, alpha] if found.alpha is not None else found.picture
+    there = [name for name in wanted if name in file.names.names]
+    parts = {file.place(name)[0] for name in there}
+    if len(parts) > 1:
+        raise Unfit(
+            f"{file.path} holds {', '.join(there)} in several parts; save them in one"
+        )
+    if not parts:
+        names = [_in_layer(file.view, x.rpartition(".")[2]) for x in wanted]
+        return file.place(found.beauty[0])[0], names
+    ahead = file.place(there[0])[1].rpartition(".")[0]
+    return parts.pop(), [_in_layer(ahead, x.rpartition(".")[2]) for x in wanted]
+
+
+def _in_layer(layer: str, letter: str) -> str:
+    return f"{layer}.{letter}" if layer else letter
+
+
+def _guide(x: Array) -> Array:
+    """Guides without NaN: a sky may have no normal, and its light is valid anyway."""
+    known = np.isfinite(x).all(axis=-1, keepdims=True)
+    return x if known.all() else np.where(known, x, np.float32(0.0))
+
+
+def _stack(file: File, names: list[str]) -> Array:
+    return np.stack([file.plane(name) for name in names], axis=-1)
+
+
+def _is_half(file: File, names: list[str]) -> bool:
+    return any(file.pixels(name).dtype == np.float16 for name in names)
+
+
+def _window(path: str | Path, part: Part) -> Window:
+    """The window that the arrays of a frame cover.
+
+    Renderers may crop each frame to its content, so that the display window is what
+    frames have in common. Our own files all have the same crop. Raises NotReusable if
+    the window would be mostly empty and fill the memory.
+    """
+    if KEY in part.attributes:
+        return part.data_window
+    (a, b), (c, d) = part.data_window
+    (e, f), (g, h) = part.display_window
+    whole = (min(a, e), min(b, f)), (max(c, g), max(d, h))
+    if is_mostly_empty(_area(part.data_window), _area(whole)):
+        (left, top), (right, bottom) = whole
+        raise NotReusable(
+            f"{path} holds few of the {right - left + 1}x{bottom - top + 1} pixels of "
+            "its windows",
+            "if it is sound give --read-limit, or else --temporal-radius 0",
+        )
+    return whole
+
+
+def _area(window: Window) -> int:
+    (left, top), (right, bottom) = window
+    return (right - left + 1) * (bottom - top + 1)
+
+
+def _inner(whole: Window, part: Window) -> tuple[slice, slice]:
+    """Rows and columns of a data window in the arrays of a larger one."""
+    (left, top), _ = whole
+    (x, y), (right, bottom) = part
+    return slice(y - top, bottom - top + 1), slice(x - left, right - left + 1)

@@ -1,0 +1,188 @@
+"""Which channels of a file hold what, by the names that renderers give to passes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+from ..errors import Unfit
+from ..exr.channels import COMPONENTS
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..exr.channels import Channels
+
+
+NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
+
+CAMERA_NORMAL = "Denoising Normal"
+
+PATH_LENGTH = "Denoising Depth"
+
+NOISE = "XRDS Noise"  # of the samples, as XRDS estimated it before storing them
+
+COUNTS = "XRDS Samples"  # of each pixel, where they differ
+
+# Names of passes in the order in which they are tried, case-insensitive.
+_USUAL = {
+    "beauty": (NOISY, COMBINED, "beauty", "RGBA", "rgb", "C", "Ci"),
+    "albedo": ("Denoising Albedo", "albedo", "denoise_albedo", "diffuse_albedo"),
+    "normal": (CAMERA_NORMAL, "Normal", "normals", "denoise_normal", "N", "Nn"),
+    "position": ("Position", "P", "Pworld"),
+    "depth": ("Depth", "Z", PATH_LENGTH),
+    "vector": ("Vector", "motion", "motionvector", "forward"),
+}
+
+_SINGLE = ("Z", "V", "R", "Y", "z", "r")
+
+_MOTION = ("XYZW", "RGBA", "xyzw", "XY", "RG", "xy", "rg", "UV", "uv")
+
+
+@dataclass(frozen=True)
+class PassNames:
+    """The names of the passes; None for the usual ones.
+
+    Their layer may be left out. `beauty` is the noisy radiance.
+    """
+
+    beauty: str | None = None
+    albedo: str | None = None
+    normal: str | None = None
+    position: str | None = None
+    depth: str | None = None
+    vector: str | None = None
+
+
+PASSES = tuple(field.name for field in fields(PassNames))
+
+
+@dataclass(frozen=True)
+class Found:
+    """The full names of the channels of the passes that a file has.
+
+    `picture` are the channels that the finished picture is written to, R, G, B, and
+    `alpha` is the one that holds alpha in the input. With `has_length` depth is a
+    length along the ray.
+    """
+
+    beauty: list[str]
+    albedo: list[str]
+    normal: list[str]
+    position: list[str]
+    depth: list[str]
+    path_length: list[str]
+    vector: list[str]
+    noise: list[str]
+    counts: list[str]
+    picture: list[str]
+    alpha: str | None
+    has_camera_normal: bool
+    has_length: bool
+
+
+def find(channels: Channels, names: PassNames) -> Found:
+    """Find the passes of a file.
+
+    Raises Unfit where beauty, albedo or normal is missing, or a pass requested by name;
+    PictureError where several layers hold one.
+    """
+    beauty = _pass(channels, names, "beauty")
+    prefix = "" if beauty is None else beauty
+    here = channels.of(prefix)
+    if not here:
+        raise _missing(channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB")
+    target = _target(channels, prefix)
+    alphas = [f"{x}.A" if x else "A" for x in (prefix, target)]
+    normal, depth = _pass(channels, names, "normal"), _depth(channels, names)
+    return Found(
+        beauty=here,
+        albedo=_needed(channels, names, "albedo"),
+        normal=_needed(channels, names, "normal"),
+        position=_channels(channels, names, "position"),
+        depth=depth,
+        path_length=_path_length(channels, names),
+        vector=_channels(channels, names, "vector", _MOTION),
+        noise=_ours(channels, NOISE, "XYZ"),
+        counts=_ours(channels, COUNTS, "X"),
+        picture=channels.of(target) or ["R", "G", "B"],
+        alpha=next((x for x in alphas if x in channels.names), None),
+        has_camera_normal=(normal or "").endswith(CAMERA_NORMAL),
+        has_length=any(PATH_LENGTH in name for name in depth),
+    )
+
+
+def _ours(channels: Channels, name: str, letters: str) -> list[str]:
+    """The channels of a pass of stored samples."""
+    found = channels.find(name, (letters,))
+    return [] if found is None else channels.of(found, (letters,))
+
+
+def _target(channels: Channels, prefix: str) -> str:
+    """The pass that the denoised picture is written to: Cycles has two of them."""
+    layer, _, name = prefix.rpartition(".")
+    if name != NOISY:
+        return prefix
+    combined = f"{layer}.{COMBINED}" if layer else COMBINED
+    return combined if channels.of(combined) else ""
+
+
+def _pass(
+    channels: Channels,
+    names: PassNames,
+    kind: str,
+    letters: Sequence[str] = COMPONENTS,
+) -> str | None:
+    """The full name of a pass; None where there is none of the usual names."""
+    requested = getattr(names, kind)
+    if requested is not None:
+        found = channels.find(requested, letters)
+        if found is None:
+            raise _missing(channels, kind, requested)
+        return found
+    if kind == "beauty" and channels.of("") and not channels.find(NOISY):
+        return None  # plain R, G, B
+    for wanted in _USUAL[kind]:
+        found = channels.find(wanted, letters, any_case=True)
+        if found is not None:
+            return found
+    return None
+
+
+def _channels(
+    channels: Channels,
+    names: PassNames,
+    kind: str,
+    letters: Sequence[str] = COMPONENTS,
+) -> list[str]:
+    found = _pass(channels, names, kind, letters)
+    return [] if found is None else channels.of(found, letters)
+
+
+def _depth(channels: Channels, names: PassNames) -> list[str]:
+    """Depth is one channel: `Depth.Z`, or without a pass `Z`."""
+    wanted = (names.depth,) if names.depth else _USUAL["depth"]
+    usual = [x.lower() for x in wanted]
+    plain = [name for name in channels.names if name.lower() in usual]
+    return plain[:1] or _channels(channels, names, "depth", _SINGLE)
+
+
+def _path_length(channels: Channels, names: PassNames) -> list[str]:
+    """Cycles' Denoising Depth, where it is not the only depth."""
+    found = channels.find(PATH_LENGTH, _SINGLE)
+    path = [] if found is None else channels.of(found, _SINGLE)
+    return [] if path == _depth(channels, names) else path
+
+
+def _needed(channels: Channels, names: PassNames, kind: str) -> list[str]:
+    found = _channels(channels, names, kind)
+    if not found:
+        raise _missing(channels, kind, getattr(names, kind) or _USUAL[kind][0])
+    return found
+
+
+def _missing(channels: Channels, kind: str, name: str) -> Unfit:
+    return Unfit(
+        f"{channels.path} has no {kind} ({name}); it holds {channels.contents()}; "
+        f"render it too, or name the pass with --{kind}"
+    )

@@ -1,0 +1,109 @@
+"""Frames stored on disk before denoising, in the format that `reading` reads.
+
+One OpenEXR file with Cycles' pass names holds what accumulation needs: light, guides
+and motion in half floats, as a window stores them in memory, and depths in full. So a
+frame that was read is reused and finished as if it had just been rendered.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import exr
+from ..accumulation.frame import pack_counts, pack_frame
+from ..arrays import LARGEST_HALF
+from ..exr.openexr_io import Part
+from .cameras import to_header
+from .frame_file import KEY, NAME, RADIUS, SAMPLES, STILL, SUBSET
+from .pass_names import CAMERA_NORMAL, COUNTS, NOISE, NOISY, PATH_LENGTH
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+    from ..accumulation.frame import Frame
+    from ..arrays import Array
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a frame was rendered from and how.
+
+    `key` is the same for frames of one file and one set of settings; `layer` is the
+    view layer; `radius` is the temporal radius that the sample subsets are for.
+    """
+
+    key: str
+    layer: str = ""
+    radius: int = 0
+
+
+def write_cached_frame(path: Path, frame: Frame, origin: Origin) -> None:
+    """Write a frame, completely or not at all; raises PictureError if it cannot."""
+    height, width = frame.shape
+    x, y = frame.camera.window
+    right, bottom = (side - 1 for side in frame.camera.size)
+    attributes: dict[str, Any] = {
+        **to_header(frame.camera),
+        # a mean where counts differ
+        SAMPLES: frame.samples if frame.counts is not None else int(frame.samples),
+        KEY: origin.key,
+        RADIUS: origin.radius,
+        STILL: int(frame.still),
+        NAME: frame.camera.name,
+    }
+    if frame.subset is not None:
+        attributes[SUBSET] = frame.subset
+    part = Part(
+        "",
+        ((x, y), (x + width - 1, y + height - 1)),
+        ((0, 0), (right, bottom)),
+        _channels(frame, f"{origin.layer}." if origin.layer else ""),
+        attributes,
+    )
+    exr.write_part(path, part)
+
+
+def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
+    assert frame.radiance is not None
+    passes: list[tuple[str, str, NDArray[Any]]] = [
+        (NOISY, "RGB", frame.radiance),
+        ("Denoising Albedo", "RGB", frame.albedo),
+        (CAMERA_NORMAL, "XYZ", frame.normal),
+        # always: noise computed from the half floats of the rest would differ
+        (NOISE, "XYZ", _noise(frame)),
+    ]
+    if frame.alpha is not None:
+        passes.append((NOISY, "A", frame.alpha[..., None]))
+    if frame.counts is not None:
+        counts = pack_counts(frame.counts).reshape(frame.shape)
+        passes.append((COUNTS, "X", counts[..., None]))
+    if frame.vector is not None:
+        passes.append(("Vector", "XYZW", frame.vector))
+    channels: dict[str, NDArray[Any]] = {
+        f"{layer}{name}.{letter}": _half(array[..., i])
+        for name, letters, array in passes
+        for i, letter in enumerate(letters)
+    }
+    channels[f"{layer}Depth.Z"] = frame.depth.astype(np.float32)
+    if frame.path_length is not None:
+        channels[f"{layer}{PATH_LENGTH}.Z"] = frame.path_length.astype(np.float32)
+    return channels
+
+
+def _noise(frame: Frame) -> Array:
+    """Return (H, W, 3): brightness, difference and guides of `Noise`."""
+    noise = pack_frame(frame)[2]
+    assert noise is not None
+    parts = (noise.brightness, noise.difference, noise.guides)
+    return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
+
+
+def _half(x: Array) -> NDArray[np.float16]:
+    """As `frame.store` packs it: clipped to the largest half; infinities stay."""
+    cut = np.clip(x, -LARGEST_HALF, LARGEST_HALF)
+    return np.where(np.isfinite(x), cut, x).astype(np.float16)

@@ -1,0 +1,397 @@
+"""Denoising a sequence of files whose frames share their samples."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import errors, exr
+from ..accumulation.object_motion import Movement
+from ..denoising.light_passes import passes_of
+from ..errors import PictureError, UsageError
+from ..files import check_folder, check_places
+from ..finish import AROUND, Finished, finish_frame
+from ..frames import (
+    RADIUS,
+    check_pattern,
+    frame_numbers,
+    frame_path,
+    in_words,
+    misnamed,
+)
+from ..progress import Clock
+from ..shot import Neighbourhood, Shot, Window
+from ..version import package_version
+from .frame_file import FrameFile, Reading
+from .loading import Loader, NeighbourSelection
+from .made_of import MADE_OF, Recipe, is_complete, is_made_of, states_of
+
+if TYPE_CHECKING:
+    from ..arrays import Array
+    from ..denoising import Denoiser
+    from ..exr import Window as PixelWindow
+    from ..finish import Rectangle
+
+
+Say = Callable[[str], object]
+
+
+@dataclass(frozen=True)
+class Files:
+    """Inputs and outputs; # stands for digits of the frame number.
+
+    `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
+    the input as well, unchanged. `others` are files that are read besides the frames,
+    `halves` is the pattern of their second half buffers, `also` those of further files
+    of each frame. `crop` is the part of the picture that is denoised and written, first
+    and last pixel in the coordinates of the files.
+    """
+
+    source: str
+    output: str
+    picture_only: bool = False
+    others: tuple[Path, ...] = ()
+    halves: str | None = None
+    also: tuple[str, ...] = ()
+    crop: PixelWindow | None = None
+
+    @property
+    def patterns(self) -> tuple[str, ...]:
+        """Those of all files of a frame."""
+        return (
+            self.source,
+            *self.also,
+            *([] if self.halves is None else [self.halves]),
+        )
+
+    def write(
+        self,
+        number: int,
+        views: Mapping[str, tuple[FrameFile, Finished]],
+        metadata: Mapping[str, str],
+        check: Callable[[], None] = lambda: None,
+    ) -> Path:
+        """Write the finished views of a frame, or none; PictureError, as of `check`."""
+        by_part: dict[int, dict[str, Array]] = {}
+        first, _ = next(iter(views.values()))
+        for view, (frame, finished) in views.items():
+            names, part = frame.channels, frame.part
+            if self.picture_only:
+                ahead = f"{view}." if view else ""
+                names, part = [f"{ahead}{x}" for x in "RGBA"], first.part
+            planes = np.moveaxis(finished.picture, 2, 0)
+            by_part.setdefault(part, {}).update(zip(names, planes, strict=False))
+            if not self.picture_only:
+                for name, plane in _light(frame, finished).items():
+                    part, own = frame.places[name]
+                    by_part.setdefault(part, {})[own] = plane
+        path = frame_path(self.output, number)
+        exr.copy_picture(
+            frame_path(self.source, number),
+            path,
+            by_part,
+            alone=self.picture_only,
+            window=self.crop,
+            metadata=metadata,
+            check=check,
+        )
+        return path
+
+    def is_done(self, number: int, digest: str) -> bool:
+        """Whether a complete output of these inputs and settings exists.
+
+        One whose input is gone cannot be made again, and stays.
+        """
+        output = frame_path(self.output, number)
+        if not output.is_file():
+            return False
+        if frame_path(self.source, number).is_file():
+            return is_made_of(output, digest)
+        return is_complete(output)
+
+    def check(self, numbers: Sequence[int], there: Sequence[int]) -> None:
+        """Reject impossible outputs; make their folder.
+
+        `there` are all frames that have a file: none may be overwritten.
+        """
+        if Path(self.output).suffix.lower() != ".exr":
+            raise UsageError(f"output {self.output!r} must end in .exr")
+        if len(numbers) > 1 and "#" not in Path(self.output).name:
+            raise UsageError(
+                f"all {len(numbers)} frames would be written to {self.output!r}; add "
+                "#### for the frame number"
+            )
+        for pattern in self.patterns[1:]:
+            self._check_beside(pattern, there)
+        inputs = [frame_path(pattern, n) for pattern in self.patterns for n in there]
+        known = set(there)
+        outputs = (frame_path(self.output, n) for n in numbers if n in known)
+        check_places(outputs, [*inputs, *self.others])
+        check_folder(Path(self.output).parent)
+
+    def _check_beside(self, pattern: str, there: Sequence[int]) -> None:
+        """Reject one file beside many frames, and the frames themselves."""
+        if "#" in Path(self.source).name and "#" not in Path(pattern).name:
+            raise UsageError(
+                f"{pattern!r} is one file for all frames; add #### for the frame number"
+            )
+        for number in there:
+            source, path = (frame_path(x, number) for x in (self.source, pattern))
+            if path.exists() and source.samefile(path):
+                raise UsageError(
+                    f"{path} is the frame itself, no further file of it; give another"
+                )
+
+
+def denoise_sequence(
+    files: Files,
+    denoiser: Denoiser,
+    *,
+    frames: Iterable[int] | None = None,
+    radius: int | None = None,
+    reading: Reading | None = None,
+    resume: bool = False,
+    say: Say = lambda _: None,
+) -> dict[str, Any]:
+    """Denoise the frames of a sequence, each with its neighbours' samples, in order.
+
+    Args:
+        files: inputs and outputs.
+        frames: their numbers; by default all that exist. Samples of other existing
+            frames, between these or next to them, are reused, too.
+        radius: how many frames before and after are neighbours; by default what the
+            files recommend, or 4.
+        resume: skip outputs that are complete and made of these settings and of the
+            inputs as they are now.
+        say: takes a line about a frame that is finished, left out, or not reusable.
+
+    Returns:
+        What `xrds denoise --json` prints; `left_out` says why frames were not read.
+
+    Raises:
+        UsageError: no frames, or impossible outputs.
+        PictureError: no frame can be read, the first lacks passes, or an output cannot
+            be written; outputs before it are complete.
+    """
+    numbers = _numbers(files, frames, say)
+    there = _there(files.source, numbers)
+    files.check(numbers, there)
+    radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
+    recipe = _recipe(files, reading or Reading(), denoiser)
+    loader = Loader(files.source, recipe, reusable=radius != 0, say=say)
+    loader.look(numbers, set(there))
+    readable = [n for n in numbers if n not in loader.failed]
+    first = loader.first(readable)
+    if radius is None:
+        radius = RADIUS if first is None or first.radius is None else first.radius
+    beside = (*numbers, *there)
+    shot = Shot((), radius, others=beside)
+    done = _done(files, recipe, shot, numbers, say) if resume else set()
+    if first is None and not done:
+        raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
+    shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
+    entries = list(_entries(files, denoiser, shot, loader, recipe, resume, say))
+    return {
+        "output": files.output,
+        "temporal_radius": radius,
+        "device": denoiser.device,
+        "frames": entries,
+        "kept": sorted(done),
+        "left_out": _left_out(loader, [n for n in numbers if n not in done]),
+    }
+
+
+def _entries(
+    files: Files,
+    denoiser: Denoiser,
+    shot: Shot,
+    loader: Loader,
+    recipe: Recipe,
+    resume: bool,
+    say: Say,
+) -> Iterator[dict[str, Any]]:
+    """Finish and write the frames of a shot; yields the record of each.
+
+    A frame that cannot be finished or written is left out; two of them in a row are an
+    error.
+    """
+    selection, fails = NeighbourSelection(say), False
+    movement, clock = Movement(), Clock()
+    for found in Window(shot, loader.load):
+        number, own = found.number, found.own
+        near = sorted((number, *shot.neighbours(number)))
+        digest = recipe.digest({n: loader.states.get(n, ()) for n in near}, number)
+        if resume and files.is_done(number, digest):  # another machine was quicker
+            continue
+        try:
+            views, others = {}, {}
+            for view, each in {"": own, **own.others}.items():
+                others[view] = selection.select(number, each, _of(found, view))
+                region, within = _regions(each, files.crop)
+                done = finish_frame(
+                    each.stored,
+                    others[view],
+                    denoiser,
+                    movement,
+                    region=region,
+                    light=each.light,
+                )
+                views[view] = each, done.within(within)
+            finished = views[""][1]
+            started = time.perf_counter()
+            metadata = {**_metadata(own, finished, denoiser), MADE_OF: digest}
+            check = partial(loader.check, number)
+            path = files.write(number, views, metadata, check)
+            fails = False
+        except PictureError as error:
+            if fails:
+                raise
+            fails = True
+            loader.leave_out(number, error)
+            continue
+        selection.record(others[""], finished.accumulated)
+        seconds = {"read": loader.seconds()}
+        for stage in finished.seconds:
+            seconds[stage] = sum(each.seconds[stage] for _, each in views.values())
+        seconds["write"] = time.perf_counter() - started
+        left = sum(n > number and n not in loader.failed for n in shot.frames)
+        say(f"frame {number}: {path}, {clock.lap(left)}")
+        entry = _entry(number, path, shot.radius, finished, seconds)
+        errors.finished.append(entry)
+        yield entry
+    selection.report()
+
+
+def _recipe(files: Files, reading: Reading, denoiser: Denoiser) -> Recipe:
+    settings = denoiser.quality, files.picture_only, files.crop
+    return Recipe(files.patterns, reading, settings)
+
+
+def _done(
+    files: Files, recipe: Recipe, shot: Shot, numbers: Sequence[int], say: Say
+) -> set[int]:
+    """The frames that are complete; a line tells those that are made anew."""
+    written = set(_there(files.output, numbers))
+    written.intersection_update(numbers)
+    near = {n: sorted((n, *shot.neighbours(n))) for n in sorted(written)}
+    states = states_of(recipe, {x for numbers in near.values() for x in numbers})
+    done = {
+        n
+        for n, others in near.items()
+        if files.is_done(n, recipe.digest({x: states[x] for x in others}, n))
+    }
+    if anew := sorted(written - done):
+        say(
+            f"made anew, as they are damaged or were made with other settings or of "
+            f"other inputs: frames {in_words(anew)}"
+        )
+    return done
+
+
+def _metadata(own: FrameFile, finished: Finished, denoiser: Denoiser) -> dict[str, str]:
+    """What made a frame, as files of `xrds render` have it."""
+    frames = finished.accumulated.frames
+    return {
+        "xrds.version": package_version(),
+        "xrds.mode": "denoised",
+        "xrds.preset": denoiser.quality,
+        "xrds.samples": f"{own.stored.samples:g}",
+        "xrds.frames": f"{frames[0]} to {frames[-1]}",
+    }
+
+
+def _of(found: Neighbourhood[FrameFile], view: str) -> dict[int, FrameFile]:
+    """The same view of a frame's neighbours, "" for the first one."""
+    if not view:
+        return found.neighbours
+    near = found.neighbours.items()
+    return {n: each.others[view] for n, each in near if view in each.others}
+
+
+def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Rectangle]:
+    """What to denoise of a frame's arrays, and which part of that to write.
+
+    A crop is denoised with what a denoiser sees around it. Raises PictureError where
+    the frame does not cover it.
+    """
+    if crop is None:
+        return own.inner, (slice(None), slice(None))
+    region, within = [], []
+    for axis, inner in ((1, own.inner[0]), (0, own.inner[1])):
+        first, last = (corner[axis] for corner in crop)
+        begin, end = (corner[axis] for corner in own.data_window)
+        if first < begin or last > end:
+            raise PictureError("the crop lies outside of what the file holds")
+        around = max(first - AROUND, begin), min(last + AROUND, end)
+        offset = inner.start - begin
+        region.append(slice(around[0] + offset, around[1] + offset + 1))
+        within.append(slice(first - around[0], last - around[0] + 1))
+    return (region[0], region[1]), (within[0], within[1])
+
+
+def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
+    """The planes of the parts of a frame's light, by full channel name."""
+    passes = passes_of(frame.light, finished.parts)
+    return {
+        name: plane
+        for names, pixels in passes.items()
+        for name, plane in zip(names, np.moveaxis(pixels, 2, 0), strict=True)
+    }
+
+
+def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
+    failed = {n: loader.failed[n] for n in todo if n in loader.failed}
+    return [{"frame": n, "reason": why} for n, why in failed.items()]
+
+
+def _numbers(files: Files, frames: Iterable[int] | None, say: Say) -> list[int]:
+    """The frames to denoise, in order."""
+    for pattern in (*files.patterns, files.output):
+        check_pattern(pattern)
+    if others := misnamed(files.source):
+        say(
+            f"{len(others)} files have another number of digits than # in "
+            f"{files.source} and are left out, such as {others[0]}"
+        )
+    return sorted(set(frames)) if frames else _all_frames(files.source)
+
+
+def _all_frames(pattern: str) -> list[int]:
+    if "#" not in Path(pattern).name:
+        return [0]
+    numbers = frame_numbers(pattern)
+    if not numbers:
+        raise PictureError(f"no file is called {pattern}; # are digits of its number")
+    return numbers
+
+
+def _there(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
+    """The frames that have a file; without # there is one for every number."""
+    if "#" in Path(pattern).name:
+        return frame_numbers(pattern)
+    return numbers if os.path.lexists(pattern) else []
+
+
+def _entry(
+    number: int, path: Path, radius: int, finished: Finished, seconds: dict[str, float]
+) -> dict[str, Any]:
+    accumulated = finished.accumulated
+    return {
+        "frame": number,
+        "output": str(path),
+        "seconds": seconds | {"total": sum(seconds.values())},
+        "temporal": {
+            "radius": radius,
+            "frames": accumulated.frames,
+            "mean_samples": float(accumulated.samples.mean()),
+            "rejected": accumulated.rejected,
+        },
+        "bad_pixels": finished.denoised.bad_pixels,
+    }
