@@ -1,4 +1,4 @@
-"""The array type of pictures and guides.
+"""The array type of pictures and guides; half floats, in which frames are stored.
 
 Every array is float32 (height, width, channels) or (height, width), row 0 at the top,
 and scene-linear where it holds colour, unless a docstring says otherwise.

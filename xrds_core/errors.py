@@ -1,4 +1,4 @@
-"""The errors XRDS raises on purpose.
+"""The errors XRDS raises on purpose, and lines about what does not stop the work.
 
 Each message is one clear line: what is wrong, where (with the value), and the
 remedy. Whatever else reaches a caller is a bug.

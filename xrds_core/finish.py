@@ -1,4 +1,7 @@
-"""Rectangles of blocks that cover what a frame lacks: each costs a call of its own."""
+"""A frame with the samples of its neighbours, denoised: every still and every shot.
+
+A still is a frame without neighbours.
+"""
 
 from __future__ import annotations
 

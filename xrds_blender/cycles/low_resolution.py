@@ -1,8 +1,9 @@
-"""The camera of the low-resolution render: every pixel exactly scale x scale.
+"""The low-resolution render: its camera, its pixels, and what it leaves.
 
-The low-resolution frame is the full one rounded up to whole pixels, so its camera
-sees a little more at the right and at the bottom. Sensor, shift and ortho scale of
-the evaluated camera are changed accordingly; the top left corner stays.
+Every pixel is exactly scale x scale of the picture. The low-resolution frame is the
+full one rounded up to whole pixels, so its camera sees a little more at the right and
+at the bottom. Sensor, shift and ortho scale of the evaluated camera are changed
+accordingly; the top left corner stays.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What each Cycles render needs, set on the evaluated scene and given back."""
+"""Names of Cycles' passes, and what each render needs, set on the evaluated scene."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The evaluated camera as matrices, for finding a pixel in another frame."""
+"""Sizes of frames as Blender rounds them, and the evaluated camera as matrices."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Render with XRDS from a button or the Render menu, whatever the scene's engine."""
+"""The buttons: Render with XRDS, whatever the scene's engine, and a test of the path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Our denoiser, loaded and cached from frame to frame."""
+"""What renders here, loaded and kept from frame to frame: our denoiser, a network."""
 
 from __future__ import annotations
 

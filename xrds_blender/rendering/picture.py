@@ -1,4 +1,4 @@
-"""What a render returns."""
+"""What a render returns, and what made it: for the log and as metadata of its files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Facts of a scene, read from Blender's data without rendering."""
+"""Facts of a scene, its cuts and the light passes that somebody looks at.
+
+Read from Blender's data without rendering.
+"""
 
 from __future__ import annotations
 

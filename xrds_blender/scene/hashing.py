@@ -1,4 +1,4 @@
-"""Blender's structs to a hash, property by property, whatever their type.
+"""Blender's structs and evaluated geometry to a hash, whatever their type.
 
 What is left out is named here; all else counts, so a property that nobody thought of
 makes a key differ and costs a render, never a wrong picture.

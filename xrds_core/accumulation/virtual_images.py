@@ -1,4 +1,4 @@
-"""Candidates: where the light of pixels that show an image was in other frames.
+"""Virtual images: where what mirrors and glass show was in other frames.
 
 A plane mirror shows things at the depth of their image behind it, a pane what is beyond
 it; a curved mirror shows them somewhere between its surface and the length of the path.

@@ -1,4 +1,10 @@
-"""How an OpenEXR file holds its pixels."""
+"""The OpenEXR library, isolated from one that the program itself brings.
+
+On Linux the OpenEXR of a program, Blender for one, lies among its global symbols, and
+the dynamic linker gives the Python module those functions in place of its own. With
+another version inside, files then cannot be written, and reading them crashes. Where
+that is so each file is read and written by a Python process of its own.
+"""
 
 from __future__ import annotations
 

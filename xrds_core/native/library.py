@@ -1,4 +1,4 @@
-"""Loads the compiled library of this platform."""
+"""Loads the compiled library of this platform, and runs its work on all processors."""
 
 from __future__ import annotations
 

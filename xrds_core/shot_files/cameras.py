@@ -1,7 +1,13 @@
-"""Values from headers and camera files, which may hold anything.
+"""Cameras of frames: in the header of an OpenEXR file, or in a JSON file beside them.
 
-Each reader takes what the file holds and raises ValueError, with what was expected, if
-that is something else.
+OpenEXR's standard attributes are `worldToCamera` and `worldToNDC`, for row vectors.
+The camera looks along its +Z, with X to the right and Y up; NDC is (0, 0) in the upper
+left and (1, 1) in the lower right corner of the display window. (OpenEXR, Standard
+Attributes.) Some renderers write a camera that looks along -Z, or NDC from -1 to 1 with
+Y up: the two matrices together show which.
+
+Headers and camera files may hold anything: each reader of a value takes what is there
+and raises ValueError, with what was expected, if that is something else.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from .walks import ROOT, SHIPPED
 
 # Files at the top of xrds_core that are a part of their own.
 _PARTS = ("xrds_core.finish", "xrds_core.shot")
-_WIDTH, _HEIGHT, _ACROSS, _DOWN = 236, 74, 22, 44  # of a box, and between boxes
+_WIDTH, _HEIGHT, _ACROSS, _DOWN = 236, 86, 22, 40  # of a box, and between boxes
 _LETTERS = 40  # of a line in a box
 _STYLE = (
     "text{font-family:sans-serif;fill:#222}.n{font-size:13px;font-weight:bold}"
@@ -171,4 +171,4 @@ def _wrapped(sentence: str) -> list[str]:
         if len(lines[-1]) + len(word) >= _LETTERS:
             lines.append("")
         lines[-1] = f"{lines[-1]} {word}".strip()
-    return lines[:2]
+    return lines[:3]

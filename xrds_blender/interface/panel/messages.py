@@ -1,4 +1,6 @@
-"""What XRDS does otherwise than Cycles, as far as a scene asks for it.
+"""What the panel says of a scene before it is rendered.
+
+What XRDS does otherwise than Cycles, as far as a scene asks for it.
 
 Pure questions to a scene; the panel shows the answers, docs/compatibility.md lists all.
 """
