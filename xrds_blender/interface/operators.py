@@ -1,4 +1,4 @@
-"""The buttons: Render with XRDS, whatever the scene's engine, and a test of the path."""
+"""Buttons: Render with XRDS, whatever the scene's engine, and a test of the path."""
 
 from __future__ import annotations
 
