@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
 from .errors import Cancelled
 
@@ -14,11 +15,18 @@ _NEARLY = 0.999  # 1 is reported once, when all is done
 
 
 class Progress:
-    """Counts work and reports the fraction done; raises Cancelled."""
+    """Reports the fraction done of all work to a callback; it never falls.
+
+    Work is counted by `begin` and `add`, or consists of stages that tell their own
+    fractions, by `begin_stage` and `monitor`. Raises Cancelled where the callback says
+    so.
+    """
 
     def __init__(self, callback: Callback | None) -> None:
         self._callback = callback
         self._reported = 0.0
+        self._start = self._share = 0.0  # of the stage
+        self._is_cancelled = False
         self.begin(1.0)
 
     def begin(self, total: float) -> None:
@@ -30,46 +38,26 @@ class Progress:
         self._done += work
         self.report(min(self._done / self._total, _NEARLY))
 
-    def report(self, fraction: float) -> None:
-        self._reported = max(self._reported, fraction)
-        if self._callback is not None and self._callback(self._reported) is False:
-            raise Cancelled
-
-
-_NEARLY_ALL = 0.999  # 1 is reported once, when all is done
-
-
-class Stages:
-    """Reports the fraction done of all stages to a callback; it never falls."""
-
-    def __init__(self, callback: Callback | None) -> None:
-        self._callback = callback
-        self._reported = 0.0
-        self._start = self._share = 0.0
-        self._is_cancelled = False
-
-    def begin(self, share: float) -> None:
+    def begin_stage(self, share: float) -> None:
         """Begin a stage that is `share` of all the work."""
         self._start, self._share = self._start + self._share, share
 
-    def report(self, fraction: float) -> None:
-        """Report the fraction of all the work; raises Cancelled."""
-        self._reported = max(self._reported, fraction)
-        if self._callback is not None and self._callback(self._reported) is False:
-            self._is_cancelled = True
-            raise Cancelled
-
     def monitor(self, fraction: float) -> bool:
-        """Take a filter's fraction of its stage; False as the result stops it."""
-        try:
-            self.report(min(self._start + self._share * fraction, _NEARLY_ALL))
-        except Cancelled:
-            self._is_cancelled = True
+        """Take a stage's own fraction; False as the result stops it."""
+        with suppress(Cancelled):
+            self.report(min(self._start + self._share * fraction, _NEARLY))
         return not self._is_cancelled
 
     def check(self) -> None:
-        """Raise Cancelled if a filter was stopped."""
+        """Raise Cancelled if a stage was stopped."""
         if self._is_cancelled:
+            raise Cancelled
+
+    def report(self, fraction: float) -> None:
+        """Report the fraction of all the work."""
+        self._reported = max(self._reported, fraction)
+        if self._callback is not None and self._callback(self._reported) is False:
+            self._is_cancelled = True
             raise Cancelled
 
 

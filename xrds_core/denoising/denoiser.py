@@ -16,7 +16,7 @@ from weakref import WeakSet
 import numpy as np
 
 from ..errors import UsageError
-from ..progress import Stages
+from ..progress import Progress
 from . import oidn_device
 from .input_images import check, sample
 
@@ -199,20 +199,20 @@ class Denoiser:
         if self._device is None:
             raise UsageError("this denoiser is closed; make another one")
         pictures = check(radiance, albedo, normal, parts or {})
-        stages = Stages(progress)
+        work = Progress(progress)
         made_of = {k: np.zeros(x.shape, np.float32) for k, x in pictures.parts.items()}
         result = np.zeros(np.shape(radiance), np.float32)
         result[..., 3:] = pictures.alpha
         prefiltered: tuple[str, ...] = ()
         with self._lock, oidn_device.explained(self.device, result.shape):
-            stages.report(0.0)
+            work.report(0.0)
             if pictures.radiance.any():
                 prefiltered = self._to_prefilter(pictures, guides_are_clean)
                 clean = bool(guides_are_clean) or self.quality in _WITH_PREFILTER
                 for task in self._light_filters(len(pictures.lit)):
                     task.hdr, task.clean_aux = hdr, clean
-                self._run(pictures, prefiltered, result[..., :3], made_of, stages)
-            stages.report(1.0)
+                self._run(pictures, prefiltered, result[..., :3], made_of, work)
+            work.report(1.0)
         return Denoised(result, pictures.bad_pixels, prefiltered, made_of)
 
     def guides(
@@ -230,17 +230,17 @@ class Denoiser:
         """
         if self._device is None:
             raise UsageError("this denoiser is closed; make another one")
-        stages = Stages(progress)
+        work = Progress(progress)
         found = {"albedo": albedo, "normal": normal}
         with self._lock, oidn_device.explained(self.device, albedo.shape):
-            stages.report(0.0)
+            work.report(0.0)
             for name, guide in found.items():
-                stages.begin(1 / len(found))
+                work.begin_stage(1 / len(found))
                 if not self._is_clean(name, guide):
                     held = np.clip(guide, *_RANGE[name])
-                    quiet = self._prefilter(name, held, name, stages)
+                    quiet = self._prefilter(name, held, name, work)
                     found[name] = quiet.astype(np.float32)
-            stages.report(1.0)
+            work.report(1.0)
         return found["albedo"], found["normal"]
 
     def _to_prefilter(
@@ -274,7 +274,7 @@ class Denoiser:
         prefiltered: tuple[str, ...],
         output: Array,
         made_of: Mapping[str, Array],
-        stages: Stages,
+        work: Progress,
     ) -> None:
         """Denoise into `output`, (H, W, 3), and the parts into `made_of`."""
         images: dict[str, Image] = {}
@@ -287,8 +287,8 @@ class Denoiser:
         for name, guide in pictures.guides.items():
             images[name] = _rows(guide, turn)
             if name in networks:
-                stages.begin(_SECONDS[networks[name]] / total)
-                images[name] = self._prefilter(name, images[name], name, stages)
+                work.begin_stage(_SECONDS[networks[name]] / total)
+                images[name] = self._prefilter(name, images[name], name, work)
         if "normal" in images and "albedo" not in images:
             images["albedo"] = np.full_like(images["normal"], _NO_ALBEDO)
         held = images.values() if turn else (images[name] for name in prefiltered)
@@ -300,18 +300,18 @@ class Denoiser:
         ]
         for use, noisy, denoised, seconds in light:
             images["color"] = _rows(noisy, turn)
-            stages.begin(seconds / total)
+            work.begin_stage(seconds / total)
             task = self._filters[use]
             self._limit(task, held_bytes + turn * noisy.nbytes)
-            self._execute(task, images, denoised, stages)
+            self._execute(task, images, denoised, work)
             if turn:
                 _turn(denoised)
         if self.quality == "best":
-            stages.begin(_SECONDS["second picture"] / total)
+            work.begin_stage(_SECONDS["second picture"] / total)
             other = np.empty(output.shape, np.float32)
             images["color"] = _rows(pictures.radiance, turn)
             images = {name: _rows(image, True) for name, image in images.items()}
-            self._execute(self._filters["picture"], images, other, stages)
+            self._execute(self._filters["picture"], images, other, work)
             _mix(output, other if turn else other[::-1])
 
     def _has_room(self, pictures: Pictures) -> bool:
@@ -322,12 +322,12 @@ class Denoiser:
         return copies <= self._memory_limit // 2
 
     def _prefilter(
-        self, name: str, guide: Image, use: str, stages: Stages | None = None
+        self, name: str, guide: Image, use: str, work: Progress | None = None
     ) -> Image:
         result = np.empty(guide.shape, np.float16)  # exact enough, for half the memory
         task = self._filter(use, self._network(name))
         self._limit(task, guide.nbytes + 2 * result.nbytes)
-        self._execute(task, {name: guide}, result, stages or Stages(None))
+        self._execute(task, {name: guide}, result, work or Progress(None))
         return result
 
     def _network(self, name: str) -> str:
@@ -363,10 +363,10 @@ class Denoiser:
             task.max_memory_mb = _ON_PROCESSOR
 
     def _execute(
-        self, task: Any, images: dict[str, Image], output: Image, stages: Stages
+        self, task: Any, images: dict[str, Image], output: Image, work: Progress
     ) -> None:
         """Run a filter; it holds no reference to the arrays afterwards."""
-        task.set_progress_monitor(stages.monitor)
+        task.set_progress_monitor(work.monitor)
         try:
             for name, image in images.items():
                 self._set_image(task, name, image)
@@ -375,7 +375,7 @@ class Denoiser:
             if buffer is not None:
                 _read(buffer, output)
         except self._oidn.Error:
-            stages.check()
+            work.check()
             raise
         finally:
             task.set_progress_monitor(None)
