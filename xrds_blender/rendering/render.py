@@ -64,7 +64,7 @@ def method_of(chosen: Chosen, on_sampled: OnSampled | None = None) -> Method:
 def render(
     scene: Any, scale: int = 1, *, layer: str | None = None, **choices: Any
 ) -> Picture:
-    """As `xrds_blender.rendering`; the engine must be registered."""
+    """As `xrds_blender.render`; the engine must be registered."""
     return render_scene(scene, render_request(scale, **choices), layer)
 
 

@@ -43,7 +43,7 @@ class FrameLoad:
 def drive(scene: Any, count: int, **choices: Any) -> list[FrameLoad]:
     """Render frames 1 to `count` and write them as PNG and EXR in turn.
 
-    `choices` are those of `xrds_blender.rendering`.
+    `choices` are those of `xrds_blender.render`.
     """
     from xrds_blender import render
     from xrds_blender.command import picture_file

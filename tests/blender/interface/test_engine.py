@@ -257,7 +257,7 @@ def test_the_package_name_is_the_function_even_after_its_import(
 ) -> None:
     import xrds_blender
 
-    assert xrds_blender.rendering(life, 4).radiance.shape == (33, 45, 3)
+    assert xrds_blender.render(life, 4).radiance.shape == (33, 45, 3)
 
 
 def test_a_small_network_of_its_own_renders(life: Any, tmp_path: Path) -> None:

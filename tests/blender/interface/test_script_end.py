@@ -16,7 +16,7 @@ import sys, bpy, xrds_blender
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
 scene = bpy.context.scene
 scene.render.use_persistent_data = sys.argv[2] == "True"
-print(xrds_blender.rendering(scene, 1).radiance.shape)
+print(xrds_blender.render(scene, 1).radiance.shape)
 """
 
 
