@@ -14,7 +14,7 @@ bpy = pytest.importorskip("bpy")
 
 from xrds_blender.planning.plan import Decision
 from xrds_blender.planning.request import render_request
-from xrds_blender.rendering.picture import Picture
+from xrds_blender.rendering.picture import Picture, log_line, metadata_of, record_of
 
 NAMES = ("version", "mode", "scale", "preset", "samples", "device", "seconds")
 
@@ -91,13 +91,13 @@ def test_what_was_left_out_is_named() -> None:
         Decision("guide cache", "used 4 samples", ""),
     )
     picture = Picture(None, None, plan=plan, device="cpu", seconds={"total": 1.26})
-    told = picture.record_of(picture, render_request(scale=4).settings, 16)
+    told = record_of(picture, render_request(scale=4).settings, 16)
     assert told["left_out"] == "motion blur, guides, from the cache"
     assert told["guide_samples"] == "2"
     assert told["seconds"] == "1.3"
-    line = picture.log_line(told, 7, "Main")
+    line = log_line(told, 7, "Main")
     assert line.startswith(f"XRDS {told['version']}, frame 7, Main: super-resolution, ")
-    assert picture.metadata_of(told, "Main")["xrds.Main.scale"] == "4"
+    assert metadata_of(told, "Main")["xrds.Main.scale"] == "4"
 
 
 @pytest.mark.parametrize("suffix", [".png", ".exr"])

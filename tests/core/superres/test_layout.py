@@ -33,7 +33,7 @@ def test_any_floats_in_any_order_become_float32() -> None:
 
 
 def test_layouts_and_the_array_type_are_stated_once() -> None:
-    facts = {"permute(2, 0, 1)[None]": "layout", "NDArray[np.float32]": "arrays"}
+    facts = {"permute(2, 0, 1)[None]": "front_end", "NDArray[np.float32]": "arrays"}
     sources = [*Path(xrds_core.__file__).parent.rglob("*.py")]
     for text, module in facts.items():
         assert [path.stem for path in sources if text in path.read_text()] == [module]
