@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import platform
 import sys
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+import time
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from ctypes import CDLL, POINTER, c_double, c_float, c_int32, c_int64, c_void_p, sizeof
 from functools import cache
 from pathlib import Path
 from struct import unpack_from
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -173,6 +174,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _ROWS = 128  # of a band
+_MOMENT = 1e-3  # seconds
 
 
 def processors() -> int:
@@ -193,36 +195,52 @@ def in_threads(
     count = min(threads or processors(), len(items))
     if count <= 1:
         return [work(item) for item in items]
+    tracked = _Tracked(work)
     pool = ThreadPoolExecutor(count)
-    futures: list[Future[Result]] = []
     try:
-        for item in items:
-            futures.append(pool.submit(work, item))  # noqa: PERF401 (an interrupt keeps it)
+        futures = [pool.submit(tracked, item) for item in items]
         return [future.result() for future in futures]
     finally:
         try:
-            _end(futures)
+            tracked.end()
         finally:
-            pool.shutdown()
+            pool.shutdown(cancel_futures=True)
 
 
-def _end(futures: Sequence[Future[Result]]) -> None:
-    """Cancel what has not begun and wait for the rest, however often interrupted.
+class _Tracked(Generic[Item, Result]):
+    """Work of which is known what runs, whatever an interrupt has made of its thread.
 
-    Threads cannot be joined for that: one whose join was interrupted counts as ended.
+    A thread whose start or join was interrupted is known to nobody: Python 3.11 neither
+    joins it nor tells what it works on. Appending to lists is all that is needed, and
+    no interrupt leaves a lock held.
     """
-    interrupt: KeyboardInterrupt | None = None
-    left = futures
-    while left:
+
+    def __init__(self, work: Callable[[Item], Result]) -> None:
+        self._work = work
+        self._begun: list[None] = []
+        self._done: list[None] = []
+        self._is_over = False
+
+    def __call__(self, item: Item) -> Result:
+        self._begun.append(None)  # before it is asked whether all is over
         try:
-            for future in left:
-                future.cancel()
-            wait(left)
-            left = [future for future in left if not future.done()]
-        except KeyboardInterrupt as again:
-            interrupt = again
-    if interrupt is not None:
-        raise interrupt
+            if self._is_over:
+                raise CancelledError
+            return self._work(item)
+        finally:
+            self._done.append(None)
+
+    def end(self) -> None:
+        """Let nothing more begin, and wait for the rest however often interrupted."""
+        interrupt: KeyboardInterrupt | None = None
+        while not self._is_over or len(self._done) < len(self._begun):
+            try:
+                self._is_over = True
+                time.sleep(_MOMENT if len(self._done) < len(self._begun) else 0.0)
+            except KeyboardInterrupt as again:
+                interrupt = again
+        if interrupt is not None:
+            raise interrupt
 
 
 def bands(height: int) -> list[tuple[int, int]]:

@@ -8,6 +8,8 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +24,13 @@ from xrds_core.accumulation.accumulate import Accumulated, accumulate
 from xrds_core.accumulation.frame import Stored, store
 from xrds_core.accumulation.local_filters import find_ranges, find_rims
 from xrds_core.native import library as module
-from xrds_core.native.library import Arrays, LibraryError, file_name, library
+from xrds_core.native.library import (
+    Arrays,
+    LibraryError,
+    file_name,
+    in_threads,
+    library,
+)
 from xrds_core.shot import Shot, Window
 
 SUPPORT = Path(__file__).resolve().parents[2] / "support"
@@ -261,6 +269,31 @@ print(threading.active_count() == before)
 print(np.array_equal(give(target, others), expected))
 """)
     assert told == "True\nTrue\n"
+
+
+def test_a_thread_that_an_interrupt_hides_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """One that comes as a thread starts: nobody else knows of that thread."""
+    start, begun, done = threading.Thread.start, [], []
+
+    def interrupted(thread: threading.Thread) -> None:
+        start(thread)
+        while not begun:
+            time.sleep(0.001)
+        raise KeyboardInterrupt
+
+    def work(item: int) -> None:
+        begun.append(item)
+        time.sleep(0.2)
+        done.append(item)
+
+    monkeypatch.setattr(threading.Thread, "start", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        in_threads(work, [1, 2, 3], 2)
+    assert done == begun == [1]
+    time.sleep(0.3)
+    assert done == begun == [1]
 
 
 @needs_linux
