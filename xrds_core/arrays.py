@@ -6,16 +6,12 @@ and scene-linear where it holds colour, unless a docstring says otherwise.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import PictureError
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
 
 Array = NDArray[np.float32]
 
@@ -40,7 +36,6 @@ def float_array(name: str, value: Any, channels: tuple[int, ...]) -> Array:
 
 
 LARGEST_HALF = 65504.0
-
 # Every half float, by its bits.
 _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
 

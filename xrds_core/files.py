@@ -25,11 +25,8 @@ from . import children
 from .errors import PictureError, UsageError, XRDSError
 
 _NAME = re.compile(r"\.xrds-(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-\w+\.unfinished")
-
 _DEAD = 3600.0  # seconds without a byte written, after which no machine writes any more
-
 _unfinished: set[Path] = set()
-
 _beginning = threading.Lock()
 
 

@@ -91,34 +91,26 @@ def _blocks_in(rectangle: Rectangle) -> int:
 # The accumulated picture has full weight from this many reused samples for each of the
 # frame's own, and this many in all: few samples say little.
 _ENOUGH, _IN_ALL = 1.0, 3.0
-
 # Where less is usual around a pixel, less is enough: a denoiser mistakes for detail
 # what has more noise than its neighbours. Full weight has what is not below the usual
 # over `_APART`. What is usual is the mean over `_USUAL` pixels across, the largest
 # within `_NEAR` of them.
 _APART, _USUAL, _NEAR = 1.5, 33, 24
-
 # What is missing in the 3x3 pixels around a pixel counts against it, times half of the
 # frame's samples, clipped to this range: the less noise there is, the more visible a
 # few noisy pixels are.
 _LEAST_FACTOR, _MOST_FACTOR = 1.0, 2.0
-
 _SMOOTH = 3  # pixels across
-
 # Beyond so many samples a denoiser bears what lacks samples along thin lines, as at
 # edges, where the frame alone would bring its noise back: a pixel to each side for each
 # doubling.
 _THICK = 4.0
-
 # Blocks that lack less than this on the mean, and lie beside none that lacks more, lose
 # nothing that is seen, and the frame alone is not denoised for them.
 _BEARABLE = 0.1
-
 _RAMP = 17  # pixels across, at the border of such blocks
-
 # The frame alone is denoised in parts where these are less than this much of it.
 _PART = 0.75
-
 AROUND = 96
 """Pixels around a part that a denoiser's network sees."""
 
@@ -215,7 +207,7 @@ def _share(accumulated: Accumulated, own: Stored) -> Array:
     samples = own.samples
     enough = np.float32(max(_ENOUGH, _IN_ALL / samples))
     most = _APART * (1.0 + enough)
-    alone = sample_counts(own, slice(None), len(own.picture))
+    alone = sample_counts(own)
     if own.invalid is not None:
         alone[own.invalid] = 0.0
     alone = alone.reshape(own.shape)

@@ -24,9 +24,7 @@ Loaded = TypeVar("Loaded")
 # Per pixel: albedo and normal, in half floats, and inverse depth; then radiance and its
 # noise, a Vector pass and an alpha, in half floats, and the inverse depth of images.
 _BYTES = 2 * 3 * 2 + 4
-
 _IMAGE_BYTES = 4
-
 _LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES = 12, 8, 2
 
 

@@ -25,7 +25,6 @@ from xrds_core.errors import finished as finished_frames
 Check = Callable[[Any], None]
 
 DONE, FAILED, WRONG_USAGE, INTERRUPTED = 0, 1, 2, 130
-
 _SIGNALS = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 
 

@@ -149,7 +149,6 @@ def _png_settings(scene: Any) -> Iterator[None]:
 
 
 _SIGNATURE, _HEADER = 8, 25  # bytes: of the file, and of its first chunk, IHDR
-
 _LONGEST = 79  # letters of a name
 
 

@@ -29,7 +29,6 @@ from .session import StageClock
 from .settings import SAMPLE_COUNT, first_look, is_of_first_sample, set_share
 
 _Passes = dict[tuple[str, str], Array]
-
 _Geometry = Sequence[tuple[str, str]]
 
 

@@ -47,7 +47,6 @@ from .settings import (
 
 # The tiny whole frame that a border render takes its exposure from.
 OVERVIEW_SIDE, OVERVIEW_SAMPLES = 96, 8
-
 # What a probe of the guides is enlarged by, where it keeps this many pixels.
 PROBE_SCALE, PROBE_PIXELS = 8, 4096
 

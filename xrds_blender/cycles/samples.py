@@ -34,17 +34,13 @@ from .settings import (
 
 GEOMETRY = ((FIRST_HIT, "Z"), (MOTION, "XYZW"))
 """Passes for reprojection into another frame."""
-
 PATH_LENGTH = (DEPTH, "Z")
 """Beside the first hit's depth: to what mirrors and glass show."""
-
 LATE_DEPTH = (DEPTH, "Z")
 """In the place of the first hit's depth where a sequence is continued: that one is
 written by its first sample alone."""
-
 COUNTS = (SAMPLE_COUNT, "X")
 """Pass with how many samples each pixel took, where Cycles decides that."""
-
 Reader = Callable[[str], Array | None]
 """Pixels (H, W, channels) of a pass by name, None where there is none."""
 

@@ -208,9 +208,7 @@ def write_pass(layer: Any, name: str, view: str, pixels: Array) -> None:
 # What Cycles says once the scene is there; a frame in tiles is read back and denoised
 # after its last sample.
 _RENDERING = ("Sample ", "Rendered ", "Finish", "Reading full buffer", "Denoising")
-
 _PEAK = re.compile(r"Mem:[\d.]+M, Peak:([\d.]+)M")
-
 _SAMPLE = re.compile(r"Sample (\d+)/")
 
 

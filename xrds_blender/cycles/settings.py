@@ -171,19 +171,13 @@ def set_box_filter(borrowed: Borrowed, scene: Any, scale: int) -> None:
 
 
 ALBEDO, NORMAL, DEPTH = "Denoising Albedo", "Denoising Normal", "Denoising Depth"
-
 GUIDE_PASSES = ((ALBEDO, "RGB", "COLOR"), (NORMAL, "XYZ", "VECTOR"))
-
 COMBINED, NOISY = "Combined", "Noisy Image"
-
 FIRST_HIT, MOTION = "Depth", "Vector"
-
 SAMPLE_COUNT = "Debug Sample Count"
-
 # Light that guides are rendered without, and what was made of it: these passes come
 # from the low-resolution render.
 _LIGHTS = ("Diffuse", "Glossy", "Transmission", "Volume")
-
 LIGHT_PASSES = frozenset(
     [f"{light} {bounce}" for light in _LIGHTS for bounce in ("Direct", "Indirect")]
     + [
@@ -194,19 +188,13 @@ LIGHT_PASSES = frozenset(
     + ["VolumeDir", "VolumeInd", "AO", "Ambient Occlusion"]
     + ["Shadow Catcher", "Noisy Shadow Catcher", "Noisy Image"]
 )
-
 # What the same things decide that decide albedo and normal.
 _KEPT = {ALBEDO, NORMAL, DEPTH, COMBINED, "Depth", "Position", "Normal", "UV"}
-
 _KEPT |= {"IndexOB", "IndexMA", "Object Index", "Material Index"}
-
 _KEPT |= {"DiffCol", "GlossCol", "TransCol"}
-
 _KEPT |= {"Diffuse Color", "Glossy Color", "Transmission Color"}
-
 # What names things cannot be averaged either.
 _OF_FIRST_SAMPLE = {"Depth", "Position", "IndexOB", "IndexMA"}
-
 _OF_FIRST_SAMPLE |= {"Object Index", "Material Index"}
 
 

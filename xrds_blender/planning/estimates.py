@@ -23,12 +23,10 @@ from .settings import (
 )
 
 LIBRARY_IS_MISSING = "Open Image Denoise is missing: install XRDS from its zip"
-
 TORCH_IS_MISSING = (
     "Super-resolution needs PyTorch, which is not installed: see the add-on's "
     "preferences"
 )
-
 WEIGHTS_ARE_MISSING = "There are no weights for this network: choose another mode"
 
 
@@ -178,7 +176,6 @@ def _difference(curve: Curve, other: Curve, samples: int) -> float:
 # A frame of more pixels than this many times those measured is not estimated: what a
 # small one takes to begin would count too much.
 MOST_GROWTH = 4
-
 # A guide sample's seconds over a full one's, where no guides were rendered yet: 0.46 to
 # 0.83 in the scenes of docs/results/bench.
 GUIDE_SHARE = 0.65
@@ -332,11 +329,8 @@ NETWORK_BYTES = {
     ("paper", 4): 553,
     ("paper", 8): 540,
 }
-
 OVERHEAD, TILE_BYTES = 2.0, 100.0
-
 DEFAULT_LIMIT = 4 << 30
-
 # Full-size float32 channels beside the network: picture, albedo, normal, alphas, the
 # result and its copy.
 PICTURE_CHANNELS = 24

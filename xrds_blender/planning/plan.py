@@ -37,11 +37,8 @@ __all__ = [
 
 # Mirrors and glass show other things' albedo and normals; four bounces hold them.
 GUIDE_BOUNCES = 4
-
 GUIDE_CACHE = "guide cache"
-
 SAME_PICTURE, DEADLINE = "same picture", "deadline"
-
 # What may be left out where a scene does not need it, by the names of the decisions.
 SAVINGS = (
     "denoise",
@@ -53,15 +50,11 @@ SAVINGS = (
     "motion blur",
     "network",
 )
-
 # Shares of a guide render's seconds that a saving takes off: docs/lab/measurements.md.
 LIGHT_SHARE = 0.45
-
 BOUNCE_SHARE = 0.12
-
 # Guide samples where nothing is finer than an edge.
 CRISP_SAMPLES = 2
-
 # Cryptomatte counts what covers a pixel by samples: fewer give ragged masks.
 CRYPTOMATTE_SAMPLES = 16
 

@@ -25,7 +25,6 @@ from .pace.more import Part, render_more
 from .sampling import Sampled, can_continue, first_sample
 
 _Passes = dict[tuple[str, str], Array]
-
 # Passes that the first sample of a sequence writes alone, and the layer's switches.
 _OF_ONE_SAMPLE = {
     "z": {"Depth"},

@@ -25,15 +25,10 @@ from xrds_core.files import replacing, sweep
 from ..cycles.settings import ALBEDO, NORMAL
 
 MEMORY_LIMIT = 1 << 30  # bytes
-
 FOLDER_LIMIT = 8 << 30
-
 _SAMPLES, _ALPHA, _PROBE = "samples", "alpha", "probe"
-
 _SUBFOLDER, _SUFFIX = "xrds-guides", ".guides.npz"
-
 _MARK = "xrds guides 1"  # the first array of each file, which holds its key
-
 # What two probes of one scene differ by at most: some modifiers round their texture
 # coordinates in another order each time.
 TOLERANCE = 1e-3

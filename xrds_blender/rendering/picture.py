@@ -119,7 +119,6 @@ def peak_memory() -> int:
 
 
 PREFIX = "xrds"
-
 # What the plan calls a decision and its value, and what was left out then.
 _LEFT_OUT = {
     ("denoise", "skipped"): "denoising",

@@ -21,17 +21,11 @@ from ..planning.settings import DEFAULT_DENOISING, Denoising, Network
 from .loading import load_denoiser, load_upscaler
 
 PROBE_PIXELS = 130_000  # of the largest probe
-
 PROBE_RUNS = 2  # of which the least counts: what else the machine does only adds
-
 LONG_PROBE = 0.4  # seconds after which it need not be repeated
-
 TINY = 4  # how much smaller, in width and height, the other probe is
-
 LEAST_GUIDE = 0.4  # of a sample's seconds; 0.43 to 0.84 in the scenes that were timed
-
 DENOISER_RUNS = 3
-
 NETWORK_SIDE = 256  # of the output that a network is tried on, in pixels
 
 

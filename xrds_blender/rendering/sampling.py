@@ -45,11 +45,8 @@ from .loading import in_process, load_denoiser
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
-
 _LARGEST_SEED = 2**31 - 1
-
 _OTHER = 1_299_709  # seeds apart; no frame's is near those of another
-
 _FEWEST = 1.0  # samples, on the mean of a frame
 
 

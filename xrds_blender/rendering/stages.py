@@ -19,11 +19,8 @@ from ..internals import status
 from ..internals.lifetimes import PROCESS, RENDER_JOB
 
 LOADING = "Loading PyTorch"
-
 LOW, GUIDES, NETWORK = "Low resolution", "Guides", "Network"
-
 SAMPLES, DENOISE = "Samples", "Denoising"
-
 STAGES = (
     "total",
     "sync",
@@ -34,11 +31,8 @@ STAGES = (
     "network",
     "write",
 )
-
 _KINDS = (LOW, GUIDES, NETWORK)
-
 _LEAST = 0.02  # of a stage, before its seconds can be estimated from what is done
-
 _LARGE = 0.1  # megapixels; of less, seconds say nothing about more
 
 

@@ -56,7 +56,6 @@ if TYPE_CHECKING:
 _OF_OTHERS = Decision(
     "guides", "of the frames beside", "only the camera moves: they show the same"
 )
-
 _NOT_CACHED = Decision(
     GUIDE_CACHE, "off", "the camera moves: no frame has the guides of another"
 )

@@ -20,7 +20,6 @@ from xrds_core.errors import GET_NETWORK, UsageError, XRDSError
 from ..internals.lifetimes import PROCESS
 
 NEEDED = {"torch": "PyTorch", "safetensors": "safetensors"}
-
 CPU_INDEX = (
     "--index-url https://download.pytorch.org/whl/cpu "
     "--extra-index-url https://pypi.org/simple"

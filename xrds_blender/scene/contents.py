@@ -26,9 +26,7 @@ _SURFACES = {
     "POINTCLOUD",
     "VOLUME",
 }
-
 _HAIR = {"CURVES"}
-
 # Modifiers whose result is the same in every frame unless something they use moves,
 # which then is found by itself.
 _STILL_MODIFIERS = (
@@ -39,7 +37,6 @@ _STILL_MODIFIERS = (
     "UV_WARP VERTEX_WEIGHT_EDIT VERTEX_WEIGHT_MIX VERTEX_WEIGHT_PROXIMITY WARP "
     "WEIGHTED_NORMAL WELD WIREFRAME"
 )
-
 _NAMED = 3  # of what moves; more would not help a reader
 
 
@@ -285,7 +282,6 @@ _LIGHT = {
     *("transmission_direct", "transmission_indirect", "volume_direct"),
     *("volume_indirect", "emit", "environment", "shadow_catcher"),
 }
-
 _IMAGES = ("OPEN_EXR_MULTILAYER", "MULTILAYER")
 
 

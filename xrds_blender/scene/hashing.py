@@ -45,18 +45,13 @@ _LEFT_OUT = {
     "node_warnings",
     "ParticleSettings": "active_dupliweight active_instanceweight",
 }
-
 _INTERFACE = {"ID": ("show_", "display_", "empty_", "lock_", "preview_")}
-
 # Their elements are geometry, or what moved it; what they point at is often their own
 # arrays, and reading those of evaluated data can crash Blender.
 _SHAPES = "Mesh Curve MetaBall Curves PointCloud Volume Lattice Armature"
-
 _ARRAYS = "Mesh Curves PointCloud"
-
 # Settings of Blender's own and of this add-on that lie among the custom properties.
 _OWN = {"cycles", "cycles_visibility", "xrds"}
-
 # Nodes that give another value in every frame, or at every place of the time line.
 TIMED_NODES = {"INPUT_SCENE_TIME", "SIMULATION_INPUT", "SIMULATION_OUTPUT", "BAKE"}
 
@@ -236,7 +231,6 @@ _ATTRIBUTES: dict[str, tuple[str, int, Any]] = {
     "QUATERNION": ("value", 4, np.float32),
     "FLOAT4X4": ("value", 16, np.float32),
 }
-
 # Numbers per particle.
 _PARTICLE = {
     "location": 3,

@@ -21,18 +21,12 @@ _KINDS = (
     "libraries images fonts volumes cache_files objects materials worlds lights "
     "textures particles node_groups"
 )
-
 _PATHS = {"FILE_PATH", "DIR_PATH"}
-
 _SEQUENCES = {"SEQUENCE", "MOVIE"}  # sources of images
-
 _IN_MEMORY = {"GENERATED", "VIEWER"}
-
 _SETTINGS = ("modifiers", "particle_systems", "soft_body", "rigid_body")  # of objects
-
 # Particles by the thousand, and the caches of a system, which lead to each other.
 _SHIPPED = "datafiles/assets/"
-
 _LEFT_OUT = {"particles", "child_particles", "seed", "vertex_groups"}
 
 

@@ -30,8 +30,6 @@ from .weighted_sums import Aligned, Means, Reprojected, Work, light_for_albedo
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from ..arrays import Array
     from .frame import Stored
 
@@ -150,13 +148,11 @@ def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
     return {target.number, *sorted(before)[-1:], *sorted(after)[:1]}
 
 
-def sample_counts(
-    frame: Stored, pixels: slice | NDArray[np.integer], count: int
-) -> Array:
-    """Return the sample counts of flat pixels (n,) of a frame."""
+def sample_counts(frame: Stored) -> Array:
+    """Return the sample counts of a frame's pixels (H W), invalid ones as well."""
     if frame.counts is None:
-        return np.full(count, frame.samples, np.float32)
-    return floats(frame.counts[pixels]).copy()
+        return np.full(len(frame.picture), frame.samples, np.float32)
+    return floats(frame.counts)
 
 
 def _unpacked(

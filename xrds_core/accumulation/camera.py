@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 # Factor by which the focal length may change from one frame to the next.
 _ZOOM = 1.25
-
 # Share of the field of view by which a camera may turn from one frame to the next.
 _TURN = 0.5
 

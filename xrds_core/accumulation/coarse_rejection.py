@@ -25,12 +25,9 @@ if TYPE_CHECKING:
 
 # Of the hits that reproject into the other frame: if fewer match, it is a shot cut.
 _LEAST_SHARE = 1 / 3
-
 # Radii in tiles: tests single tiles, 3x3 tiles, and the whole picture.
 _REACHES = (0, 1, None)
-
 _NOISE, _FALL = 4.0, 2.0  # z squared is 1 on average where frames match
-
 # Relative to brightness: a difference that no one sees, however significant.
 _HARMLESS = 0.01
 

@@ -31,29 +31,19 @@ if TYPE_CHECKING:
 
 
 _SPOTS = 1 << 14  # pixels that are looked at, at most
-
 _FEWEST = 256  # of them that say anything; fewer may agree by chance
-
 _NOISE = 0.005  # relative to the pixels around: less is rounding
-
 _AGREE = 0.25  # share of signs, of independent noise 0, of equal noise 1
-
 _BEYOND = 0.15  # by which it exceeds that of texture
-
 _EVEN = 0.02  # range of guides in 3x3 pixels of one surface, where all else is noise
-
 # Of the difference to the residual, of independent noise the root of 2. Texture that
 # the guides do not show lessens it, but a still picture rendered twice has none.
 _SLOW, _STILL = 0.25, 0.05
-
 _SMALL = 0.25  # quantile of residuals
-
 # The Laplacian of a Laplacian: it keeps noise and leaves out slopes and edges.
 # J. Immerkaer, Fast Noise Variance Estimation, 1996.
 _MASK = np.outer([1.0, -2.0, 1.0], [1.0, -2.0, 1.0]).astype(np.float32) / 6.0
-
 _AROUND = tuple(product((-1, 0, 1), repeat=2))
-
 _SEEN: WeakKeyDictionary[Stored, _Spots] = WeakKeyDictionary()
 
 

@@ -203,11 +203,8 @@ def _pass(arrays: Arrays, picture: Array) -> structures.Pass:
 # Relative to the surface's depth: how far behind it an image lies at least. Less is
 # the slope of a surface, or the edge of something.
 _BEHIND = 0.04
-
 _PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
-
 _OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "counts": ()}
-
 _OPTIONAL |= {"path_length": ()}
 
 

@@ -23,19 +23,15 @@ if TYPE_CHECKING:
 
 # Albedo beyond this is a lamp; it must not dominate the pixels around it.
 _BRIGHTEST = 4.0
-
 # Normals change where nothing else does, so they weigh less than albedo.
 _NORMAL_SHARE = 0.1
-
 # Ratio of the variance of guides to the smallest difference, squared: 3.6 if guides
 # were pure noise. The more samples, the more of the difference is texture.
 _LEAST, _OF_ONE_SAMPLE = 1.2, 2.5
-
 # Variance that half buffers of few samples show beyond that of the surrounding pixels:
 # halves of one sequence complement each other, and noise that light shares with albedo
 # is left out.
 _HALVES_EXCESS = 1.0
-
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
 
 

@@ -122,15 +122,12 @@ def _pixels(camera: Camera, ray: Array) -> tuple[Array, Array]:
 # Pixels by which forward and backward motion of moving objects may differ; half as much
 # as of what stands still, for their edges are known less well.
 MOVING_TOLERANCE = 0.5
-
 # Cycles' first sample lies at the pixel's centre. Frames of a sample or two that move
 # by whole pixels would all show the same points, and lines thinner than a pixel would
 # break up. So there the pixel taken is jittered. Motion counts as
 # whole pixels where a position is nearer to a centre than this, per frame between.
 FEW_SAMPLES = 2.0
-
 _WHOLE = 0.02
-
 # Distance between spots along each axis, in small and large pictures.
 _STRIDES, _LARGE = (2, 4), 1_000_000
 

@@ -12,9 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 _SEEDS = 2**31  # Cycles takes a signed 32-bit integer
-
 _LONG = 64  # frames
-
 _APART = 32_452_843  # of seeds: a prime that nothing else sets seeds apart by
 
 

@@ -36,19 +36,14 @@ if TYPE_CHECKING:
 # Depths, from the surface (0) to the length of the path (1), which is a little too
 # short or too long, as its parts are weighted by what the mirror reflects.
 _SHARES = (0.06, 0.12, 0.25, 0.5, 0.75, 0.9, 1.0, 1.1)
-
 # Pixels per frame of an image's own motion, from coarse to fine.
 _STEPS = (1.0, 0.5, 0.25)
-
 _AREA = 5  # spots across, over which guides are compared
-
 # An image is believed where it matches better than the surface by this factor, and by
 # so many standard errors of the difference, over the spots: one on the path, and one
 # that moves by itself, of which there are so many that one always matches by chance.
 _BETTER, _SURE, _SURE_IF_MOVED = 0.85, 2.0, 3.0
-
 _SEEN = 0.5  # of a candidate's spots, in neighbours
-
 _TINY = np.float32(1e-9)
 
 

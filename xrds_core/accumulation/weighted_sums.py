@@ -55,11 +55,9 @@ _CHANGES, _LEAST_CHANGES = 256.0, 4.0
 # (samples per pixel up to, pixels across): over how many pixels errors of guides are
 # averaged. Half buffers of few samples say little about one pixel.
 _GUIDE_AREAS = ((4.0, 9), (np.inf, 5))
-
 # Squared, summed over the channels: below this albedo the ratio of light to albedo is
 # taken from the whole frame.
 _DARKEST_ALBEDO = 0.02
-
 MARGIN = 12
 """Pixels on each side of a pixel that influence its weight."""
 
@@ -109,12 +107,10 @@ def for_library(
 
 TILE = 64
 """Pixels across, of coarse rejection: as the library has it."""
-
 # The squared parallax between both sides of an edge lowers the logarithm of a weight by
 # so much of it, however many samples there are: the other side's light and texture are
 # not this pixel's. Of few samples noise counts more. 1.2 and 2.5 were within 0.1 dB.
 _AT_RIMS, _AT_RIMS_OF_FEW = 1.7, 0.5
-
 _COLUMNS = 512  # of an area: what it needs beside the pictures stays small
 
 

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 
 _TINY = np.float32(1e-9)
-
 _ROWS = 128  # at a time, so that memory does not grow with the picture
 
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 COMPONENTS = ("RGB", "XYZ", "rgb", "xyz")
 """Letters of the channels of a colour or a direction, in their order."""
-
 _COMPOSITED = "Composite."  # Blender's layer for the output of its compositor
 
 

@@ -35,7 +35,6 @@ CODECS = (
     *("none", "rle", "zips", "zip", "piz"),
     *("pxr24", "b44", "b44a", "dwaa", "dwab"),  # these lose some of the picture
 )
-
 LARGEST_HALF = 65504.0
 
 
@@ -71,20 +70,15 @@ def fitting(pixels: Pixels, dtype: Any) -> Pixels:
 
 
 Window = tuple[tuple[int, int], tuple[int, int]]
-
 Attributes = dict[str, Any]
 """Of a header: texts, numbers, matrices as lists of rows, and names of views."""
 
 VIEWS = "multiView"
 """The attribute with the names of a file's views, the one without names first."""
-
 _FAULTS = (RuntimeError, ValueError, TypeError, MemoryError)  # of a damaged file
-
 # Of a header, what a file with other channels has anew.
 _OF_CHANNELS = {"channels", "name", "type", "tiles", "chunkCount", "version"}
-
 _LESS = 0.9  # of what DWA may hold, where it is decoded as infinite
-
 _stderr = threading.Lock()
 
 

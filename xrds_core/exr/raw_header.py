@@ -17,15 +17,10 @@ from ..errors import PictureError
 from ..files import scratch_folder
 
 _LARGEST_SIDE = 1 << 16  # pixels; more is a damaged header
-
 _ALWAYS_READ = 1 << 30  # bytes of pixels
-
 _USUAL_RATIO = 1000  # of pixels to file; ZIP, the default, packs no picture smaller
-
 _ALWAYS_PADDED = 4096 * 2304  # pixels, of a 4K picture
-
 _USUAL_PADDING = 16  # times the pixels that a crop holds
-
 _BYTES = 4  # of a number; the header as read does not say half or float
 
 _allowed = 0
@@ -84,23 +79,18 @@ def _area_around(windows: list[list[int]]) -> int:
 
 
 _MAGIC = 20000630
-
 _SEVERAL_PARTS = 0x1000
-
 _MOST = 64 << 20  # bytes of headers
-
 _NEEDED = frozenset(
     b"channels chunkCount compression dataWindow displayWindow lineOrder name "
     b"pixelAspectRatio screenWindowCenter screenWindowWidth tiles type version".split()
 )
 """Attributes without which the library reads no file."""
-
 _UNSAFE = frozenset(
     b"bytes chlist compression deepImageState envmap idmanifest keycode lineOrder "
     b"preview tiledesc".split()
 )
 """Kinds that it refuses or changes wherever it finds a value impossible."""
-
 _SIZES = {
     **dict.fromkeys((b"float", b"int"), 4),
     **dict.fromkeys((b"double", b"timecode", b"v2f", b"v2i"), 8),
@@ -113,7 +103,6 @@ _SIZES = {
     b"m33d": 72,
     b"m44d": 128,
 }
-
 _OF_FLOATS = (b"chromaticities", b"float", b"floatvector", b"m33f", b"m44f")
 
 

@@ -25,15 +25,12 @@ if TYPE_CHECKING:
 
 
 FOLDER = Path(__file__).parent / "lib"
-
 _SYSTEMS = {
     "linux": ("linux", ".so"),
     "win32": ("windows", ".dll"),
     "darwin": ("macos", ".dylib"),
 }
-
 _MACHINES = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
-
 _FUNCTIONS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "level": (c_int32, ()),
     "limit_level": (None, (c_int32,)),
@@ -170,7 +167,6 @@ class Arrays:
 
 
 Item = TypeVar("Item")
-
 Result = TypeVar("Result")
 
 _ROWS = 128  # of a band
@@ -204,7 +200,7 @@ def in_threads(
         try:
             tracked.end()
         finally:
-            pool.shutdown(cancel_futures=True)
+            pool.shutdown()
 
 
 class _Tracked(Generic[Item, Result]):
@@ -233,10 +229,12 @@ class _Tracked(Generic[Item, Result]):
     def end(self) -> None:
         """Let nothing more begin, and wait for the rest however often interrupted."""
         interrupt: KeyboardInterrupt | None = None
-        while not self._is_over or len(self._done) < len(self._begun):
+        while True:
             try:
                 self._is_over = True
-                time.sleep(_MOMENT if len(self._done) < len(self._begun) else 0.0)
+                while len(self._done) < len(self._begun):
+                    time.sleep(_MOMENT)
+                break
             except KeyboardInterrupt as again:
                 interrupt = again
         if interrupt is not None:

@@ -30,17 +30,12 @@ if TYPE_CHECKING:
 
 # Share of the blocks, those with most noise, that an error is not measured in.
 _NOISIEST = 0.01
-
 _DARKEST = 0.02  # of the mean luminance, added to the light of each channel
-
 _SMOOTH = 7  # pixels across
-
 _SEEN = 3  # pixels across: the light that an error is relative to
-
 # Standard deviation of noise that nobody sees, of the square root of luminance and
 # relative to it: 0.2 % of the light.
 _UNSEEN = 1e-3
-
 _TINY = 1e-12
 
 
@@ -150,7 +145,7 @@ def gain(accumulated: Accumulated, own: Stored, lent: float = 1.0) -> Gain:
     Errors fall with `FALL`; the noise of a pixel is its weight.
     """
     noise = root_noise(own)
-    alone = sample_counts(own, slice(None), noise.size).reshape(own.shape)
+    alone = sample_counts(own).reshape(own.shape)
     reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(lent)
     share = alone / np.maximum(alone + reused, _TINY)
     weights, weighted = block_means(noise), block_means(noise * share**FALL)

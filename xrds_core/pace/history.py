@@ -59,7 +59,7 @@ def extended(history: Stored | None, frame: Stored, movement: Movement) -> Store
     if history is None:
         return frame
     found = accumulate(frame, [history], movement)
-    own = sample_counts(frame, slice(None), len(frame.picture))
+    own = sample_counts(frame)
     total = found.samples.ravel()
     counts = np.minimum(total, own * LONGEST)
     passes = found.radiance, found.albedo, found.normal, found.alpha

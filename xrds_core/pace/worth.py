@@ -17,20 +17,15 @@ import numpy as np
 from ..errors import warn
 
 _SOON = 20  # frames; one of those before has all its neighbours
-
 # What is known before anything is measured: mean and standard deviation over the
 # choosing half of the gallery, 4 samples with neighbours against 16 without.
 _USUAL, _SPREAD = 0.45, 0.25
-
 # No ratio is better known than this, relative to it: errors do not fall quite with
 # `FALL`, nor does every measure of them see the same.
 _EXACT = 0.06
-
 _CAUTION = 0.16  # probability that it is worth less: the mean less its standard error
-
 FALL = 0.7
 """The error of a denoised picture falls with about this power of its samples."""
-
 _STEPS = np.linspace(0.0, 1.0, 201)
 
 
@@ -87,7 +82,6 @@ class Worth:
 
 
 _FRAMES = 5  # that are timed before anything is said
-
 _LATER = 1.1  # times Cycles' seconds, from which it is said
 
 

@@ -31,12 +31,9 @@ if TYPE_CHECKING:
 
 
 MOST = 2**31 - 1  # the libraries count in 32 bits
-
 LARGEST = 1e15
 """Of lengths, in any unit: its square fits into float32."""
-
 _LEAST_SPAN = 1e-6  # radians
-
 _ROUNDING = 1e-4  # of matrices in single precision
 
 
@@ -140,19 +137,13 @@ def _short(value: Any) -> str:
 
 
 VIEW, NDC = "worldToCamera", "worldToNDC"
-
 PROJECT = "xrds/project"
 """`Camera.project` for row vectors, exact where NDC is rounded."""
-
 SPHERE = "xrds/sphere"
 """Of an equirectangular panorama: `Camera.sphere` as text, instead of NDC."""
-
 _AHEAD = np.diag([1.0, 1.0, -1.0, 1.0])  # to and from a camera that looks along +Z
-
 _SKEW = 1e-3
-
 _SENSOR = 36.0  # mm, of a camera in JSON that names none
-
 _MOST_BYTES = 64 << 20  # of a file of cameras: a hundred thousand frames
 
 

@@ -33,27 +33,16 @@ if TYPE_CHECKING:
 
 
 _SPOTS = 2048  # pixels that are looked at, at most
-
 _FEWEST = 64  # of them that say anything
-
 _FRAMES = 8  # that are looked at: a camera may rest at first
-
 _SMOOTH = 0.999  # cosine of two normals on one surface
-
 _NEAR = 0.1  # relative difference of their depths
-
 _ACROSS = 0.02  # sine of the angle by which steps leave a surface, where all is right
-
 _FAR_ACROSS = 0.05  # where something is wrong, whatever it is
-
 _STEEPER = 0.3  # share of it that the right kind leaves
-
 _DIFFERS = 0.02  # mean difference of albedo of two frames, where all is right
-
 _BESIDE = 0.5  # share of it that the right unit leaves; some is noise
-
 _MOST = 0.2  # difference of albedo that counts
-
 _FACTORS = 10.0 ** (np.arange(-96, 97) / 24)  # of units: from 1/10000 to 10000
 
 _NO_FIT = (

@@ -30,22 +30,15 @@ if TYPE_CHECKING:
 
 
 SAMPLES, KEY, RADIUS, STILL = "xrds/samples", "xrds/key", "xrds/radius", "xrds/still"
-
 SUBSET = "xrds/subset"
-
 NAME = "cameraLabel"
 """Attributes: samples per pixel; a key of what the frame was rendered from; the
 temporal radius that its sample subsets are for; 1 where nothing at all moves in the
 shot; `Frame.subset`, none of a sequence of its own; the camera's name."""
-
 _DEFAULT_SAMPLES = 16
-
 _FITS = 2.0  # pixels by which a reprojected Position pass may be off
-
 _NEAREST = 1e-30  # depth of a hit, in any unit: dividing by it stays within float32
-
 _SPOTS = 4096  # pixels for which this is checked
-
 _CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # placeholder where none is needed
 
 

@@ -15,15 +15,10 @@ if TYPE_CHECKING:
 
 
 NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
-
 CAMERA_NORMAL = "Denoising Normal"
-
 PATH_LENGTH = "Denoising Depth"
-
 NOISE = "XRDS Noise"  # of the samples, as XRDS estimated it before storing them
-
 COUNTS = "XRDS Samples"  # of each pixel, where they differ
-
 # Names of passes in the order in which they are tried, case-insensitive.
 _USUAL = {
     "beauty": (NOISY, COMBINED, "beauty", "RGBA", "rgb", "C", "Ci"),
@@ -33,9 +28,7 @@ _USUAL = {
     "depth": ("Depth", "Z", PATH_LENGTH),
     "vector": ("Vector", "motion", "motionvector", "forward"),
 }
-
 _SINGLE = ("Z", "V", "R", "Y", "z", "r")
-
 _MOTION = ("XYZW", "RGBA", "xyzw", "XY", "RG", "xy", "rg", "UV", "uv")
 
 

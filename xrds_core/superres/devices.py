@@ -10,7 +10,6 @@ from ..errors import UsageError
 
 _TORCH_NAMES = {"metal": "mps"}
 """Where torch's name of a device is not ours, which the denoiser has as well."""
-
 PRECISIONS = {"fp32": torch.float32, "bf16": torch.bfloat16}
 
 

@@ -25,26 +25,18 @@ from .regression import ALBEDO_EPSILON, explain
 ArrayOrTensor = TypeVar("ArrayOrTensor", Array, Tensor)
 
 TRANSFER_GAIN = 10.0
-
 EXPOSURE_KEY = 0.18
-
 EXPOSURE_RANGE = (1e-36, 1e36)  # times the gain, still a normal float32
-
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # Rec.709
 
 _MOST_BINS = 16  # along each axis
-
 # A sun or fireflies in a few bins must not make night of all others, so it is not the
 # brightest bin that the others are held against.
 _TYPICAL_BRIGHT = 0.95  # quantile of the bins with light
-
 _FARTHEST_BIN = 1e4  # times brighter or darker: such bins say nothing of the exposure
-
 _LARGEST = np.float32(3.4e38)  # blended tiles may round up and stay finite
-
 # Of k e x: its square, over the epsilons that networks divide by, is a float32 still.
 _LARGEST_EXPOSED = 1e18
-
 LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
 
 

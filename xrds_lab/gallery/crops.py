@@ -86,7 +86,7 @@ def averaged(own: Stored, others: Sequence[Stored]) -> Accumulated:
     Places follow the camera and the Vector passes, as in the product. Nothing asks
     whether a place is hidden there, or shows other light.
     """
-    samples = sample_counts(own, slice(None), len(own.picture))
+    samples = sample_counts(own)
     sums = floats(own.picture) * samples[:, None]
     spots = grid(own.shape)
     motions = Movement().object_motions(own, others)
@@ -98,7 +98,7 @@ def averaged(own: Stored, others: Sequence[Stored]) -> Accumulated:
             x[motion.pixels[known]] = motion.x[known]
             y[motion.pixels[known]] = motion.y[known]
         found = nearest(x, y, other.shape)
-        weight = sample_counts(other, found.pixel, len(samples)) * found.seen
+        weight = sample_counts(other)[found.pixel] * found.seen
         values = floats(other.picture.take(found.pixel, axis=0))
         if both.turn is not None:
             values[:, other.normals] = values[:, other.normals] @ both.turn.T

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from xrds_core.files import replacing
 
-from .walks import ROOT, SHIPPED
+from .walks import SHIPPED, modules
 
 # Files at the top of xrds_core that are a part of their own.
 _PARTS = ("xrds_core.finish", "xrds_core.shot")
@@ -59,53 +59,26 @@ def svg() -> str:
 
 def imports() -> dict[str, set[str]]:
     """The parts that each part imports."""
-    found: dict[str, set[str]] = {part_of(module): set() for module in _sources()}
-    for module, path in _sources().items():
-        for target in _imported(module, path):
-            own, other = part_of(module), part_of(target)
-            if own != other:
+    parts = {part_of(module) for module in modules()}
+    found: dict[str, set[str]] = {part: set() for part in parts - set(SHIPPED)}
+    for module in modules().values():
+        for full in module.imported:
+            target = full if full in modules() else full.rpartition(".")[0]
+            own, other = part_of(module.name), part_of(target)
+            # not errors, files and arrays, which everything imports
+            if own != other and {own, other} <= found.keys():
                 found[own].add(other)
-    for top in SHIPPED:  # errors, files and arrays, which everything imports
-        found.pop(top, None)
-    return {part: lower & found.keys() for part, lower in found.items()}
+    return found
 
 
 def part_of(module: str) -> str:
     """The folder that a module lies in, or itself where it is a part."""
-    if module in _PARTS:
+    if module in _PARTS or module not in modules():
         return module
     folders = module.split(".")
-    if _sources()[module].stem != "__init__":
+    if modules()[module].path.stem != "__init__":
         folders.pop()
     return ".".join(folders[:2])
-
-
-@cache
-def _sources() -> dict[str, Path]:
-    found = {}
-    for path in sorted(p for name in SHIPPED for p in (ROOT / name).rglob("*.py")):
-        parts = path.relative_to(ROOT).with_suffix("").parts
-        name = parts[:-1] if parts[-1] == "__init__" else parts
-        if "shipped" not in parts:
-            found[".".join(name)] = path
-    return found
-
-
-def _imported(module: str, path: Path) -> set[str]:
-    """The modules that a module imports, wherever in it."""
-    package = module.split(".")
-    if path.stem != "__init__":
-        package.pop()
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-        if not isinstance(node, ast.ImportFrom):
-            continue
-        above = package[: len(package) - node.level + 1] if node.level else []
-        base = ".".join([*above, *([node.module] if node.module else [])])
-        for alias in node.names:
-            full = f"{base}.{alias.name}"
-            found |= {full if full in _sources() else base} & _sources().keys()
-    return found
 
 
 def _reduced(edges: Mapping[str, set[str]]) -> dict[str, set[str]]:
@@ -144,13 +117,13 @@ def _arrow(start: tuple[float, float], end: tuple[float, float]) -> str:
 
 
 def _box(name: str, x: float, y: float) -> str:
-    path = _sources()[name]
     lines = sum(
-        len(p.read_text("utf-8").splitlines())
-        for module, p in _sources().items()
-        if part_of(module) == name
+        len(module.path.read_text("utf-8").splitlines())
+        for module in modules().values()
+        if part_of(module.name) == name and "shipped" not in module.path.parts
     )
-    told = (ast.get_docstring(ast.parse(path.read_text("utf-8"))) or "").partition("\n")
+    source = ast.parse(modules()[name].path.read_text("utf-8"))
+    told = (ast.get_docstring(source) or "").partition("\n")
     kind = "b" if name.startswith("xrds_blender") else "c"
     words = "".join(
         f'<tspan x="{x + 10}" dy="13">{html.escape(line)}</tspan>'

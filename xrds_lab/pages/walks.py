@@ -46,12 +46,16 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 @dataclass
 class _Module:
-    """A module: its functions by qualified name, and what its names mean."""
+    """A module: its functions by qualified name, what its names mean, and full names of
+    all that it imports.
+    """
 
     name: str
+    path: Path
     functions: dict[str, Function] = field(default_factory=dict)
     classes: set[str] = field(default_factory=set)
     names: dict[str, str] = field(default_factory=dict)
+    imported: set[str] = field(default_factory=set)
 
 
 @dataclass
@@ -86,7 +90,7 @@ def modules() -> dict[str, _Module]:
 def _read(path: Path) -> _Module:
     parts = path.relative_to(ROOT).with_suffix("").parts
     package = parts[:-1]
-    module = _Module(".".join(package if parts[-1] == "__init__" else parts))
+    module = _Module(".".join(package if parts[-1] == "__init__" else parts), path)
     tree = ast.parse(path.read_text("utf-8"))
     for node in tree.body:
         if isinstance(node, Function):
@@ -103,7 +107,9 @@ def _read(path: Path) -> _Module:
                 above = package[: len(package) - node.level + 1]
                 base = ".".join([*above, *([node.module] if node.module else [])])
             for alias in node.names:
-                module.names[alias.asname or alias.name] = f"{base}.{alias.name}"
+                full = f"{base}.{alias.name}"
+                module.names[alias.asname or alias.name] = full
+                module.imported.add(full)
     return module
 
 

@@ -87,27 +87,21 @@ _NOTES: tuple[tuple[Callable[[Any], bool], str], ...] = (
 NO_DENOISER = (
     "There is no denoiser: the picture keeps its noise. Install XRDS from its zip"
 )
-
 NOISY_INPUT = (
     "There is no denoiser: the network gets a noisy picture. Install XRDS from its "
     "zip, or use more samples"
 )
-
 CYCLES_CANNOT_DENOISE = (
     "This Blender has no denoiser, so Cycles may stop with an error: switch off its "
     "Denoise, or choose another mode"
 )
-
 NO_BUDGET = "A time budget needs a denoiser: install XRDS from its zip"
-
 OTHER_PASSES = (
     "The network was trained with an earlier Blender: from 5.1 on gloss and clear coat "
     "can look wrong. Full Size is not affected"
 )
-
 PASSES_CHANGED = (5, 1)
 """The Blender since which the denoising passes leave out what gloss reflects."""
-
 Remark = tuple[str, str]
 
 

@@ -34,9 +34,7 @@ if TYPE_CHECKING:
 
 
 Row = tuple[str, str]
-
 MOST_ROWS = 6
-
 _STAGES = {
     "sync": "Scene",
     "beauty": "Samples",
@@ -47,7 +45,6 @@ _STAGES = {
     "write": "Writing",
     "total": "Total",
 }
-
 _QUALITIES = {quality: label for quality, label, _ in DENOISE}
 
 
@@ -200,14 +197,11 @@ def _amount(size: float) -> str:
 
 
 UNKNOWN = "Known after a first render of a frame"
-
 EXPECTED = "Expected from the renders of this file so far"
-
 ALONE = (
     "Frames of this camera, or without a temporal radius, cannot use each other's "
     "samples: each is rendered by itself"
 )
-
 STILLS = "Frames help each other in animations, not in single images"
 
 

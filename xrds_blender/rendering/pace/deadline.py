@@ -24,16 +24,12 @@ from .interface import Finishing
 from .more import More
 
 _FIRST_TRY, _GROWTH = 2, 4  # samples, and how many times those of the try before
-
 # A further try may take this share of the time of all frames, or of one.
 _OF_ALL, _OF_ONE = 0.02, 0.1
-
 # Frames under a still camera continue one sequence: each has room for so many times
 # the samples of the first.
 _ROOM = 1.5
-
 _ALIKE = 0.05  # a change of samples below this is not made
-
 _NEWEST = 0.3  # weight of the newest frame in what is expected of the next
 
 

@@ -171,6 +171,4 @@ def learn(frame: Stored, asked: Array) -> Threshold:
 
 def _noise(frame: Stored) -> Array:
     """Variance (H, W) of one sample."""
-    height, width = frame.shape
-    counts = sample_counts(frame, slice(None), height * width)
-    return root_noise(frame) * counts.reshape(frame.shape)
+    return root_noise(frame) * sample_counts(frame).reshape(frame.shape)

@@ -49,30 +49,20 @@ from .more import (
 
 FEWEST_SAMPLES = 8
 """Samples of the file from which it pays."""
-
 FEWEST_FRAMES = 16
 """Frames of a shot from which it pays: the first costs more than the file asks for."""
-
 _FIRST = 0.25  # share that the first frames have; less was not tried by then
-
 _FALL = 0.5  # the next share over the present one, at least, where frames add up
-
 _LEAST = 2  # samples of a frame, which has halves then
-
 # Blocks with less than this share of what they need get more samples, and frames.
 _LACKING, _ENOUGH = 0.5, 0.8
-
 _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
-
 # The share of the next frames stays as it is as long as it is off by no more from what
 # the last frames needed: Cycles syncs the scene again for another number of samples.
 _TOO_MUCH, _TOO_LITTLE = 0.9, 1.1
-
 _LAST = 4  # frames: one alone may need more by chance
-
 # Where so many are needed all are taken: a frame of a few less is no sooner, and worse.
 _ALL = 0.8
-
 # Neighbours' samples of less worth count less beside more of the frame's own.
 _USEFUL = 0.25
 
