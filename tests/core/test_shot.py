@@ -1,4 +1,4 @@
-"""Which frames lend to which, and when they are loaded and dropped."""
+"""Which frames lend to which, and what they take of memory."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from shots import HEIGHT, WIDTH, camera, view
 
 from xrds_core.accumulation.frame import Halves, Stored, store
 from xrds_core.errors import UsageError
-from xrds_core.shot import Shot, Window, bytes_needed
+from xrds_core.shot import Shot, bytes_needed
 
 
 def test_neighbours_lie_on_both_sides_and_end_with_the_shot() -> None:
@@ -31,59 +31,6 @@ def test_no_frame_has_neighbours_across_a_cut() -> None:
     assert shot.neighbours(3) == (2, 1)
     assert shot.neighbours(4) == (5,)
     assert shot.neighbours(6) == (7, 8)
-
-
-def test_frames_of_other_machines_are_neighbours_alone() -> None:
-    shot = Shot((5, 6), radius=2, others=(1, 2, 3, 4, 7, 8, 9))
-    loaded = []
-    done = [x.number for x in Window(shot, lambda n: loaded.append(n) or n)]
-    assert done == [5, 6]
-    assert loaded == [3, 4, 5, 6, 7, 8]  # and no frame that nobody needs
-
-
-@pytest.mark.parametrize("radius", [0, 1, 3, 20])
-@pytest.mark.parametrize("cuts", [(), (5, 9)])
-def test_each_frame_is_loaded_once_and_few_are_kept(
-    radius: int, cuts: tuple[int, ...]
-) -> None:
-    shot = Shot(tuple(range(12)), radius, frozenset(cuts))
-    alive: dict[int, int] = {}
-    loads: list[int] = []
-    most = 0
-
-    class Picture:
-        def __init__(self, number: int) -> None:
-            self.number = number
-            alive[number] = 1
-
-        def __del__(self) -> None:
-            del alive[self.number]
-
-    def load(number: int) -> Picture:
-        loads.append(number)
-        return Picture(number)
-
-    done = []
-    for found in Window(shot, load):
-        number = found.number
-        assert found.own.number == number
-        assert tuple(found.neighbours) == shot.neighbours(number)
-        assert all(x.number == n for n, x in found.neighbours.items())
-        done.append(number)
-        most = max(most, len(alive))
-        # no later than it must be: the last neighbour is there, and nothing beyond
-        assert max(loads) == max((number, *found.neighbours))
-        del found
-    assert done == loads == list(range(12))
-    assert most <= min(2 * radius + 1, len(shot.order))
-
-
-def test_missing_frames_are_left_out_and_nobodys_neighbours() -> None:
-    shot = Shot((1, 2, 3, 4), radius=1)
-    window = Window(shot, lambda n: None if n == 2 else n)
-    found = [(x.number, x.own, x.neighbours) for x in window]
-    assert found == [(1, 1, {}), (3, 3, {4: 4}), (4, 4, {3: 3})]
-    assert window.neighbourhood(2) is None
 
 
 def test_a_negative_radius_is_refused() -> None:

@@ -42,6 +42,16 @@ def has_denoiser() -> bool:
     return bool(_cycles.with_openimagedenoise)
 
 
+def samples_on_card(scene: Any) -> bool:
+    """Whether Cycles renders a scene on a graphics card."""
+    import bpy
+
+    if scene.cycles.device != "GPU":
+        return False
+    cycles = bpy.context.preferences.addons.get("cycles")
+    return cycles is not None and bool(cycles.preferences.has_active_device())
+
+
 def prepare(engine: Any, depsgraph: Any) -> None:
     """Hand the graph's updates to a session kept from the frame before, then forget.
 

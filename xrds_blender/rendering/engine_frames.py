@@ -9,18 +9,18 @@ from __future__ import annotations
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from xrds_core.arrays import Array
-from xrds_core.shot import Neighbourhood, Shot, Window
+from xrds_core.frame_source import FrameSource, Neighbourhood, Window
+from xrds_core.shot import Shot
 
 from ..cycles import session
 from ..cycles.passes import CyclesPasses
 from ..scene.contents import cuts, frame_range, requested_passes
 from . import stages
-from .methods import Method
-from .pace.choose import pace_of
+from .methods import Method, completed
 from .pace.more import Part, render_more
 from .sampling import Sampled, can_continue, first_sample
 
@@ -49,7 +49,7 @@ class _Call:
 
 
 @dataclass
-class EngineFrames:
+class EngineFrames(FrameSource[Sampled]):
     """The frames of one view layer of an animation, for one render job.
 
     `ahead` are Cycles' own passes of frames that were sampled before their turn.
@@ -72,14 +72,13 @@ class EngineFrames:
         numbers = frame_range(scene)
         radius, begins = method.request.settings.temporal_radius, cuts(scene, numbers)
         shot = Shot(tuple(numbers), radius, begins)
-        method.pace = pace_of(
+        method.begin_shot(
             scene,
-            method.request,
             shot,
             layers=max(1, sum(layer.use for layer in scene.view_layers)),
             beside=None if beside is None else beside.pace,
         )
-        found.window = Window(shot, found._load)
+        found.window = Window(shot, found)
         return found
 
     def neighbourhood(self, engine: Any, depsgraph: Any) -> Neighbourhood[Sampled]:
@@ -98,13 +97,14 @@ class EngineFrames:
             last = missing[-1] if missing else None
             self._call = _Call(engine, depsgraph, passes, number, last)
             try:
-                found = self._whole(number)
+                found = self.window.neighbourhood(number)
             finally:
                 self._call = None
                 go_to(engine, depsgraph, number)
                 if number in self.ahead:
                     passes.put_back(self.ahead.pop(number))
-            return self._completed(engine, depsgraph, found)
+        assert found is not None
+        return found
 
     def sample_next(self, engine: Any, depsgraph: Any) -> None:
         """Sample what the frame after this one needs, while this one is finished.
@@ -128,35 +128,22 @@ class EngineFrames:
                 go_to(engine, depsgraph, number)
                 passes.put_back(before)
 
-    def _completed(
-        self, engine: Any, depsgraph: Any, found: Neighbourhood[Sampled]
-    ) -> Neighbourhood[Sampled]:
-        """The frame with more samples where it lacks them."""
-        method = self.method
+    def complete(self, frame: Neighbourhood[Sampled]) -> tuple[Sampled, Sampled]:
+        """The frame with more samples, or sampled again, where it lacks them."""
+        call, others = self._call, list(frame.neighbours.values())
+        assert call is not None
+        go_to(call.engine, call.depsgraph, frame.number)
+        if self.method.lacks(frame.own, others):
+            self.ahead.pop(frame.number, None)  # its own passes are rendered now
+            own = self._sample(between=False)
+            return own, own
 
         def more(part: Part) -> Any:
-            scene = depsgraph.scene_eval
-            place = scene.frame_current // scene.frame_step
-            return render_more(engine, depsgraph, method.request, place, part)
+            place = _place(call.depsgraph.scene_eval)
+            request = self.method.request
+            return render_more(call.engine, call.depsgraph, request, place, part)
 
-        others = list(found.neighbours.values())
-        own = method.complete(found.own, others, more)
-        if own.views is not found.own.views:  # it lends what it has got as well
-            self.window.replace(found.number, replace(own, gathered={}))
-        return replace(found, own=own)
-
-    def _whole(self, number: int) -> Neighbourhood[Sampled]:
-        """A frame with its neighbours, sampled again where these lack what it lacks."""
-        call, found = self._call, self.window.neighbourhood(number)
-        assert call is not None
-        assert found is not None
-        if not self.method.lacks(found.own, list(found.neighbours.values())):
-            return found
-        go_to(call.engine, call.depsgraph, number)
-        self.ahead.pop(number, None)  # its own passes are rendered now
-        own = self._sample(between=False)
-        self.window.replace(number, own)
-        return replace(found, own=own)
+        return completed(self.method, frame.own, others, more)
 
     def _show(self, scene: Any) -> None:
         """Show how far the animation is; frames ahead are sampled already."""
@@ -169,7 +156,7 @@ class EngineFrames:
             seconds = each * ((end - last) // step + 1)
         stages.begin_frame(number, (end - number) // step, seconds)
 
-    def _load(self, number: int) -> Sampled:
+    def load(self, number: int) -> Sampled:
         """Sample a frame, and keep its passes where others overwrite them."""
         call = self._call
         assert call is not None
@@ -193,7 +180,7 @@ class EngineFrames:
         scene = depsgraph.scene_eval
         if not can_continue(scene, self.method.request):
             return self.method.sample(engine, depsgraph, between=between)
-        place = scene.frame_current // scene.frame_step
+        place = _place(scene)
         sampled = self.method.sample(engine, depsgraph, place)
         requested = _OF_ONE_SAMPLE.keys() & set(
             requested_passes(depsgraph.view_layer_eval)
@@ -205,6 +192,11 @@ class EngineFrames:
             own = {k: x for k, x in passes.all_passes().items() if k[1] in names}
             passes.put_back(others | own)
         return sampled
+
+
+def _place(scene: Any) -> int:
+    """The frame's index among all frames of its step, as `place_of` has it."""
+    return int(scene.frame_current // scene.frame_step)
 
 
 _ADD_ON = __name__.partition(".")[0]

@@ -15,6 +15,7 @@ from xrds_core.denoising.light_passes import LightPart, passes_by_name
 from xrds_core.denoising.light_sums import added_up, light_in
 from xrds_core.errors import warn
 from xrds_core.finish import finish_frame
+from xrds_core.shot import Shot
 
 from ..cycles.layer_session import LayerSession
 from ..cycles.samples import Samples
@@ -22,8 +23,10 @@ from ..planning.plan import Decision, full_size
 from ..planning.request import Request
 from ..planning.settings import Denoising, Settings
 from .loading import load_denoiser
-from .methods import Method, Report
+from .methods import Method, Pace, Report
+from .pace.deadline import Deadline, deadline
 from .pace.more import More
+from .pace.same_picture import same_picture
 from .picture import Picture, Temporal, peak_memory
 from .sampling import OnSampled, Sampled, sample_frame
 
@@ -51,6 +54,16 @@ class FullSize(Method):
         self._denoiser = load_denoiser(self._quality, request.machine)
         self._movement = Movement()
         self._independent = IndependentFrames(warn)
+
+    def begin_shot(
+        self, scene: Any, shot: Shot, *, layers: int = 1, beside: Pace | None = None
+    ) -> None:
+        if self.request.deadline is None:
+            self.pace = same_picture(scene, self.request, len(shot.order))
+        elif isinstance(beside, Deadline):
+            self.pace = beside
+        else:
+            self.pace = deadline(scene, self.request, shot, layers)
 
     def sample(
         self,

@@ -7,22 +7,66 @@ picture from these samples. A still is a frame without neighbours.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from dataclasses import replace
+from typing import Any, Protocol
 
+from xrds_core.accumulation.accumulate import Accumulated
 from xrds_core.arrays import Array
+from xrds_core.shot import Shot
 
 from ..cycles import session
 from ..cycles.samples import render_once
 from ..cycles.settings import COMBINED
 from ..planning.request import Request
 from . import stages
-from .pace.interface import Pace
 from .pace.more import More
 from .picture import Picture, peak_memory
 from .sampling import Sampled
 
 Report = Callable[[float], bool]
 """Takes how far a stage is, from 0 to 1; False once the user has stopped it."""
+
+
+class Finishing(Protocol):
+    """What makes pictures of frames: `FullSize`."""
+
+    def accumulate(
+        self, own: Sampled, others: Sequence[Sampled], view: str
+    ) -> Accumulated:
+        """One view with the samples of its neighbours."""
+
+    def finish(self, own: Sampled, others: Sequence[Sampled], view: str) -> Picture:
+        """The picture of one view."""
+
+    def radiance(
+        self,
+        own: Sampled,
+        others: Sequence[Sampled],
+        view: str,
+        region: tuple[slice, slice],
+    ) -> Array:
+        """Rows and columns of the picture of one view, (H, W, 3), denoised alone."""
+
+    def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
+        """Samples by themselves, denoised."""
+
+
+class Pace(Protocol):
+    """What chooses the samples of each frame of one shot, in the order of time."""
+
+    def request(self, request: Request) -> Request:
+        """The request of the next frame that is sampled."""
+
+    def takes(self, method: Finishing, frame: Sampled) -> bool:
+        """Note a frame that was sampled; False where it is to be sampled again."""
+
+    def complete(
+        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: More
+    ) -> Sampled:
+        """A frame with all that it is finished from; `more` renders more samples.
+
+        Raises Cancelled when the user stops their render.
+        """
 
 
 class Method:
@@ -37,6 +81,15 @@ class Method:
     def __init__(self, request: Request) -> None:
         self.request, self.settings = request, request.settings
         self.pace: Pace | None = None
+
+    def begin_shot(
+        self, scene: Any, shot: Shot, *, layers: int = 1, beside: Pace | None = None
+    ) -> None:
+        """Choose what says how many samples the frames of a shot take: `pace`.
+
+        Where several view `layers` render in turn, `beside` is that of another one:
+        they share a deadline.
+        """
 
     def sample(
         self,
@@ -134,12 +187,18 @@ class CyclesOnly(Method):
             peak_memory=peak_memory(),
         )
 
-    def complete(self, own: Sampled, others: Sequence[Sampled], more: More) -> Sampled:
-        """The frame with all that it is finished from; `more` renders more samples.
-
-        Raises Cancelled when the user stops their render.
-        """
-        return own
-
     def begin_finishing(self, engine: Any) -> Report:
         return lambda _: True
+
+
+def completed(
+    method: Method, own: Sampled, others: Sequence[Sampled], more: More
+) -> tuple[Sampled, Sampled]:
+    """A frame with all that it is finished from, and what it lends to others.
+
+    It lends the samples that it has got as well, but what was accumulated on it is its
+    own.
+    """
+    whole = method.complete(own, others, more)
+    lent = own if whole.views is own.views else replace(whole, gathered={})
+    return whole, lent

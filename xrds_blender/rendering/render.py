@@ -16,8 +16,10 @@ from typing import Any
 
 from xrds_core.arrays import Array
 from xrds_core.errors import Cancelled
+from xrds_core.overlap import Overlap
 
 from ..cycles import session
+from ..cycles.session import samples_on_card
 from ..internals.lifetimes import RENDER_JOB
 from ..planning.request import Request, render_request
 from . import history, stages, torch_folder
@@ -26,7 +28,6 @@ from .choose import Chosen, choose_for_shot, chosen
 from .engine_frames import EngineFrames
 from .full_size import FullSize
 from .methods import CyclesOnly, Method, Report
-from .overlap import Overlap, samples_on_card
 from .picture import NetworkFailed, Picture, joined
 from .sampling import OnSampled, Sampled, has_neighbours
 from .super_resolution import SuperResolution

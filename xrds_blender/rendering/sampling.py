@@ -22,7 +22,6 @@ from xrds_core.exr.channels import Channels
 
 from ..cycles import session
 from ..cycles.halves import sample_halves, sample_motion
-from ..cycles.low_resolution import Beauty, LowSamples
 from ..cycles.samples import (
     COUNTS,
     GEOMETRY,
@@ -30,18 +29,15 @@ from ..cycles.samples import (
     PATH_LENGTH,
     Samples,
     sample_layer,
-    samples_in,
 )
 from ..cycles.settings import has_subsets, set_share, subset_of_file
 from ..cycles.view import cameras_of, can_track
 from ..internals.borrowed import Borrowed
 from ..planning.plan import Decision
 from ..planning.request import Request
-from ..planning.settings import Denoising
 from ..scene.contents import scene_facts, shapes_move, stands_still
 from . import loading, stages
-from .enlarging import enlarged
-from .loading import in_process, load_denoiser
+from .stopping import finish_samples
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
 SEED_STEP = 7919
@@ -454,48 +450,3 @@ def _geometry(depsgraph: Any) -> Sequence[tuple[str, str]]:
     """
     blurred = depsgraph.scene_eval.render.use_motion_blur
     return GEOMETRY[:1] if blurred or not shapes_move(depsgraph) else GEOMETRY
-
-
-def finish_samples(engine: Any, layer_name: str, request: Request) -> None:
-    """Denoise the full-size samples in the result, if the request asks for it."""
-    if not request.finish_stopped:
-        return
-    denoiser = load_denoiser("fast", request.machine)
-    noisy = samples_in(engine, layer_name)
-    pictures = {
-        view: denoiser(each.picture, each.albedo, each.normal).radiance
-        for view, each in noisy.items()
-        if each.picture.any()
-    }
-    session.write_combined(engine, layer_name, pictures)
-
-
-def finish_low_samples(
-    engine: Any, layer_name: str, request: Request, light: Mapping[str, LowSamples]
-) -> None:
-    """Denoise low-resolution samples, if requested, and as `finish_beauties`.
-
-    Views without any are left out.
-    """
-    if not request.finish_stopped:
-        return
-    denoise = in_process(Denoising.XRDS_FAST, request.machine)
-    beauties = {
-        view: low.place.beauty(low.samples.picture)
-        if denoise is None
-        else low.denoised(denoise)
-        for view, low in light.items()
-        if low.samples.picture.any()
-    }
-    finish_beauties(engine, layer_name, request, beauties)
-
-
-def finish_beauties(
-    engine: Any, layer_name: str, request: Request, beauties: dict[str, Beauty]
-) -> None:
-    """Make low-resolution pictures the result, enlarged, if the request asks for it."""
-    if request.finish_stopped:
-        result = engine.get_result()
-        size = result.resolution_y, result.resolution_x
-        pictures = enlarged(beauties, request.settings.scale, size)
-        session.write_combined(engine, layer_name, pictures)

@@ -7,24 +7,24 @@ along with what they show, and the sum is denoised once and, above scale 1, enla
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from xrds_core.accumulation.camera import Camera
 from xrds_core.errors import SceneError
-from xrds_core.shot import Shot, Window, place_of
+from xrds_core.frame_source import FrameSource, Neighbourhood, finish_frames
+from xrds_core.shot import Shot, place_of
 
 from ..cycles import session
+from ..cycles.session import samples_on_card
 from ..cycles.view import cameras_of
 from ..planning.request import Request
 from ..scene.contents import cuts
 from . import stages
 from .blender_job import call_engine
 from .choose import Chosen, choose_for_shot
-from .methods import Method
-from .overlap import Overlap, samples_on_card
-from .pace.choose import pace_of
+from .methods import Method, completed
 from .pace.more import Part, render_more
 from .picture import Picture, joined
 from .render import method_of
@@ -57,63 +57,63 @@ def render_shot(
     cached = cache.beside(frames, radius) if cache else []
     there = tuple(sorted({*frames, *cached}))
     shot = Shot(todo, radius, cuts(scene, there), others=there)
-
-    def load(number: int) -> Sampled | None:
-        if cache and (found := cache.read(number)):
-            return found
-        if number not in frames:
-            return None
-        return _sample(scene, method, frames, number, shot.is_between(number))
-
     if not cache:
-        method.pace = pace_of(scene, request, shot)
-    window = Window(shot, load)
+        method.begin_shot(scene, shot)
+    source = _SceneFrames(scene, method, frames, shot, is_done, cache)
     # more samples of a frame are rendered, and judged, before it is finished
-    is_on = method.pace is None and samples_on_card(scene)
-    with Overlap[tuple[int, Picture]](is_on) as overlap:
-        for found in window:
-            number, own = found.number, found.own
-            if is_done(number):  # another machine was quicker
-                continue
-            others = list(found.neighbours.values())
-            own = _completed(scene, method, frames, own, others)
-            if own.views is not found.own.views:  # it lends what it has got as well
-                window.replace(number, replace(own, gathered={}))
-            if method.lacks(own, others):
-                own = _sample(scene, method, frames, number)
-            yield from overlap.put(partial(_finished, method, chosen, own, others))
-        yield from overlap.rest()
+    beside = method.pace is None and samples_on_card(scene)
+    finish = partial(_finished, method, chosen)
+    yield from finish_frames(shot, source, finish, beside=beside)
+
+
+@dataclass(frozen=True)
+class _SceneFrames(FrameSource[Sampled]):
+    """Frames of an open scene, each a Blender job; `numbers` are those to render."""
+
+    scene: Any
+    method: Method
+    numbers: Sequence[int]
+    shot: Shot
+    finished: Callable[[int], bool]
+    cache: SampleCache | None
+
+    def load(self, number: int) -> Sampled | None:
+        if self.cache and (cached := self.cache.read(number)):
+            return cached
+        if number not in self.numbers:
+            return None
+        between = self.shot.is_between(number)
+        return _sample(self.scene, self.method, self.numbers, number, between)
+
+    def is_done(self, frame: Neighbourhood[Sampled]) -> bool:
+        return self.finished(frame.number)
+
+    def complete(self, frame: Neighbourhood[Sampled]) -> tuple[Sampled, Sampled]:
+        number, others = frame.number, list(frame.neighbours.values())
+        if self.method.lacks(frame.own, others):
+            own = _sample(self.scene, self.method, self.numbers, number)
+            return own, own
+        return completed(self.method, frame.own, others, partial(self._more, number))
+
+    def _more(self, number: int, part: Part) -> Any:
+        self.scene.frame_set(number)
+
+        def work(engine: Any, depsgraph: Any) -> Any:
+            session.allocate(engine)
+            place = place_of(number, self.numbers)
+            return render_more(engine, depsgraph, self.method.request, place, part)
+
+        return call_engine(self.scene, work)
 
 
 def _finished(
-    method: Method, chosen: Chosen, own: Sampled, others: Sequence[Sampled]
+    method: Method, chosen: Chosen, frame: Neighbourhood[Sampled]
 ) -> tuple[int, Picture]:
+    own, others = frame.own, list(frame.neighbours.values())
     pictures = {view: method.finish(own, others, view) for view in own.views}
     picture = joined(pictures, own.seconds)
     picture.seconds["total"] = sum(picture.seconds.values())
     return own.number, chosen.described(picture)
-
-
-def _completed(
-    scene: Any,
-    method: Method,
-    frames: Sequence[int],
-    own: Sampled,
-    others: Sequence[Sampled],
-) -> Sampled:
-    """The frame with more samples where it lacks them."""
-
-    def more(part: Part) -> Any:
-        scene.frame_set(own.number)
-
-        def work(engine: Any, depsgraph: Any) -> Any:
-            session.allocate(engine)
-            place = place_of(own.number, frames)
-            return render_more(engine, depsgraph, method.request, place, part)
-
-        return call_engine(scene, work)
-
-    return method.complete(own, others, more)
 
 
 def _chosen(scene: Any, request: Request, todo: Sequence[int]) -> Chosen:

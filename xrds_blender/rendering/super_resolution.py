@@ -43,11 +43,10 @@ from .picture import NetworkFailed, Picture, Temporal, peak_memory
 from .sampling import (
     Sampled,
     Sampling,
-    finish_beauties,
-    finish_low_samples,
     light_of,
     sampling_of,
 )
+from .stopping import finish_beauties, finish_low_samples
 
 if TYPE_CHECKING:
     from xrds_core.denoising import Denoiser

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from ..denoising.light_passes import passes_of
 from ..errors import PictureError, UsageError
 from ..files import check_folder, check_places
 from ..finish import AROUND, Finished, finish_frame
+from ..frame_source import FrameSource, Neighbourhood, finish_frames
 from ..frames import (
     RADIUS,
     check_pattern,
@@ -27,7 +28,7 @@ from ..frames import (
     misnamed,
 )
 from ..progress import Clock
-from ..shot import Neighbourhood, Shot, Window
+from ..shot import Shot
 from ..version import package_version
 from .frame_file import FrameFile, Reading
 from .loading import Loader, NeighbourSelection
@@ -197,7 +198,9 @@ def denoise_sequence(
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
-    entries = list(_entries(files, denoiser, shot, loader, recipe, resume, say))
+    source = _Frames(files, denoiser, shot, loader, recipe, resume, say)
+    entries = [x for x in finish_frames(shot, source, source.finish) if x is not None]
+    source.selection.report()
     return {
         "output": files.output,
         "temporal_radius": radius,
@@ -208,65 +211,86 @@ def denoise_sequence(
     }
 
 
-def _entries(
-    files: Files,
-    denoiser: Denoiser,
-    shot: Shot,
-    loader: Loader,
-    recipe: Recipe,
-    resume: bool,
-    say: Say,
-) -> Iterator[dict[str, Any]]:
-    """Finish and write the frames of a shot; yields the record of each.
+@dataclass
+class _Frames(FrameSource[FrameFile]):
+    """The frames of a sequence, read, finished and written.
 
     A frame that cannot be finished or written is left out; two of them in a row are an
     error.
     """
-    selection, fails = NeighbourSelection(say), False
-    movement, clock = Movement(), Clock()
-    for found in Window(shot, loader.load):
-        number, own = found.number, found.own
-        near = sorted((number, *shot.neighbours(number)))
-        digest = recipe.digest({n: loader.states.get(n, ()) for n in near}, number)
-        if resume and files.is_done(number, digest):  # another machine was quicker
-            continue
+
+    files: Files
+    denoiser: Denoiser
+    shot: Shot
+    loader: Loader
+    recipe: Recipe
+    resume: bool
+    say: Say
+    selection: NeighbourSelection = field(init=False)
+    movement: Movement = field(default_factory=Movement)
+    clock: Clock = field(default_factory=Clock)
+    fails: bool = False
+
+    def __post_init__(self) -> None:
+        self.selection = NeighbourSelection(self.say)
+
+    def load(self, number: int) -> FrameFile | None:
+        return self.loader.load(number)
+
+    def is_done(self, frame: Neighbourhood[FrameFile]) -> bool:
+        if not self.resume:
+            return False
+        return self.files.is_done(frame.number, self._digest(frame.number))
+
+    def finish(self, frame: Neighbourhood[FrameFile]) -> dict[str, Any] | None:
+        """Finish and write a frame; returns its record, None where it is left out."""
         try:
-            views, others = {}, {}
-            for view, each in {"": own, **own.others}.items():
-                others[view] = selection.select(number, each, _of(found, view))
-                region, within = _regions(each, files.crop)
-                done = finish_frame(
-                    each.stored,
-                    others[view],
-                    denoiser,
-                    movement,
-                    region=region,
-                    light=each.light,
-                )
-                views[view] = each, done.within(within)
-            finished = views[""][1]
-            started = time.perf_counter()
-            metadata = {**_metadata(own, finished, denoiser), MADE_OF: digest}
-            check = partial(loader.check, number)
-            path = files.write(number, views, metadata, check)
-            fails = False
+            record = self._finish(frame)
         except PictureError as error:
-            if fails:
+            if self.fails:
                 raise
-            fails = True
-            loader.leave_out(number, error)
-            continue
-        selection.record(others[""], finished.accumulated)
-        seconds = {"read": loader.seconds()}
+            self.fails = True
+            self.loader.leave_out(frame.number, error)
+            return None
+        self.fails = False
+        errors.finished.append(record)
+        return record
+
+    def _finish(self, frame: Neighbourhood[FrameFile]) -> dict[str, Any]:
+        number, own = frame.number, frame.own
+        views, others = {}, {}
+        for view, file in {"": own, **own.others}.items():
+            others[view] = self.selection.select(number, file, _of(frame, view))
+            region, within = _regions(file, self.files.crop)
+            done = finish_frame(
+                file.stored,
+                others[view],
+                self.denoiser,
+                self.movement,
+                region=region,
+                light=file.light,
+            )
+            views[view] = file, done.within(within)
+        finished = views[""][1]
+        started = time.perf_counter()
+        made_of = {MADE_OF: self._digest(number)}
+        metadata = _metadata(own, finished, self.denoiser) | made_of
+        check = partial(self.loader.check, number)
+        path = self.files.write(number, views, metadata, check)
+        self.selection.record(others[""], finished.accumulated)
+        seconds = {"read": self.loader.seconds()}
         for stage in finished.seconds:
-            seconds[stage] = sum(each.seconds[stage] for _, each in views.values())
+            seconds[stage] = sum(done.seconds[stage] for _, done in views.values())
         seconds["write"] = time.perf_counter() - started
-        left = sum(n > number and n not in loader.failed for n in shot.frames)
-        say(f"frame {number}: {path}, {clock.lap(left)}")
-        entry = _entry(number, path, shot.radius, finished, seconds)
-        errors.finished.append(entry)
-        yield entry
-    selection.report()
+        failed = self.loader.failed
+        left = sum(n > number and n not in failed for n in self.shot.frames)
+        self.say(f"frame {number}: {path}, {self.clock.lap(left)}")
+        return _entry(number, path, self.shot.radius, finished, seconds)
+
+    def _digest(self, number: int) -> str:
+        near = sorted((number, *self.shot.neighbours(number)))
+        states = {n: self.loader.states.get(n, ()) for n in near}
+        return self.recipe.digest(states, number)
 
 
 def _recipe(files: Files, reading: Reading, denoiser: Denoiser) -> Recipe:

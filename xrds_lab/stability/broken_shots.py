@@ -12,14 +12,15 @@ from xrds_core.accumulation.accumulate import accumulate
 from xrds_core.accumulation.frame import Stored
 from xrds_core.accumulation.weighted_sums import MARGIN
 from xrds_core.errors import PictureError
-from xrds_core.shot import Shot, Window
+from xrds_core.frame_source import FrameSource, Window
+from xrds_core.shot import Shot
 
 from .accumulation import RADIUS, SAMPLES, film, finished
 from .load import growth, resident
 from .measured import Measured, faults, relative_difference
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from xrds_core.accumulation.accumulate import Accumulated
 
@@ -95,12 +96,22 @@ def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
     return replace(spoilt, noise=noise, counts=frame.counts, image=frame.image)
 
 
+class _Frames(FrameSource[Stored]):
+    """Frames that a function makes of their numbers."""
+
+    def __init__(self, load: Callable[[int], Stored | None]) -> None:
+        self._load = load
+
+    def load(self, number: int) -> Stored | None:
+        return self._load(number)
+
+
 def missing(frames: Frames) -> Iterator[Measured]:
     """A frame that could not be read is left out; the others are finished."""
     shot = Shot(tuple(frames), RADIUS)
     lost = _MIDDLE + 1
     wrong, number_of = 0, []
-    for found in Window(shot, lambda n: frames[n] if n != lost else None):
+    for found in Window(shot, _Frames(lambda n: frames[n] if n != lost else None)):
         number_of.append(found.number)
         result = accumulate(found.own, list(found.neighbours.values()))
         wrong += faults(np.maximum(result.radiance, 0.0))
@@ -142,7 +153,7 @@ def long(frames: Frames) -> Measured:
         frame = originals[number % len(originals)]
         return replace(frame, number=number, picture=frame.picture.copy())
 
-    for found in Window(Shot(tuple(range(LONG)), RADIUS), load):
+    for found in Window(Shot(tuple(range(LONG)), RADIUS), _Frames(load)):
         method.finish_stored(found.own, list(found.neighbours.values()))
         memory.append(resident() / 2**10)
     late = memory[len(memory) // 3 :: 4]

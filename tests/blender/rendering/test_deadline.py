@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from frame_sources import Frames
 
 bpy = pytest.importorskip("bpy")
 pytest.importorskip("mitsuba_oidn")
@@ -23,7 +24,8 @@ from xrds_blender.rendering.pace import deadline as deadline_module
 from xrds_blender.rendering.pace.deadline import Deadline
 from xrds_blender.rendering.sampling import Sampled
 from xrds_core.errors import UsageError
-from xrds_core.shot import Shot, Window
+from xrds_core.frame_source import Window
+from xrds_core.shot import Shot
 
 RADIUS = 2
 
@@ -81,7 +83,7 @@ class Farm:
                     self.counts.append(samples)
                     return frame
 
-        for found in Window(Shot(tuple(range(frames)), RADIUS), load):
+        for found in Window(Shot(tuple(range(frames)), RADIUS), Frames(load)):
             frame = pace.complete(self, found.own, (), lambda _: ({}, {}))
             assert frame.decisions[0].decision == "deadline"
             self.finish()

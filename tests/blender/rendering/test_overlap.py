@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,57 +11,13 @@ import numpy as np
 import pytest
 from channels import read_channels
 
+from xrds_blender.cycles.session import samples_on_card
 from xrds_blender.planning.request import render_request
 from xrds_blender.rendering import render as renders
 from xrds_blender.rendering import shot as shots
 from xrds_blender.rendering.full_size import FullSize
-from xrds_blender.rendering.overlap import Overlap, samples_on_card
 
 FRAMES = range(1, 6)
-
-
-def pieces() -> Iterator[Callable[[], int]]:
-    for number in range(4):
-        yield lambda number=number: number
-
-
-@pytest.mark.parametrize("is_on", [False, True])
-def test_pieces_come_in_order(is_on: bool) -> None:
-    found = []
-    with Overlap[int](is_on) as overlap:
-        for work in pieces():
-            found += overlap.put(work)
-        found += overlap.rest()
-    assert found == [0, 1, 2, 3]
-
-
-def test_one_piece_runs_beside_what_goes_on_here() -> None:
-    """Each piece ends only after something was done here; in turn none would."""
-    with Overlap[bool](True) as overlap:
-        for _ in range(4):
-            sampled = threading.Event()
-            assert all(overlap.put(lambda event=sampled: event.wait(600)))
-            sampled.set()
-        assert all(overlap.rest())
-
-
-def test_an_error_of_a_piece_reaches_the_one_who_takes_it() -> None:
-    def fail() -> int:
-        raise RuntimeError("no memory")
-
-    with Overlap[int](True) as overlap:
-        assert list(overlap.put(fail)) == []
-        with pytest.raises(RuntimeError, match="no memory"):
-            list(overlap.rest())
-
-
-def test_an_error_here_waits_for_nothing() -> None:
-    may_end, ended = threading.Event(), threading.Event()
-    overlap = Overlap[None](True)
-    list(overlap.put(lambda: may_end.wait(600) and ended.set()))
-    overlap.__exit__(KeyboardInterrupt, KeyboardInterrupt(), None)
-    assert not ended.is_set()
-    may_end.set()
 
 
 def test_without_a_card_nothing_overlaps(life: Any) -> None:

@@ -17,12 +17,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from frame_sources import Frames
 from native_shots import Kind, passes_of, shot
 from shots import World, camera, view
 
 from xrds_core.accumulation.accumulate import Accumulated, accumulate
 from xrds_core.accumulation.frame import Stored, store
 from xrds_core.accumulation.local_filters import find_ranges, find_rims
+from xrds_core.frame_source import Window
 from xrds_core.native import library as module
 from xrds_core.native.library import (
     Arrays,
@@ -31,7 +33,7 @@ from xrds_core.native.library import (
     in_threads,
     library,
 )
-from xrds_core.shot import Shot, Window
+from xrds_core.shot import Shot
 
 SUPPORT = Path(__file__).resolve().parents[2] / "support"
 PREAMBLE = f"""
@@ -187,7 +189,7 @@ def test_a_frame_of_one_pixel() -> None:
 
 def test_a_window_of_one_frame() -> None:
     frame = view(3, camera(), World()).frame
-    window = Window(Shot((3,), 0), lambda _: store(frame))
+    window = Window(Shot((3,), 0), Frames(lambda _: store(frame)))
     (only,) = window
     found = accumulate(only.own, list(only.neighbours.values()))
     assert found.frames == (3,)

@@ -19,8 +19,8 @@ from xrds_core.shot import Shot
 from ...planning.plan import DEADLINE, Decision
 from ...planning.request import MOST_SAMPLES, Request
 from ...planning.settings import counted
+from ..methods import Finishing
 from ..sampling import Sampled, can_continue
-from .interface import Finishing
 from .more import More
 
 _FIRST_TRY, _GROWTH = 2, 4  # samples, and how many times those of the try before

@@ -19,8 +19,8 @@ from xrds_core.pace.worth import Ratio
 
 from ...cycles.low_resolution import Region
 from ...cycles.settings import LOOKS_EVERY, first_look
+from ..methods import Finishing
 from ..sampling import Sampled
-from .interface import Finishing
 from .more import Part, measured_regions, nothing, pixels_of, put
 
 Render = Callable[[Part], dict[str, ExtraSamples]]

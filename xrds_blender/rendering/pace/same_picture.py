@@ -33,8 +33,8 @@ from ...planning.plan import SAME_PICTURE, Decision
 from ...planning.request import Request
 from ...planning.settings import Mode
 from ...scene.contents import stands_still
+from ..methods import Finishing
 from ..sampling import Sampled, can_continue, has_neighbours, is_even
-from .interface import Finishing
 from .measuring import Measured, Render, Threshold, learn, measure
 from .more import (
     More,

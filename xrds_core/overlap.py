@@ -1,26 +1,18 @@
-"""Finishing a frame while Cycles' card samples the next one.
+"""Work in a thread of its own, such as finishing a frame while a card samples the next.
 
 On the processor both would share the same cores: nothing is gained there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from types import TracebackType
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-import bpy
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from types import TracebackType
 
 T = TypeVar("T")
-
-
-def samples_on_card(scene: Any) -> bool:
-    """Whether Cycles renders a scene on a graphics card."""
-    if scene.cycles.device != "GPU":
-        return False
-    cycles = bpy.context.preferences.addons.get("cycles")
-    return cycles is not None and bool(cycles.preferences.has_active_device())
 
 
 class Overlap(Generic[T]):
