@@ -9,7 +9,7 @@ from typing import Any
 
 from .denoising import oidn_device
 from .errors import GET_NETWORK, WeightsError, XRDSError
-from .superres.weights_header import DIRECTORY, available, guide_filter_record
+from .superres.weights_header import DIRECTORY, available
 from .version import package_version
 
 COSTS = DIRECTORY / "costs.json"
@@ -77,7 +77,6 @@ def info(
         "denoiser": denoiser_devices(),
         **shipped_costs(),
         "weights": available(weights),
-        "guide_filter": guide_filter_record(weights),
     }
 
 
@@ -110,5 +109,3 @@ def lines(result: dict[str, Any]) -> Iterator[str]:
             f"  {record['file']}  Blender {record['blender_series']}"
             f"  sha256 {record['sha256'][:16]}"
         )
-    record = result["guide_filter"]
-    yield f"guide filter: {record['file']}  sha256 {record['sha256'][:16]}"

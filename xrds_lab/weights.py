@@ -11,7 +11,6 @@ from torch import Tensor, nn
 
 from xrds_core.errors import WeightsError
 from xrds_core.files import replacing
-from xrds_core.superres.guide_filter import GuideFilter
 from xrds_core.superres.network import XRDS
 from xrds_core.superres.weights import FACTORS
 
@@ -25,13 +24,6 @@ def save_network(network: XRDS, path: str | Path, metadata: dict[str, str]) -> N
     """
     record = {**metadata, "config": json.dumps(network.config.to_dict())}
     _write(pack(_halves(network)), path, record)
-
-
-def save_guide_filter(
-    guide_filter: GuideFilter, path: str | Path, metadata: dict[str, str]
-) -> None:
-    """Write a filter and `metadata`, as `save` does a network."""
-    _write(_halves(guide_filter), path, metadata)
 
 
 def _halves(module: nn.Module) -> dict[str, Tensor]:

@@ -94,7 +94,6 @@ def test_lines_show_missing_blender_and_weights() -> None:
         "paper_table": [],
         "presets": {},
         "weights": [],
-        "guide_filter": {"file": "own.safetensors", "sha256": "0123456789abcdef01"},
     }
     text = "\n".join(info.lines(told))
     assert "Blender not found" in text

@@ -14,7 +14,6 @@ from hostile import Trigger
 
 from xrds_core.errors import WeightsError
 from xrds_lab.studio import datasheet
-from xrds_lab.training.guide_filter import Learner
 from xrds_lab.training.run_folder import RunFolder
 from xrds_lab.training.windows import read_arrays
 
@@ -23,38 +22,26 @@ def load_run(folder: Path) -> None:
     RunFolder(folder).load(torch.device("cpu"))
 
 
-def load_filter(folder: Path) -> None:
-    Learner(1, 0, folder / "checkpoint.pt")
-
-
-@pytest.mark.parametrize("load", [load_run, load_filter])
-def test_a_checkpoint_runs_no_code(
-    load: Callable[[Path], None], tmp_path: Path
-) -> None:
+def test_a_checkpoint_runs_no_code(tmp_path: Path) -> None:
     mark = tmp_path / "it ran"
     torch.save({"step": Trigger(mark), "seed": 0}, tmp_path / "checkpoint.pt")
     with pytest.raises(WeightsError, match=r"checkpoint\.pt is damaged"):
-        load(tmp_path)
+        load_run(tmp_path)
     assert not mark.exists()
 
 
 def damage(data: bytes) -> list[bytes]:
-    """A file cut off, empty, of text, with other bytes, and of another content."""
-    return [b"", data[: len(data) // 2], b"text", data.replace(b"seed", b"sead")]
+    """A file that is empty, cut off, or of text."""
+    return [b"", data[: len(data) // 2], b"text"]
 
 
-@pytest.mark.parametrize("load", [load_run, load_filter])
-@pytest.mark.parametrize("kind", range(4))
-def test_a_damaged_checkpoint_is_one_line(
-    load: Callable[[Path], None], kind: int, tmp_path: Path
-) -> None:
+@pytest.mark.parametrize("kind", range(3))
+def test_a_damaged_checkpoint_is_one_line(kind: int, tmp_path: Path) -> None:
     path = tmp_path / "checkpoint.pt"
     torch.save({"step": 3, "seed": 0}, path)
     path.write_bytes(damage(path.read_bytes())[kind])
-    if load is load_run and kind == 3:
-        pytest.skip("what the run lacks is found when it takes the state over")
     with pytest.raises(WeightsError, match=r"checkpoint\.pt is damaged") as error:
-        load(tmp_path)
+        load_run(tmp_path)
     assert "weights_only=False" not in str(error.value)
 
 

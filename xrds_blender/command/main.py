@@ -52,7 +52,6 @@ LABORATORY = (
     "bench",
     "dataset",
     "train",
-    "train-filter",
 )
 
 

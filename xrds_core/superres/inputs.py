@@ -13,7 +13,6 @@ from ..arrays import Array, float_array
 from ..errors import PictureError, UsageError
 from ..holes import clean_alpha, fill_holes
 from .front_end import clean_radiance, pad_guide, to_planes, transfer
-from .guide_filter import FEW_SAMPLES
 from .guide_noise import Quiet
 from .tiling import Tile
 
@@ -35,8 +34,6 @@ class Inputs:
     guide_alpha: Array | None
     """(H, W)"""
     bad_pixels: int
-    has_noisy_guides: bool
-    """Albedo and normal are of few samples."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -50,7 +47,7 @@ class Inputs:
     def with_guides(self, quiet: Quiet) -> Inputs:
         """The same with albedo and normal as `quiet` makes them of these."""
         albedo, normal = quiet(self.albedo, self.normal)
-        return replace(self, albedo=albedo, normal=normal, has_noisy_guides=False)
+        return replace(self, albedo=albedo, normal=normal)
 
     def radiance_tensor(self, tile: Tile, exposure: float) -> Tensor:
         """Return the radiance of a tile in the transfer domain, (1, 3, h, w)."""
@@ -137,7 +134,6 @@ def check(
         cleaned["normal"][0],
         None if cover is None else cover[..., 0],
         bad_pixels,
-        guide_samples is not None and guide_samples < FEW_SAMPLES,
     )
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor
 
 from ..arrays import Array
 from ..errors import OutOfMemory, WeightsError
@@ -30,11 +29,10 @@ from .front_end import (
     inverse_transfer,
     to_picture,
 )
-from .guide_filter import filter_guides
 from .idle import Area, busy_area, write_base
 from .inputs import Inputs, check
 from .network import XRDS
-from .weights import choose_network, load_guide_filter
+from .weights import choose_network
 
 DEFAULT_MEMORY = 4 << 30
 """Bytes that an upscale takes on the CPU at most where no limit is given."""
@@ -75,8 +73,7 @@ class Upscaler:
         device: `auto`, `cpu`, `metal`, or what torch knows: `cuda`, `cuda:1`.
         precision: `auto`, `fp32` or `bf16`; only the layers of the network
             ever run in bf16.
-        weights: a folder of presets, a file, or a network, in place of the shipped;
-            a filter of guides in the folder, too, takes the place of the shipped.
+        weights: a folder of presets, a file, or a network, in place of the shipped.
 
     Raises:
         WeightsError: the weights are missing, damaged or of another scale.
@@ -94,8 +91,6 @@ class Upscaler:
         self.preset, self.device = preset, choose_device(device)
         self.precision = choose_precision(precision, self.device)
         self.network = choose_network(preset, scale, weights).to(self.device)
-        folder = None if isinstance(weights, XRDS) else weights
-        self.guide_filter = load_guide_filter(folder).to(self.device)
 
     @property
     def scale(self) -> int:
@@ -138,7 +133,7 @@ class Upscaler:
             guide_alpha: (H, W), the alpha of the guides' render; in place of the
                 picture's own, too, where `radiance` has none.
             guide_samples: per pixel of albedo and normal; the noise of few of them
-                is filtered first. None where they are many, or not known.
+                is denoised first. None where they are many, or not known.
             exposure: of a picture this is a part of; None finds it in `radiance`.
             memory_limit: bytes to aim at, beside the arrays given and returned. The
                 smallest tiles are taken where it is too small even for them.
@@ -278,7 +273,7 @@ class Upscaler:
         bf16 = self.precision == torch.bfloat16
         try:
             with torch.inference_mode():
-                guides = self._guides(inputs, tile)
+                guides = inputs.guide_tensor(tile).to(self.device)
                 noisy = inputs.noisy_tensor(tile, exposure)
                 with torch.autocast(self.device.type, torch.bfloat16, enabled=bf16):
                     t = self.network(
@@ -302,13 +297,6 @@ class Upscaler:
                 "device"
             ) from error
         return to_picture(result)
-
-    def _guides(self, inputs: Inputs, tile: tiling.Tile) -> Tensor:
-        """Return the guides of a tile, without the noise of few samples."""
-        guides = inputs.guide_tensor(tile).to(self.device)
-        if not inputs.has_noisy_guides:
-            return guides
-        return filter_guides(self.guide_filter, guides)
 
 
 def _size(area: Area) -> tuple[int, ...]:

@@ -4,8 +4,7 @@ A file holds the tensors of one `XRDS` and, in its metadata, the network's confi
 as JSON under `config` beside whatever else was recorded (preset, blender_series,
 training set, licence), all strings. What has several axes is in whole numbers of 8 bits
 with one factor per output channel, float32, under NAME.factors; all else is in half
-precision. The filter of guides of few samples has a file of its own, in half precision,
-for it serves every network.
+precision.
 """
 
 from __future__ import annotations
@@ -19,9 +18,8 @@ from safetensors import SafetensorError, safe_open
 from torch import Tensor
 
 from ..errors import WeightsError
-from .guide_filter import GuideFilter
 from .network import XRDS, NetworkConfig
-from .weights_header import DIRECTORY, GUIDES, guide_filter_file, network_files
+from .weights_header import DIRECTORY, GUIDES, network_files
 
 FACTORS = ".factors"
 _LARGEST_SETTING = 4096  # far above any real width or count; bounds hostile files
@@ -61,20 +59,6 @@ def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:
     network = XRDS(config)
     network.load_state_dict({name: x.float() for name, x in tensors.items()})
     return network.eval().requires_grad_(False), metadata
-
-
-def load_guide_filter(directory: str | Path | None = None) -> GuideFilter:
-    """Return the filter in `directory`, or the shipped one if it has none.
-
-    Raises WeightsError if the file is missing or damaged.
-    """
-    path = guide_filter_file(directory)
-    tensors, _ = _read(path)
-    guide_filter = GuideFilter()
-    shapes = {k: v.shape for k, v in guide_filter.state_dict().items()}
-    _compare(path, shapes, tensors)
-    guide_filter.load_state_dict({name: x.float() for name, x in tensors.items()})
-    return guide_filter.eval().requires_grad_(False)
 
 
 def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:

@@ -19,7 +19,6 @@ from ..errors import WeightsError
 PRESETS = ("fast", "balanced", "paper")
 """The names of networks, the quickest first."""
 DIRECTORY = Path(__file__).with_name("weights")
-GUIDE_FILTER = DIRECTORY / "guide_filter.safetensors"
 GUIDES = "fast"
 """What a configuration calls albedo and normal: the only guides there are."""
 _LARGEST_HEADER = 1 << 20  # far above any real one; bounds hostile files
@@ -49,18 +48,6 @@ def network_files(folder: Path) -> list[Path]:
     """The files in a folder that are named as a preset's."""
     paths = sorted(folder.glob("*_x*.safetensors"))
     return [path for path in paths if path.name.split("_x")[0] in PRESETS]
-
-
-def guide_filter_record(directory: str | Path | None = None) -> dict[str, str]:
-    """Return {file, sha256} of the filter that `directory`'s networks go with."""
-    path = guide_filter_file(directory)
-    return {"file": path.name, "sha256": _digest(path)}
-
-
-def guide_filter_file(directory: str | Path | None) -> Path:
-    """Return the file of `directory`'s filter, or of the shipped one without."""
-    own = None if directory is None else Path(directory) / GUIDE_FILTER.name
-    return own if own is not None and own.is_file() else GUIDE_FILTER
 
 
 def _record(path: Path) -> dict[str, Any]:

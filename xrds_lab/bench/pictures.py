@@ -52,7 +52,6 @@ class Networks:
             Network(record["preset"], record["scale"]): record
             for record in files.available(weights)
         }
-        self.filter_digest = files.guide_filter_record(weights)["sha256"][:12]
 
     def digest(self, network: Network) -> str:
         """The first digits of the weights file's checksum."""
@@ -211,8 +210,6 @@ class Pictures:
         if config.method != "xrds":
             return key
         key += f"-{self.networks.digest(config.network)}"
-        if config.has_noisy_guides:
-            key += f"-{self.networks.filter_digest}"
         if config.denoises_guides:
             key += "-denoised-guides"
         return key

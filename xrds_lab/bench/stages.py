@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
 ROUNDS = 3
 PLAIN_FRAME, XRDS_FRAME = "whole frame, plain", "whole frame, XRDS"
-GUIDE_FILTER = "filter of guides of few samples"
 GUIDE_DENOISER = "denoiser of guides of more"
 CYCLES = ("cycles", "oidn", "oidn_adaptive")
 STAGES = ("sync", "beauty", "denoise", "guides", "network", "other")
@@ -149,8 +148,6 @@ class StageTimes:
             stages["guides"] = self._line(guide[0], key)
         if not plain:
             stages["network"] = self.median(in_process_name(config), key)
-        if config.has_noisy_guides:
-            stages["network"] += self.median(GUIDE_FILTER, key)
         if config.denoises_guides:  # they are kept as they are then
             stages["guides"] += self.median(GUIDE_DENOISER, key)
         return stages

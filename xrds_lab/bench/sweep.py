@@ -85,15 +85,8 @@ class Config:
         return Network(self.preset, self.scale)
 
     @property
-    def has_noisy_guides(self) -> bool:
-        """Whether the noise of its guides is filtered before the network sees them."""
-        from xrds_core.superres.guide_filter import FEW_SAMPLES
-
-        return self.method == "xrds" and 0 < self.guide_samples < FEW_SAMPLES
-
-    @property
     def denoises_guides(self) -> bool:
-        """Whether OIDN takes the noise of its guides out instead."""
+        """Whether OIDN takes the noise of its guides out."""
         from xrds_core.superres.guide_noise import is_noisy
 
         return self.method == "xrds" and is_noisy(self.guide_samples)

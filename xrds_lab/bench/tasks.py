@@ -18,7 +18,6 @@ from .rivals import ENLARGEMENTS
 from .stages import (
     CYCLES,
     GUIDE_DENOISER,
-    GUIDE_FILTER,
     PLAIN_FRAME,
     XRDS_FRAME,
     clocked,
@@ -63,7 +62,6 @@ def tasks(shot: Shot, configs: Iterable[Config], networks: Networks) -> dict[str
             timed[name] = _baseline(ENLARGEMENTS[config.method], window, config.scale)
     timed[PLAIN_FRAME] = lambda: frame(shot, plain_job())[1]
     if used:
-        timed[GUIDE_FILTER] = _guide_filter(networks, used[0], window)
         timed[GUIDE_DENOISER] = _guide_denoiser(networks, used[0], window)
         job = _quick_job(networks, used[0])
         timed[XRDS_FRAME] = lambda: frame(shot, job)[1]
@@ -150,35 +148,13 @@ def _our_denoiser(mode: Denoising, noisy: Callable[[], Arrays]) -> Task:
     return task
 
 
-def _guide_filter(networks: Networks, network: Network, window: Window) -> Task:
-    """Time the filter of a whole frame's guides; all networks share it."""
-    import torch
-
-    from xrds_core.superres.guide_filter import filter_guides
-
-    def task() -> Run:
-        upscaler, (_, full) = networks[network], noise(window, network.scale)
-        guides = torch.from_numpy(np.concatenate((full, full), axis=-1))
-        guides = guides.permute(2, 0, 1)[None].contiguous().to(upscaler.device)
-
-        def run() -> None:
-            with torch.inference_mode():
-                filter_guides(upscaler.guide_filter, guides)
-
-        run()
-        return clocked(run)
-
-    return task
-
-
 def _guide_denoiser(networks: Networks, network: Network, window: Window) -> Task:
     """Time the denoising of a whole frame's guides; all networks share it."""
-    from xrds_core.superres.guide_filter import FEW_SAMPLES
     from xrds_core.superres.guide_noise import remover
 
     def task() -> Run:
         upscaler, (_, full) = networks[network], noise(window, network.scale)
-        quiet = remover(FEW_SAMPLES, upscaler.device.type)
+        quiet = remover(1, upscaler.device.type)
         if quiet is None:
             raise LookupError("Open Image Denoise is missing: install mitsuba-oidn")
         quiet(full, 1 - full)  # the same guides again would be kept

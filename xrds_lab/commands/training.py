@@ -45,13 +45,6 @@ def _train_lines(result: dict[str, Any]) -> list[str]:
     ]
 
 
-def _train_filter(options: argparse.Namespace) -> dict[str, Any]:
-    from ..training.guide_filter import train_guide_filter
-
-    steps, seed = options.steps, options.seed
-    return train_guide_filter(options.data, options.out, steps=steps, seed=seed)
-
-
 def add_dataset(commands: Any) -> argparse.ArgumentParser:
     """Add `xrds dataset`."""
     command = commands.add_parser("dataset", help="render a training set")
@@ -75,21 +68,6 @@ def add_train(commands: Any) -> argparse.ArgumentParser:
     )
     _add_changes(command)
     command.set_defaults(work=_train, lines=_train_lines)
-    return command
-
-
-def add_train_filter(commands: Any) -> argparse.ArgumentParser:
-    """Add `xrds train-filter`."""
-    command = commands.add_parser(
-        "train-filter", help="train what filters guides of few samples"
-    )
-    add = command.add_argument
-    add("data", type=Path, nargs="+", metavar="DATASET", help="folders of `dataset`")
-    add("-o", "--out", type=Path, required=True, metavar="guide_filter.safetensors")
-    add("--steps", type=arguments.positive, default=10_000)
-    add("--seed", type=arguments.whole, default=0)
-    lines = lines_of("xrds_lab.training.guide_filter")
-    command.set_defaults(work=_train_filter, lines=lines)
     return command
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import Cancelled, UsageError
+from xrds_core.exr import read_beauty, write_picture
 from xrds_core.superres import guide_noise
-from xrds_core.superres.guide_filter import FEW_SAMPLES
+from xrds_core.superres.exr_upscale import upscale_file
 from xrds_core.superres.guide_noise import NOISY_SAMPLES, remover
 from xrds_core.superres.upscaler import Upscaler
 
@@ -60,20 +63,50 @@ def test_clean_guides_are_returned_as_given() -> None:
     assert found[1] is even
 
 
-@pytest.mark.parametrize("samples", [None, FEW_SAMPLES - 1, NOISY_SAMPLES, 4096])
-def test_fewer_and_more_samples_are_left_alone(samples: int | None) -> None:
+@pytest.mark.parametrize("samples", [None, NOISY_SAMPLES, 4096])
+def test_more_samples_are_left_alone(samples: int | None) -> None:
     assert remover(samples, "cpu") is None
 
 
 def test_a_picture_is_made_of_the_denoised_guides(upscaler: Upscaler) -> None:
     low = np.random.default_rng(0).random((SIDE // 2, SIDE // 2, 3), np.float32)
     noisy = guides(0.1)
-    quiet = remover(FEW_SAMPLES, "cpu")
+    quiet = remover(1, "cpu")
     assert quiet is not None
     found = upscaler(low, *noisy, guide_samples=NOISY_SAMPLES - 1).radiance
     expected = upscaler(low, *quiet(*noisy)).radiance
     np.testing.assert_array_equal(found, expected)
     assert np.abs(found - upscaler(low, *noisy).radiance).max() > 1e-3
+
+
+def test_guides_of_no_samples_are_refused(upscaler: Upscaler) -> None:
+    low = np.ones((SIDE // 2, SIDE // 2, 3), np.float32)
+    with pytest.raises(UsageError, match="guide_samples is 0"):
+        upscaler(low, *guides(0.1), guide_samples=0)
+
+
+def test_files_tell_no_samples(tmp_path: Path) -> None:
+    """So the command is told of them; without, guides are taken as they are."""
+    low = np.random.default_rng(0).random((SIDE // 2, SIDE // 2, 3), np.float32)
+    albedo, normal = guides(0.1)
+    write_picture(tmp_path / "low.exr", planes("Combined", low, "RGB"))
+    written = planes("Denoising Albedo", albedo, "RGB")
+    written |= planes("Denoising Normal", normal, "XYZ")
+    write_picture(tmp_path / "guides.exr", written)
+    pictures = {}
+    for samples in (None, 1, NOISY_SAMPLES):
+        out = tmp_path / f"{samples}.exr"
+        upscale_file(
+            tmp_path / "low.exr", tmp_path / "guides.exr", out, guide_samples=samples
+        )
+        pictures[samples] = read_beauty(out).radiance
+    np.testing.assert_array_equal(pictures[None], pictures[NOISY_SAMPLES])
+    assert np.abs(pictures[1] - pictures[None]).max() > 1e-3
+
+
+def planes(name: str, picture: np.ndarray, channels: str) -> dict[str, np.ndarray]:
+    """As Blender names a pass."""
+    return {f"ViewLayer.{name}.{c}": picture[..., i] for i, c in enumerate(channels)}
 
 
 def test_it_can_be_cancelled(upscaler: Upscaler) -> None:
@@ -103,7 +136,7 @@ def nothing_kept(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_same_guides_are_denoised_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    noisy, quiet = guides(0.1), remover(FEW_SAMPLES, "cpu")
+    noisy, quiet = guides(0.1), remover(1, "cpu")
     assert quiet is not None
     first = quiet(*noisy)
     monkeypatch.setattr(Denoiser, "guides", lambda *_, **__: pytest.fail("again"))
@@ -116,7 +149,7 @@ def test_the_same_guides_are_denoised_once(monkeypatch: pytest.MonkeyPatch) -> N
 
 def test_large_guides_are_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(guide_noise, "CACHE_BYTES", 1)
-    noisy, quiet = guides(0.1), remover(FEW_SAMPLES, "cpu")
+    noisy, quiet = guides(0.1), remover(1, "cpu")
     assert quiet is not None
     quiet(*noisy)
     monkeypatch.setattr(Denoiser, "guides", lambda *_, **__: pytest.fail("again"))
