@@ -111,13 +111,7 @@ def _add_mode(command: argparse.ArgumentParser) -> None:
         "--time-budget",
         type=arguments.factor,
         metavar="SECONDS",
-        help="time for a frame; XRDS chooses the best settings that stay within it",
-    )
-    size.add_argument(
-        "--quality",
-        type=arguments.factor,
-        metavar="DB",
-        help="expected PSNR; XRDS chooses the fastest settings that reach it",
+        help="time for a frame: as many samples as fit, on the mean of a shot",
     )
 
 
@@ -308,7 +302,6 @@ def _not_full_size(options: argparse.Namespace) -> dict[str, Any]:
         "--scale above 1": options.scale > 1,
         "--plain": options.plain,
         "--time-budget": options.time_budget,
-        "--quality": options.quality,
     }
 
 

@@ -19,7 +19,7 @@ from ..cycles.settings import subset_of_file
 from ..cycles.view import picture_size
 from ..planning.request import Request
 from ..planning.settings import Mode
-from ..rendering.loading import is_ready, load_denoiser, load_upscaler
+from ..rendering.loading import load_denoiser, load_upscaler
 from ..rendering.picture import NetworkFailed, Picture, metadata_of, record_of
 from ..rendering.render import render_scene
 from ..rendering.sample_cache import SampleCache, cache_of
@@ -144,9 +144,7 @@ def _check_parts(request: Request) -> None:
     settings, machine = request.settings, request.machine
     if request.guide_cache is not None:
         check_folder(Path(request.guide_cache))
-    if request.goal is not None:
-        is_ready()  # PyTorch is loaded before the budget begins
-    elif settings.is_enlarged:
+    if settings.is_enlarged:
         load_upscaler(settings.network, machine)
     elif not settings.is_cycles_only:
         load_denoiser(settings.quality, machine)
@@ -177,10 +175,9 @@ def _pictures(
 
 def _check_cache(request: Request) -> None:
     """Raise UsageError for a request that has no samples to cache."""
-    if request.goal is not None or request.settings.mode is not Mode.FULL_SIZE:
+    if request.time_budget is not None or request.settings.mode is not Mode.FULL_SIZE:
         raise UsageError(
-            "--sample-cache needs --scale 1, without --plain, --time-budget and "
-            "--quality"
+            "--sample-cache needs --scale 1, without --plain and --time-budget"
         )
     if not request.settings.temporal_radius:
         raise UsageError("--sample-cache needs a --temporal-radius of 1 or more")

@@ -10,7 +10,7 @@ from xrds_core.frames import RADIUS
 
 from ..planning.request import Request, render_request
 from ..planning.settings import Mode
-from ..rendering import choose
+from ..rendering import modes
 from ..scene.contents import passes_looked_at
 from .machine import machine
 from .translations import CONTEXT
@@ -241,8 +241,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Time Budget",
         translation_context=CONTEXT,
         description="Give each frame a number of seconds: XRDS tries the scene out "
-        "and takes the mode, the samples and the denoiser that give the best picture "
-        "in that time",
+        "and takes as many samples as fit",
     )
     time_budget: FloatProperty(
         name="Time Budget",
@@ -257,7 +256,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
 
     @property
     def is_timed(self) -> bool:
-        """Whether a time budget chooses mode and samples."""
+        """Whether a time budget chooses the samples."""
         budget = self.use_time_budget and self.animation != DEADLINE
         return self.mode == Mode.AUTOMATIC and budget
 
@@ -285,4 +284,4 @@ def request_of(settings: XRDSSettings) -> Request:
         deadline=settings.deadline if settings.animation == DEADLINE else None,
         passes=passes,
     )
-    return choose.in_mode(wanted, Mode(settings.mode))
+    return modes.in_mode(wanted, Mode(settings.mode))

@@ -1,4 +1,4 @@
-"""Seconds requested -> what to render: the least error expected in them.
+"""What fits into the seconds of a still: the least error expected in them.
 
 Seconds come from a cost model of the scene at hand (what the probes found), errors
 from a table that `xrds bench` measured on other scenes. Pure functions: neither
@@ -10,15 +10,14 @@ from __future__ import annotations
 import json
 import math
 from bisect import bisect_right
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from .plan import Decision
-from .request import Goal
-from .settings import Denoising, Mode, Network, Settings
+from .settings import Denoising, Mode, Network, Settings, counted
 
 MODEL = Path(__file__).with_name("budget.json")
 # Predictions scatter; a frame that is late is worse than one that is early.
@@ -41,9 +40,9 @@ ACCUMULATION = 0.25
 class Costs:
     """Seconds of one frame's parts, all for the whole frame at its full size.
 
-    `fixed`: scene sync, BVH, reading and writing, whatever is rendered, and `probes`,
-    what has gone into finding all this out; `beauty` and `guide`: one sample; `denoise`
-    by denoiser; `network` by network; `pictures`: how many are denoised at full size.
+    `fixed`: scene sync, BVH, reading and writing, whatever is rendered; `beauty` and
+    `guide`: one sample; `denoise` by denoiser; `network` by network; `pictures`: how
+    many are denoised at full size.
     """
 
     fixed: float
@@ -51,20 +50,17 @@ class Costs:
     guide: float
     denoise: Mapping[Denoising, float]
     network: Mapping[Network, float]
-    probes: float = 0.0
     pictures: int = 1
 
     def in_shot(self, radius: int) -> Costs:
         """Those of a frame that reuses samples of `radius` frames before and after.
 
-        The probes are the first frame's alone. At full size the frame is denoised by
-        itself as well.
+        At full size the frame is denoised by itself as well.
         """
         reusing = 2 * radius * ACCUMULATION * min(self.denoise.values())
         return replace(
             self,
-            fixed=self.fixed - self.probes + reusing,
-            probes=0.0,
+            fixed=self.fixed + reusing,
             pictures=2 if radius else 1,
         )
 
@@ -138,25 +134,19 @@ class ErrorModel:
         assert settings.samples is not None
         return self.curves[settings.family].at(settings.samples)
 
-    def limited(self, denoising: Collection[Denoising]) -> ErrorModel:
-        """Without those at full size whose denoising is not among these."""
-        left = {
-            family: curve
-            for family, curve in self.curves.items()
-            if family.is_enlarged or family.denoising in denoising
-        }
-        return ErrorModel(left)
-
     def in_shot(self, radius: int) -> ErrorModel:
         """Of frames that `radius` frames before and after give their samples."""
         worth = 1 + 2 * radius * REUSED
         return ErrorModel({s: replace(c, worth=worth) for s, c in self.curves.items()})
 
-    def families(self, networks: Sequence[Network]) -> Iterator[tuple[Settings, Curve]]:
-        """Everything but the sample counts, of what these networks can render."""
-        for family, curve in self.curves.items():
-            if not family.is_enlarged or family.network in networks:
-                yield family, curve
+    @property
+    def full_size(self) -> dict[Denoising, Curve]:
+        """Curves over the samples of full size, by our denoiser."""
+        return {
+            family.denoising: curve
+            for family, curve in self.curves.items()
+            if family.mode is Mode.FULL_SIZE and family.denoising is not None
+        }
 
 
 @dataclass(frozen=True)
@@ -219,150 +209,74 @@ class Model:
 
 @dataclass(frozen=True)
 class Selection:
-    """Settings with what is expected of them, and the best of the other kind."""
+    """Samples and our denoiser for a still, and what is expected of them."""
 
-    settings: Settings
+    samples: int
+    denoising: Denoising
     seconds: float
     psnr: float
-    rival: Selection | None = None
     fits: bool = True
 
-    def decision(self, goal: Goal) -> Decision:
-        """What was chosen and why, for the plan."""
-        in_seconds = goal.seconds is not None
-        name, unit = ("time budget", "s") if in_seconds else ("quality", "dB")
-        wanted = f"{goal.seconds if in_seconds else goal.decibels:g} {unit}"
+    def decision(self, budget: float) -> Decision:
+        """What was chosen for a budget in seconds and why, for the plan."""
         reason = f"{self.psnr:.1f} dB expected in {self.seconds:.1f} s"
-        if not self.fits and in_seconds:
-            reason = f"{wanted} is too short for this scene; the nearest: {reason}"
-        elif not self.fits:
-            reason = f"{wanted} is beyond what was measured; the best: {reason}"
-        elif self.rival is None:
-            reason += f", the only method for {wanted}"
-        else:
-            other = self.rival
-            reason += (
-                f"; best {other.settings.kind} for {wanted}: "
-                f"{other.settings.label}: {other.psnr:.1f} dB in {other.seconds:.1f} s"
-            )
-        return Decision(name, self.settings.label, reason)
+        if not self.fits:
+            reason = f"{budget:g} s is too short for this scene; the nearest: {reason}"
+        value = f"{counted(self.samples, 'sample')}, {self.denoising.quality}"
+        return Decision("time budget", value, reason)
 
 
-def choose(
-    budget: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
-) -> Selection:
+def choose(budget: float, costs: Costs, errors: ErrorModel) -> Selection:
     """The least error expected within `budget` seconds; where none fits the fastest.
 
-    Where super-resolution alone fits, but full size nearly does, the latter: it is
-    decibels better. Of what is in time more seconds never give more expected error.
+    More seconds never give more expected error.
     """
-    fitting = list(_fitting(budget * AIM, costs, errors, networks))
-    if not fitting:
-        return _fastest(costs, errors, networks)
-    best = max(fitting, key=_merit)
-    if best.settings.is_enlarged:
-        full_size = [p for p in _few(costs, errors, []) if p.seconds <= budget * ALIKE]
-        late = max(full_size, key=_merit, default=best)
-        if late.psnr > best.psnr:
-            return replace(late, fits=False)
-    rivals = [p for p in fitting if p.settings.kind != best.settings.kind]
-    rival = max(rivals, key=_merit, default=None)
-    return Selection(best.settings, best.seconds, best.psnr, rival)
+    fitting = []
+    for denoising, curve in errors.full_size.items():
+        samples = costs.samples(_settings(denoising), budget * AIM)
+        if samples >= curve.samples[0]:
+            fitting.append(_selection(denoising, samples, costs, curve))
+    if fitting:
+        return max(fitting, key=_merit)
+    fewest = [
+        _selection(denoising, curve.samples[0], costs, curve)
+        for denoising, curve in errors.full_size.items()
+    ]
+    least = min(x.seconds for x in fewest)
+    best = max((x for x in fewest if x.seconds <= least * ALIKE), key=_merit)
+    return replace(best, fits=False)
 
 
 def denoiser_in_time(
-    spent: float,
-    budget: float,
-    settings: Settings,
-    costs: Costs,
-    errors: ErrorModel,
+    spent: float, budget: float, foreseen: Selection, costs: Costs, errors: ErrorModel
 ) -> Denoising:
     """Ours with the least error for the samples that are there after `spent` seconds.
 
-    `settings` at full size are what was chosen for the `budget`: samples may have taken
-    more or less time than expected. Where nothing is in time, about the quickest.
+    `foreseen` was chosen for the `budget`: samples may have taken more or less time
+    than expected. Where nothing is in time, about the quickest.
     """
-    assert settings.samples is not None
-    psnr = {
-        family.denoising: curve.at(settings.samples)
-        for family, curve in errors.families([])
-        if family.mode is Mode.FULL_SIZE and family.denoising is not None
-    }
-    assert settings.denoising is not None
-    foreseen = psnr[settings.denoising]
+    psnr = {x: curve.at(foreseen.samples) for x, curve in errors.full_size.items()}
     late = budget * (1 + LATE)
-    ends = {mode: spent + costs.denoise[mode] for mode in psnr}
+    ends = {denoising: spent + costs.denoise[denoising] for denoising in psnr}
     in_time = [
-        mode
-        for mode, end in ends.items()
-        if end <= (budget if psnr[mode] > foreseen else late)
+        denoising
+        for denoising, end in ends.items()
+        if end <= (budget if psnr[denoising] > psnr[foreseen.denoising] else late)
     ]
     quickest = min(ends.values())
-    about = [mode for mode, end in ends.items() if end <= quickest * ALIKE]
-    return max(in_time or about, key=lambda mode: psnr[mode])
+    about = [x for x, end in ends.items() if end <= quickest * ALIKE]
+    return max(in_time or about, key=lambda denoising: psnr[denoising])
 
 
-def reach(
-    psnr: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
+def _settings(denoising: Denoising, samples: int | None = None) -> Settings:
+    return Settings(Mode.FULL_SIZE, samples, denoising)
+
+
+def _selection(
+    denoising: Denoising, samples: int, costs: Costs, curve: Curve
 ) -> Selection:
-    """The fastest choice of at least `psnr` dB; the best there is where none has it."""
-    found = []
-    for family, curve in errors.families(networks):
-        samples = _least_samples(curve, psnr)
-        found.append(_selection(family, samples, costs, curve))
-    enough = [each for each in found if each.psnr >= psnr]
-    if not enough:
-        best = max(found, key=_merit)
-        return Selection(best.settings, best.seconds, best.psnr, None, fits=False)
-    best = min(enough, key=lambda p: p.seconds)
-    rivals = [p for p in enough if p.settings.kind != best.settings.kind]
-    rival = min(rivals, key=lambda p: p.seconds, default=None)
-    return Selection(best.settings, best.seconds, best.psnr, rival)
-
-
-def _fitting(
-    seconds: float, costs: Costs, errors: ErrorModel, networks: Sequence[Network]
-) -> Iterator[Selection]:
-    for family, curve in errors.families(networks):
-        samples = costs.samples(family, seconds)
-        if samples >= curve.samples[0]:
-            yield _selection(family, samples, costs, curve)
-
-
-def _fastest(
-    costs: Costs, errors: ErrorModel, networks: Sequence[Network]
-) -> Selection:
-    found = _few(costs, errors, networks)
-    least = min(p.seconds for p in found)
-    best = max((each for each in found if each.seconds <= least * ALIKE), key=_merit)
-    return Selection(best.settings, best.seconds, best.psnr, None, fits=False)
-
-
-def _few(
-    costs: Costs, errors: ErrorModel, networks: Sequence[Network]
-) -> list[Selection]:
-    """Every family with the fewest samples that were measured."""
-    return [
-        _selection(family, curve.samples[0], costs, curve)
-        for family, curve in errors.families(networks)
-    ]
-
-
-def _least_samples(curve: Curve, psnr: float) -> int:
-    """Smallest count that reaches `psnr`; the largest measured where none does."""
-    low, high = curve.samples[0], curve.samples[-1]
-    while low < high:
-        middle = (low + high) // 2
-        if curve.at(middle) >= psnr:
-            high = middle
-        else:
-            low = middle + 1
-    return low
-
-
-def _selection(family: Settings, samples: int, costs: Costs, curve: Curve) -> Selection:
-    settings = replace(family, samples=samples)
-    return Selection(settings, costs.seconds(settings), curve.at(samples))
+    seconds = costs.seconds(_settings(denoising, samples))
+    return Selection(samples, denoising, seconds, curve.at(samples))
 
 
 def _merit(selected: Selection) -> tuple[float, float]:

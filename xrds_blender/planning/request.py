@@ -28,20 +28,6 @@ _RANGES = {
 
 
 @dataclass(frozen=True)
-class Goal:
-    """What a frame is to have: `seconds` it may take, or `decibels` of PSNR."""
-
-    seconds: float | None = None
-    decibels: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.seconds is not None and self.decibels is not None:
-            raise UsageError("give a time budget or a quality, not both")
-        if self.seconds is not None and not self.seconds > 0:
-            raise UsageError(f"time budget {self.seconds} s must be above 0")
-
-
-@dataclass(frozen=True)
 class Machine:
     """What the network and our denoiser run on.
 
@@ -64,7 +50,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Request:
-    """A render as requested; where there is a goal, settings follow from it.
+    """A render as requested.
 
     `seed` None leaves Cycles' own; `exposure` None is found in the picture; `savings`
     names what the plan may leave out where the scene does not need it. `guide_cache` is
@@ -72,12 +58,12 @@ class Request:
     samples to them until they are `guide_limit`. `finish_stopped` leaves what there is
     in the result when the user stops the render. A shot that is to have the
     `same_picture` as the file's own settings takes fewer samples where it can; one
-    with a `deadline` takes as many as fit into these seconds. `passes` are the parts of
-    the light that are finished as well, as in `Wanted`, and `light_aovs` further ones.
+    with a `deadline` takes as many as fit into these seconds, as a frame with a
+    `time_budget` does. `passes` are the parts of the light that are finished as well,
+    as in `Wanted`, and `light_aovs` further ones.
     """
 
     settings: Settings = field(default_factory=Settings)
-    goal: Goal | None = None
     machine: Machine = field(default_factory=Machine)
     seed: int | None = None
     exposure: float | None = None
@@ -87,6 +73,7 @@ class Request:
     finish_stopped: bool = False
     same_picture: bool = False
     deadline: float | None = None
+    time_budget: float | None = None
     passes: tuple[str, ...] = (NONE,)
     light_aovs: tuple[str, ...] = ()
 
@@ -99,6 +86,8 @@ class Request:
             )
         if self.deadline is not None and not self.deadline > 0:
             raise UsageError(f"deadline {self.deadline} s must be above 0")
+        if self.time_budget is not None and not self.time_budget > 0:
+            raise UsageError(f"time budget {self.time_budget} s must be above 0")
         for record in (self, self.settings, self.machine):
             for name in _RANGES.keys() & vars(record).keys():
                 _check_range(name, getattr(record, name))
@@ -111,6 +100,12 @@ class Request:
     def with_settings(self, **changes: Any) -> Request:
         """The same with other settings."""
         return replace(self, settings=replace(self.settings, **changes))
+
+    def in_shot(self, frames: int) -> Request:
+        """The same for a shot of so many frames: their time budgets are a deadline."""
+        if self.time_budget is None:
+            return self
+        return replace(self, deadline=self.time_budget * frames, time_budget=None)
 
     def plan(self, facts: Facts | None = None) -> Plan:
         """What is decided for it; at full size it rests on no facts."""
@@ -128,17 +123,14 @@ def render_request(
     plain: bool = False,
     denoise: str = "high",
     denoiser: str | None = None,
-    time_budget: float | None = None,
-    quality: float | None = None,
     **others: Any,
 ) -> Request:
     """The request of what scripts and the command call their choices.
 
     `plain` is Cycles alone; `denoise` the quality of our denoiser, one of QUALITIES;
     `denoiser` a mode of Cycles', for `plain` and for the low-resolution picture;
-    `time_budget` in seconds and `quality` in dB are goals; `others` are fields of
-    Settings, Machine and Request by their names. Raises UsageError on what is out of
-    range, TypeError on unknown names.
+    `others` are fields of Settings, Machine and Request by their names. Raises
+    UsageError on what is out of range, TypeError on unknown names.
     """
     if scale not in SCALES:
         raise UsageError(f"scale {scale} is not one of {', '.join(map(str, SCALES))}")
@@ -149,21 +141,18 @@ def render_request(
     if denoiser is not None:
         cycles = _of_cycles(denoiser)
         denoising = denoising if mode is Mode.FULL_SIZE else cycles
-    goal = None
-    if (time_budget, quality) != (None, None):
-        goal = Goal(time_budget, quality)
     settings = Settings(mode, denoising=denoising, **_taken(others, Settings))
     machine = Machine(**_taken(others, Machine))
     unknown = others.keys() - {each.name for each in fields(Request)}
     if unknown:
         raise TypeError(f"a render has no {', '.join(sorted(unknown))}")
-    return Request(settings, goal, machine, **others)
+    return Request(settings, machine, **others)
 
 
 CHOICES = frozenset(
-    {"scale", "plain", "denoise", "denoiser", "time_budget", "quality"}
+    {"scale", "plain", "denoise", "denoiser"}
     | {each.name for kind in (Settings, Machine, Request) for each in fields(kind)}
-) - {"settings", "machine", "goal", "mode", "denoising"}
+) - {"settings", "machine", "mode", "denoising"}
 """The names that `render_request` takes."""
 
 

@@ -75,7 +75,7 @@ class EngineFrames(FrameSource[Sampled]):
         method.begin_shot(
             scene,
             shot,
-            layers=max(1, sum(layer.use for layer in scene.view_layers)),
+            layers=layers_of(scene),
             beside=None if beside is None else beside.pace,
         )
         found.window = Window(shot, found)
@@ -197,6 +197,11 @@ class EngineFrames(FrameSource[Sampled]):
 def _place(scene: Any) -> int:
     """The frame's index among all frames of its step, as `place_of` has it."""
     return int(scene.frame_current // scene.frame_step)
+
+
+def layers_of(scene: Any) -> int:
+    """How many view layers of a scene are rendered."""
+    return max(1, sum(layer.use for layer in scene.view_layers))
 
 
 _ADD_ON = __name__.partition(".")[0]

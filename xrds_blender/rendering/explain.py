@@ -14,10 +14,12 @@ from ..planning.request import Request
 from ..scene.contents import cuts, frame_range
 from ..scene.remarks import remarks
 from .blender_job import call_engine
-from .choose import Chosen, chosen, find_facts, frame_seconds
+from .facts import find_facts
 from .history import scene_settings
+from .modes import frame_seconds
 from .pace.same_picture import can_save
 from .sampling import has_neighbours
+from .time_budget import Timed, in_time
 
 
 def explain(
@@ -26,7 +28,7 @@ def explain(
     """Facts and decisions of the first of some frames, evaluated as for its render.
 
     `frames` None is the scene's current one, and its whole range as a shot. Nothing is
-    rendered but, for a time budget or a quality, the probes that a render would choose
+    rendered but, for a still with a time budget, the tries that a render would choose
     by. Raises SceneError without a camera.
     """
     start = time.perf_counter()
@@ -36,25 +38,25 @@ def explain(
 
     def look(engine: Any, depsgraph: Any) -> dict[str, Any]:
         is_shot = len(shot) > 1 and has_neighbours(scene, request)
-        with chosen(engine, depsgraph, request, start, is_shot) as found:
-            return _described(depsgraph, found, scene, shot)
+        wanted = request.in_shot(len(shot)) if is_shot else request
+        with in_time(engine, depsgraph, wanted, start) as timed:
+            return _described(depsgraph, timed, scene, shot)
 
     return call_engine(scene, look)
 
 
 def _described(
-    depsgraph: Any, choice: Chosen, scene: Any, shot: Sequence[int]
+    depsgraph: Any, timed: Timed, scene: Any, shot: Sequence[int]
 ) -> dict[str, Any]:
-    request, radius = choice.request, choice.request.settings.temporal_radius
+    request, radius = timed.request, timed.request.settings.temporal_radius
     facts = find_facts(depsgraph, request.settings)
-    decisions = request.plan(facts).decisions
+    decisions = (*timed.decisions, *request.plan(facts).decisions)
     if radius and len(shot) > 1:
         decisions += neighbours(facts, radius, cuts(scene, shot))
     if can_save(scene, request, len(shot)):
         decisions += (same_picture(scene.cycles.samples),)
     if request.deadline is not None:
         decisions += (deadline(request.deadline, len(shot)),)
-    decisions = choice.all_decisions(decisions)
     size = picture_size(scene.render)
     pace = request.deadline and request.deadline / len(shot)
     settings = resolved(request.settings, scene_settings(scene))

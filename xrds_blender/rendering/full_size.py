@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,7 @@ from .pace.more import More
 from .pace.same_picture import same_picture
 from .picture import Picture, Temporal, peak_memory
 from .sampling import OnSampled, Sampled, sample_frame
+from .time_budget import Timed
 
 if TYPE_CHECKING:
     from xrds_core.accumulation.frame import Stored
@@ -38,18 +39,18 @@ if TYPE_CHECKING:
 class FullSize(Method):
     """Samples at full size, denoised.
 
-    `on_sampled` takes each frame that is sampled. `denoise_in_time` gives the quality,
-    in place of the request's, once the samples of a still are there.
+    `on_sampled` takes each frame that is sampled. `timed` is what fits into the time
+    budget of a still: its request is this one.
     """
 
     def __init__(
         self,
         request: Request,
         on_sampled: OnSampled | None = None,
-        denoise_in_time: Callable[[], str] | None = None,
+        timed: Timed | None = None,
     ) -> None:
         super().__init__(request)
-        self._on_sampled, self._denoise_in_time = on_sampled, denoise_in_time
+        self._on_sampled, self._timed = on_sampled, timed or Timed(request)
         self._quality = self.settings.quality
         self._denoiser = load_denoiser(self._quality, request.machine)
         self._movement = Movement()
@@ -89,8 +90,8 @@ class FullSize(Method):
         return own if self.pace is None else self.pace.complete(self, own, others, more)
 
     def begin_finishing(self, engine: Any) -> Report:
-        if self._denoise_in_time is not None:
-            self._quality = self._denoise_in_time()
+        if self._timed.denoise_in_time is not None:
+            self._quality = self._timed.denoise_in_time()
             self._denoiser = load_denoiser(self._quality, self.request.machine)
         return super().begin_finishing(engine)
 
@@ -112,7 +113,7 @@ class FullSize(Method):
         assert settings is not None
         samples = own.samples or settings.samples
         settings = replace(settings, share=own.share, samples=samples)
-        plan = (*picture.plan, *own.decisions)
+        plan = (*self._timed.decisions, *picture.plan, *own.decisions)
         return replace(picture, settings=settings, plan=plan)
 
     def accumulate(

@@ -81,15 +81,6 @@ def _load_network(network: Network, device: str, weights: str | None) -> Upscale
     return upscaler_class(preset, scale, device=device, weights=weights)
 
 
-def is_ready() -> bool:
-    """Whether PyTorch can be loaded; it then is."""
-    try:
-        torch_folder.load("superres.weights")
-    except XRDSError:
-        return False
-    return True
-
-
 def capabilities(weights: str | Path | None = None) -> Capabilities:
     """What is installed; nothing of it is loaded. `weights` as in a Machine."""
     return Capabilities(

@@ -185,6 +185,7 @@ class CyclesOnly(Method):
             seconds={},
             plan=self.request.plan().decisions,
             peak_memory=peak_memory(),
+            settings=self.settings,
         )
 
     def begin_finishing(self, engine: Any) -> Report:

@@ -22,23 +22,23 @@ from ..cycles import session
 from ..cycles.session import samples_on_card
 from ..internals.lifetimes import RENDER_JOB
 from ..planning.request import Request, render_request
+from ..scene.contents import frame_range
 from . import history, stages, torch_folder
 from .blender_job import call_engine
-from .choose import Chosen, choose_for_shot, chosen
-from .engine_frames import EngineFrames
+from .engine_frames import EngineFrames, layers_of
 from .full_size import FullSize
 from .methods import CyclesOnly, Method, Report
 from .picture import NetworkFailed, Picture, joined
 from .sampling import OnSampled, Sampled, has_neighbours
 from .super_resolution import SuperResolution
+from .time_budget import Timed, in_time
 
 
 @dataclass(frozen=True)
 class _Animation:
-    """A view layer's frames in one render job; `request` is what `chosen` came from."""
+    """A view layer's frames in one render job, and the request that they are for."""
 
     request: Request
-    chosen: Chosen
     frames: EngineFrames
 
 
@@ -49,16 +49,19 @@ class Animations:
     by_layer: dict[tuple[str, str], _Animation] = field(default_factory=dict)
 
 
-def method_of(chosen: Chosen, on_sampled: OnSampled | None = None) -> Method:
-    """What makes pictures of a job; `on_sampled` as in `FullSize`.
+def method_of(
+    request: Request,
+    on_sampled: OnSampled | None = None,
+    timed: Timed | None = None,
+) -> Method:
+    """What makes pictures of a job; `on_sampled` and `timed` as in `FullSize`.
 
     Raises XRDSError where its parts cannot be loaded.
     """
-    request = chosen.request
     if request.settings.is_cycles_only:
         return CyclesOnly(request)
     if not request.settings.is_enlarged:
-        return FullSize(request, on_sampled, chosen.denoise_in_time)
+        return FullSize(request, on_sampled, timed)
     return SuperResolution(request)
 
 
@@ -111,15 +114,16 @@ def render_alone(
     layer = history.layer_of(depsgraph)
     alone = request.with_settings(temporal_radius=0)
     try:
-        with chosen(engine, depsgraph, alone, start) as found:
-            if found.request.settings.is_enlarged and torch_folder.loaded() is None:
+        with in_time(engine, depsgraph, alone, start) as timed:
+            if alone.settings.is_enlarged and torch_folder.loaded() is None:
                 stages.begin(engine, stages.LOADING, 0)  # which takes some seconds
-            method = method_of(found)  # first: missing weights are to cost no render
+            # first: missing weights are to cost no render
+            method = method_of(timed.request, timed=timed)
             own = method.sample(engine, depsgraph)
             picture = _finish(engine, layer.name, method, own)
     finally:
         stages.end()
-    return _described(found, picture, layer, start)
+    return _remembered(picture, layer, start)
 
 
 def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Picture:
@@ -131,12 +135,12 @@ def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Pictu
         animations = RENDER_JOB.of(Animations).by_layer
         animation = animations.get(key)
         if animation is None or animation.request != request:
-            choice = choose_for_shot(engine, depsgraph, request)
             same = (a for k, a in animations.items() if k[0] == key[0])
             beside = next((a.frames.method for a in same if a.request == request), None)
-            scene, method = depsgraph.scene_eval, method_of(choice)
-            frames = EngineFrames.of(scene, method, beside)
-            animation = animations[key] = _Animation(request, choice, frames)
+            scene, layers = depsgraph.scene_eval, layers_of(depsgraph.scene_eval)
+            timed = request.in_shot(layers * len(frame_range(scene)))
+            frames = EngineFrames.of(scene, method_of(timed), beside)
+            animation = animations[key] = _Animation(request, frames)
         frames = animation.frames
         try:
             found = frames.neighbourhood(engine, depsgraph)
@@ -152,14 +156,11 @@ def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Pictu
         picture = _finish(engine, key[1], frames.method, found.own, others, ahead)
     finally:
         stages.end()
-    return _described(animation.chosen, picture, layer, start)
+    return _remembered(picture, layer, start)
 
 
-def _described(
-    choice: Chosen, picture: Picture, layer: history.Layer, start: float
-) -> Picture:
-    """The picture with what it was rendered by and how long; it is remembered."""
-    picture = choice.described(picture)
+def _remembered(picture: Picture, layer: history.Layer, start: float) -> Picture:
+    """The picture with how long it took, which is remembered."""
     picture.seconds["total"] = time.perf_counter() - start
     assert picture.settings is not None
     history.remember(layer, picture.settings, picture.seconds, _devices(picture))

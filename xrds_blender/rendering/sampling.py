@@ -36,7 +36,7 @@ from ..internals.borrowed import Borrowed
 from ..planning.plan import Decision
 from ..planning.request import Request
 from ..scene.contents import scene_facts, shapes_move, stands_still
-from . import loading, stages
+from . import stages
 from .stopping import finish_samples
 
 # Frames of one seed would have the same noise, and gain nothing from each other.
@@ -188,12 +188,9 @@ def subset_at(place: int, radius: int) -> int:
 def has_neighbours(scene: Any, request: Request) -> bool:
     """Whether frames of a shot are to use, and can use, each other's samples.
 
-    Not under most panoramic cameras. What a time budget will choose can where it may
-    choose our denoiser.
+    Not under most panoramic cameras.
     """
     if request.settings.is_cycles_only or not request.settings.temporal_radius:
-        return False
-    if request.goal is not None and not loading.has_library():
         return False
     return scene.camera is not None and can_track(scene)
 

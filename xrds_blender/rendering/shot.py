@@ -23,7 +23,6 @@ from ..planning.request import Request
 from ..scene.contents import cuts
 from . import stages
 from .blender_job import call_engine
-from .choose import Chosen, choose_for_shot
 from .methods import Method, completed
 from .pace.more import Part, render_more
 from .picture import Picture, joined
@@ -45,14 +44,11 @@ def render_shot(
     needed. A `cache` stores the samples of every frame rendered; what it has already is
     not rendered again, and may lie beyond the ends of these frames. Where Cycles has a
     card, a frame is finished while the next one is sampled. Yields numbers and
-    pictures; the scene stays at the last frame rendered.
-    What the request leaves open is chosen at the first frame to render. Raises what
-    `render` raises.
+    pictures; the scene stays at the last frame rendered. Raises what `render` raises.
     """
     todo = tuple(number for number in frames if not is_done(number))
-    chosen = _chosen(scene, request, todo)
-    request = chosen.request
-    method = method_of(chosen, None if cache is None else cache.write)
+    request = request.in_shot(len(todo))
+    method = method_of(request, None if cache is None else cache.write)
     radius = request.settings.temporal_radius
     cached = cache.beside(frames, radius) if cache else []
     there = tuple(sorted({*frames, *cached}))
@@ -62,7 +58,7 @@ def render_shot(
     source = _SceneFrames(scene, method, frames, shot, is_done, cache)
     # more samples of a frame are rendered, and judged, before it is finished
     beside = method.pace is None and samples_on_card(scene)
-    finish = partial(_finished, method, chosen)
+    finish = partial(_finished, method)
     yield from finish_frames(shot, source, finish, beside=beside)
 
 
@@ -106,23 +102,12 @@ class _SceneFrames(FrameSource[Sampled]):
         return call_engine(self.scene, work)
 
 
-def _finished(
-    method: Method, chosen: Chosen, frame: Neighbourhood[Sampled]
-) -> tuple[int, Picture]:
+def _finished(method: Method, frame: Neighbourhood[Sampled]) -> tuple[int, Picture]:
     own, others = frame.own, list(frame.neighbours.values())
     pictures = {view: method.finish(own, others, view) for view in own.views}
     picture = joined(pictures, own.seconds)
     picture.seconds["total"] = sum(picture.seconds.values())
-    return own.number, chosen.described(picture)
-
-
-def _chosen(scene: Any, request: Request, todo: Sequence[int]) -> Chosen:
-    if request.goal is None or not todo:
-        return Chosen(request)
-    scene.frame_set(todo[0])
-    return call_engine(
-        scene, lambda engine, graph: choose_for_shot(engine, graph, request)
-    )
+    return own.number, picture
 
 
 def cache_samples(
@@ -132,7 +117,7 @@ def cache_samples(
 
     Raises what `render` raises.
     """
-    method = method_of(Chosen(request), cache.write)
+    method = method_of(request, cache.write)
     for number in frames:
         if cache.read(number) is None:
             _sample(scene, method, frames, number)

@@ -32,8 +32,8 @@ from ..planning.request import Machine, Request
 from ..planning.settings import Settings
 from ..scene.contents import shapes_move
 from . import stages
-from .choose import find_facts
 from .enlarging import enlarge, enlarged, enlarged_lights
+from .facts import find_facts
 from .full_size import accumulation, temporal
 from .guide_cache import GuideName
 from .guides import GuideSource
@@ -192,6 +192,7 @@ class SuperResolution(Method):
             plan=inputs.decisions,
             peak_memory=peak_memory(),
             device=self._upscaler.device_name,
+            settings=self.settings,
             temporal=inputs.temporal,
         )
 

@@ -8,10 +8,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.planning import budget
-from xrds_blender.planning.request import render_request
+from xrds_blender.planning.estimates import GUIDE_SHARE
+from xrds_blender.planning.request import Machine, render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Mode
 from xrds_blender.planning.settings import Settings as RenderSettings
-from xrds_blender.rendering.probing import probe, with_guides
+from xrds_blender.rendering.time_budget import measure
 from xrds_core.files import read_json, write_json
 
 from . import tasks, workload
@@ -81,7 +82,7 @@ class SceneBench:
         return [c for c in self.configs if not self.pictures.knows(c)]
 
     def _predicted(self, config: Config) -> float:
-        """Seconds of its frame: as timed, or from the probes where nothing is timed."""
+        """Seconds of its frame: as timed, or from the tries where nothing is timed."""
         try:
             return self.times.cost(config).total
         except KeyError:
@@ -91,21 +92,24 @@ class SceneBench:
 
     @cached_property
     def costs(self) -> budget.Costs:
-        """Costs of the scene's whole frame, from the product's own probes."""
+        """Costs of the scene's whole frame: its tries, and guesses for x2 and more."""
         from xrds_blender import run_job
 
         model = budget.shipped()
         slowest = max(model.network_speed.values())
-        known = list(self.settings.sweep.networks)
-        speeds = {n: model.network_speed.get(n, slowest) for n in known}
-        model = replace(model, network_speed=speeds)
         scene = open_scene(self.shot.path, self.shot.window.whole)
         start = time.perf_counter()
 
-        def probed(passes: Any) -> budget.Costs:
-            return with_guides(probe(passes, model, known, start), passes)
-
-        return run_job(scene, probed)
+        costs: budget.Costs = run_job(
+            scene, lambda passes: measure(passes, model, start, Machine())
+        )
+        unit = costs.denoise[DEFAULT_DENOISING]
+        networks = self.settings.sweep.networks
+        return replace(
+            costs,
+            guide=GUIDE_SHARE * costs.beauty,
+            network={n: unit * model.network_speed.get(n, slowest) for n in networks},
+        )
 
     def estimate(self) -> float:
         """Predicted seconds of the work that is left."""
@@ -164,7 +168,7 @@ class SceneBench:
         """Time, render and compare whatever is missing."""
         if self.settings.timing:
             rounds = self.settings.rounds
-            # All foreseen first: the costs' own probe must not render inside a render.
+            # All foreseen first: the costs' own tries must not render inside a render.
             seconds = {n: self._task_seconds(n) for n in self._stopwatch.left(rounds)}
             self._stopwatch.measure(
                 rounds, lambda n: meter.done(seconds[n], f"{self.name}: {n}")
@@ -229,7 +233,8 @@ class SceneBench:
         )
         picture, run = tasks.frame(self.shot, job)
         assert picture.settings is not None
-        config = selected_config(picture.settings)
+        chosen = picture.settings
+        config = Config("full_size", chosen.samples or 0, chosen.denoising)
         record = {
             "budget": seconds,
             "seconds": picture.seconds | {"total": run["seconds"]},
@@ -311,16 +316,6 @@ class SceneBench:
             for name, runs in self.times.runs.items()
             if name.startswith("XRDS")
         }
-
-
-def selected_config(settings: RenderSettings) -> Config:
-    """The configuration of settings that were selected for a goal."""
-    samples, denoising = settings.samples or 0, settings.denoising
-    if not settings.is_enlarged:
-        method = "oidn" if settings.is_cycles_only else "full_size"
-        return Config(method, samples, denoising)
-    network, guides = settings.network, settings.guide_samples
-    return Config("xrds", samples, denoising, *network, guide_samples=guides)
 
 
 def _named(shot: Shot, samples: int) -> str:

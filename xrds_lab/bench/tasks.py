@@ -94,7 +94,7 @@ def frame(
     scene = open_scene(shot.path, shot.window.whole)
     if adaptive is not None and adaptive.noise_threshold is not None:
         sample_adaptively(scene, adaptive.samples, adaptive.noise_threshold)
-    if job.goal is None and job.settings.is_enlarged:
+    if job.settings.is_enlarged:
         load_upscaler(job.settings.network, job.machine)
     pictures: list[Picture] = []
     job = replace(job, savings=savings_but(GUIDE_CACHE))

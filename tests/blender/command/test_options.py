@@ -62,7 +62,6 @@ VALUES = {
     "--position": "other",
     "--position-space": "camera",
     "--preset": "balanced",
-    "--quality": "30",
     "--read-limit": "3G",
     "--resolution": "64x32",
     "--sample-cache": "folder",

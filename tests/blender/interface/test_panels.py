@@ -35,7 +35,7 @@ from xrds_blender.planning import estimates
 from xrds_blender.planning.estimates import Capabilities
 from xrds_blender.planning.settings import Mode, Network
 from xrds_blender.rendering import history, stages
-from xrds_blender.rendering.choose import estimates as estimates_of
+from xrds_blender.rendering.modes import estimates as estimates_of
 
 
 @pytest.fixture(autouse=True)
@@ -199,11 +199,11 @@ def test_other_networks_are_offered_where_their_weights_are(
     assert "4×" not in told  # no weights
 
 
-def test_a_time_budget_leaves_way_and_samples_open() -> None:
+def test_a_time_budget_leaves_samples_open() -> None:
     settings = bpy.context.scene.xrds
     settings.use_time_budget, settings.time_budget = True, 90.0
     assert drawn(panels.XRDS_PT_settings)[0] == "Automatic (within 90 s)"
-    assert rows(bpy.context.scene)["Expected Settings"] == "known after a first render"
+    assert list(rows(bpy.context.scene)) == ["Picture"]
     settings.mode = "full_size"
     assert "within" not in " ".join(drawn(panels.XRDS_PT_settings)[1:])
 
@@ -224,16 +224,12 @@ def test_the_table_tells_seconds_after_a_render() -> None:
     assert last["Mode"] == "Full Size, 1 sample"
     assert "Total" in last
     assert "Samples and Denoising" not in last
-    settings = scene.xrds
-    settings.mode, settings.use_time_budget = "automatic", True
-    settings.time_budget = 1e5
-    assert rows(scene)["Expected Settings"].endswith("16384 samples")
     bpy.ops.wm.read_factory_settings()
     assert history.last(bpy.context.scene) is None
 
 
 def rows(scene: object) -> dict[str, str]:
-    return dict(summary.next_render(scene, properties.request_of(scene.xrds), ALL))
+    return dict(summary.next_render(scene, properties.request_of(scene.xrds)))
 
 
 @pytest.mark.parametrize(("scale", "low"), [("2", "683x384"), ("8", "171x96")])
@@ -386,7 +382,7 @@ def test_panel_says_what_is_missing() -> None:
     scene.xrds.mode, scene.cycles.use_denoising = "cycles_only", True
     assert remarks_of(noisy)[0] == ("ERROR", messages.CYCLES_CANNOT_DENOISE)
     scene.xrds.mode, scene.xrds.use_time_budget = "automatic", True
-    assert remarks_of(noisy)[0] == ("ERROR", messages.NO_BUDGET)
+    assert remarks_of(noisy)[0] == ("ERROR", estimates.LIBRARY_IS_MISSING)
 
 
 @pytest.mark.parametrize(("version", "warns"), [((4, 5, 3), False), ((5, 2, 2), True)])

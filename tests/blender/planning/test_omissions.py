@@ -16,8 +16,8 @@ from xrds_blender.planning import plan
 from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import Settings
 from xrds_blender.rendering.blender_job import call_engine
-from xrds_blender.rendering.choose import find_facts
 from xrds_blender.rendering.explain import explain
+from xrds_blender.rendering.facts import find_facts
 from xrds_lab.studio import traps
 
 pytestmark = pytest.mark.nightly  # it takes minutes

@@ -29,7 +29,7 @@ from xrds_blender.planning.request import Request, render_request
 from xrds_blender.rendering import guide_cache
 from xrds_blender.rendering import guides as frame_guides
 from xrds_blender.rendering.blender_job import call_engine, run_job
-from xrds_blender.rendering.choose import find_facts
+from xrds_blender.rendering.facts import find_facts
 from xrds_blender.rendering.guide_cache import TOLERANCE
 from xrds_blender.rendering.guides import GuideSource
 from xrds_lab.studio import traps

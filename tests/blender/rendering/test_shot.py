@@ -22,7 +22,6 @@ from xrds_blender.planning.request import render_request
 from xrds_blender.rendering import full_size, shot
 from xrds_blender.rendering import render as engine_shots
 from xrds_blender.rendering.blender_job import call_engine
-from xrds_blender.rendering.choose import Chosen
 from xrds_blender.rendering.sampling import noisy_frame
 from xrds_core import exr, finish
 from xrds_core.accumulation.accumulate import accumulate
@@ -156,7 +155,7 @@ def test_no_two_frames_have_the_same_noise(blend: Path) -> None:
     job = render_request(scale=1, temporal_radius=1)
     pictures = [p for _, p in shot.render_shot(scene, job, [1, 2])]
     assert pictures[0].temporal.mean_samples == pytest.approx(2.0, abs=0.05)
-    method = engine_shots.method_of(Chosen(job))
+    method = engine_shots.method_of(job)
     first, second = (
         call_engine(scene, method.sample).views[""].picture[:, :3].astype(np.float32)
         for _ in map(scene.frame_set, (1, 2))
@@ -220,7 +219,6 @@ def test_a_cancelled_shot_keeps_the_frames_before(
         ("--scale 2 --frames 1-3", 4),
         ("--plain --frames 1-3", 0),
         ("--time-budget 9 --frames 1-3", 4),
-        ("--quality 30 --frames 1-3", 4),
     ],
 )
 def test_the_radius_by_default(line: str, radius: int) -> None:
@@ -439,7 +437,7 @@ def test_equirectangular_frames_lend_by_direction(blend: Path) -> None:
         scene.camera.rotation_euler.z = 0.05 * frame
         scene.camera.keyframe_insert("rotation_euler", frame=frame)
     job = render_request(scale=1, samples=16, temporal_radius=1)
-    method = engine_shots.method_of(Chosen(job))
+    method = engine_shots.method_of(job)
     here, there = (
         call_engine(scene, method.sample).views[""]
         for _ in map(scene.frame_set, (1, 4))

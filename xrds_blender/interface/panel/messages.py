@@ -17,7 +17,7 @@ from ...planning.estimates import Capabilities, missing
 from ...planning.plan import Facts, SceneFacts
 from ...planning.request import Request
 from ...planning.settings import MODES, Mode, Settings
-from ...rendering.choose import join_facts
+from ...rendering.facts import join_facts
 from ...rendering.loading import weights_headers
 from ...scene.contents import scene_facts
 
@@ -95,7 +95,6 @@ CYCLES_CANNOT_DENOISE = (
     "This Blender has no denoiser, so Cycles may stop with an error: switch off its "
     "Denoise, or choose another mode"
 )
-NO_BUDGET = "A time budget needs a denoiser: install XRDS from its zip"
 OTHER_PASSES = (
     "The network was trained with an earlier Blender: from 5.1 on gloss and clear coat "
     "can look wrong. Full Size is not affected"
@@ -107,13 +106,10 @@ Remark = tuple[str, str]
 
 def remarks(scene: Any, request: Request, here: Capabilities) -> list[Remark]:
     """Icon and sentence: what is missing first, then what is otherwise than usual."""
-    settings, chosen = scene.xrds, request.settings.mode
+    chosen = request.settings.mode
     lacks = {m: missing(replace(request.settings, mode=m), here) for m in MODES}
     found: list[Remark] = []
-    if settings.is_timed:
-        if not here.any_denoiser:
-            found.append(("ERROR", NO_BUDGET))
-    elif lacks[chosen]:
+    if lacks[chosen]:
         found.append(("ERROR", lacks[chosen]))
     else:
         found += [("ERROR", sentence) for sentence in _wrong(scene, chosen, here)]

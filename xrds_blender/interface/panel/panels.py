@@ -15,8 +15,8 @@ from ...planning.estimates import Capabilities, automatic
 from ...planning.request import Request
 from ...planning.settings import Mode
 from ...rendering import history
-from ...rendering.choose import estimates
 from ...rendering.loading import capabilities
+from ...rendering.modes import estimates
 from ...scene.contents import has_light
 from .. import live_picture, operators, presets, translations
 from ..properties import DEADLINE, request_of
@@ -152,7 +152,7 @@ class XRDS_PT_advanced(_RenderPanel, bpy.types.Panel):
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
         settings = context.scene.xrds
-        may_enlarge = Mode(settings.mode).is_enlarged or settings.is_timed
+        may_enlarge = Mode(settings.mode).is_enlarged
         return super().poll(context) and may_enlarge
 
     def draw(self, context: bpy.types.Context) -> None:
@@ -171,8 +171,7 @@ class XRDS_PT_forecast(_RenderPanel, bpy.types.Panel):
 
     def draw(self, context: bpy.types.Context) -> None:
         scene, request = context.scene, request_of(context.scene.xrds)
-        here = capabilities(request.machine.weights)
-        for name, value in summary.next_render(scene, request, here):
+        for name, value in summary.next_render(scene, request):
             _row(self.layout, name, value)
 
 

@@ -18,8 +18,8 @@ from ...planning.plan import Plan
 from ...planning.request import Request
 from ...planning.settings import Mode, Settings
 from ...rendering import history
-from ...rendering.choose import frame_seconds
 from ...rendering.history import LastRender, scene_settings
+from ...rendering.modes import frame_seconds
 from ...rendering.pace.same_picture import can_save
 from ...rendering.sampling import has_neighbours
 from ...scene.contents import frame_range
@@ -74,15 +74,11 @@ def is_shot(scene: Any, request: Request) -> bool:
     return is_animation(scene) and has_neighbours(scene, request)
 
 
-def next_render(scene: Any, request: Request, here: Capabilities) -> list[Row]:
+def next_render(scene: Any, request: Request) -> list[Row]:
     """Name and value of what the render will do, take and leave out; six at most."""
     size = frame_size(scene.render)
-    if request.goal is not None:
-        rows = [
-            ("Picture", _size(*size)),
-            ("Expected Settings", _foreseen(scene, request, here)),
-        ]
-        return rows + _neighbours(scene, request)
+    if request.time_budget is not None:
+        return [("Picture", _size(*size)), *_neighbours(scene, request)]
     if request.settings.is_enlarged:
         return _enlarged(scene, request)
     rows = [("Picture", _sampled(*size, scene.cycles.samples))]
@@ -106,18 +102,6 @@ def _neighbours(scene: Any, request: Request) -> list[Row]:
     taken = _amount(estimates.shot_memory(*size, radius, request.settings.scale))
     shown = translated(text, radius=radius, memory=taken)
     return [("Neighbouring Frames", shown)]
-
-
-def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
-    """What a time budget will about choose."""
-    from ...rendering.choose import foresee
-
-    networks = sorted(here.networks) if here.torch else []
-    shot = is_shot(scene, request)
-    found = foresee(scene, request, networks, shot) if here.any_denoiser else None
-    if found is None:
-        return translated("known after a first render")
-    return _named(found.settings)
 
 
 def _named(settings: Settings) -> str:

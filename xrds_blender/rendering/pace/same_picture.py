@@ -72,7 +72,7 @@ def can_save(scene: Any, request: Request, frames: int) -> bool:
     settings, cycles = request.settings, scene.cycles
     return (
         request.same_picture
-        and request.goal is None
+        and request.time_budget is None
         and settings.mode is Mode.FULL_SIZE
         and settings.samples is None
         and frames >= FEWEST_FRAMES
