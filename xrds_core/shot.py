@@ -1,4 +1,4 @@
-"""Which frames of a shot are neighbours, and what they cost in memory.
+"""Which frames of a shot are neighbours.
 
 A frame reuses samples of those up to `radius` frames before and after it, between two
 shot cuts; at the ends there are fewer.
@@ -15,13 +15,6 @@ from .errors import UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-
-# Per pixel: albedo and normal, in half floats, and inverse depth; then radiance and its
-# noise, a Vector pass and an alpha, in half floats, and the inverse depth of images.
-_BYTES = 2 * 3 * 2 + 4
-_IMAGE_BYTES = 4
-_LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES = 12, 8, 2
 
 
 @dataclass(frozen=True)
@@ -84,21 +77,3 @@ def step_of(frames: Sequence[int]) -> int | None:
     """Return how far frames lie apart, 1 for a single one; None if not evenly."""
     steps = {after - before for before, after in pairwise(sorted(set(frames)))}
     return max(steps, default=1) if len(steps) < 2 else None
-
-
-def bytes_needed(
-    width: int,
-    height: int,
-    frames: int,
-    alpha: bool = False,
-    vector: bool = False,
-    light: bool = True,
-    images: bool = False,
-) -> int:
-    """Return the bytes that `frames` frames of half floats take in a window.
-
-    Guides alone have no `light`.
-    """
-    each = _BYTES + _LIGHT_BYTES * light
-    each += _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha + _IMAGE_BYTES * images
-    return width * height * each * frames

@@ -321,12 +321,12 @@ def test_cycles_denoiser_is_cycles_own(still_life: Callable[..., Any]) -> None:
     made, _ = call_engine(scene, lambda *given: sample_layer(*given, samples=2, seed=5))
     noisy = next(iter(made.values()))
     frame = Frame(
-        0,
-        Camera(np.eye(4), np.eye(4), SIZE),
-        noisy.picture[..., :3],
-        noisy.albedo,
-        noisy.normal,
-        np.ones(SIZE[::-1], np.float32),
+        number=0,
+        camera=Camera(np.eye(4), np.eye(4), SIZE),
+        radiance=noisy.radiance,
+        albedo=noisy.albedo,
+        normal=noisy.normal,
+        depth=np.ones(SIZE[::-1], np.float32),
     )
 
     def render(passes: Any) -> dict[str, Any]:
@@ -348,12 +348,12 @@ def frames_of(colours: list[float], shift: int = 0) -> dict[int, Frame]:
         vector = np.zeros((64, 64, 4), np.float32)
         vector[..., [0, 2]] = -shift
         result[number] = Frame(
-            number,
-            Camera(np.eye(4), np.eye(4), (64, 64)),
-            radiance,
-            np.ones((64, 64, 3), np.float32),
-            np.zeros((64, 64, 3), np.float32),
-            np.ones((64, 64), np.float32),
+            number=number,
+            camera=Camera(np.eye(4), np.eye(4), (64, 64)),
+            radiance=radiance,
+            albedo=np.ones((64, 64, 3), np.float32),
+            normal=np.zeros((64, 64, 3), np.float32),
+            depth=np.ones((64, 64), np.float32),
             vector=vector,
         )
     return result

@@ -118,7 +118,7 @@ class Halves:
 def test_frames_come_back_as_they_were_whatever_fields_they_have(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    @dataclass(frozen=True)
+    @dataclass(frozen=True, kw_only=True)
     class More(Frame):
         halves: Halves | None = None
 
@@ -126,7 +126,15 @@ def test_frames_come_back_as_they_were_whatever_fields_they_have(
     # half floats hold these exactly
     light = np.random.default_rng(2).integers(0, 99, (4, 5, 3)).astype(np.float32)
     camera = Camera(np.eye(4), np.eye(4), (5, 4), (1, 2), "eye", Sphere((-1, 1)))
-    made = More(3, camera, light, light, light, light[..., 0] + 0.1, samples=4)
+    made = More(
+        number=3,
+        camera=camera,
+        radiance=light,
+        albedo=light,
+        normal=light,
+        depth=light[..., 0] + 0.1,
+        samples=4,
+    )
     made = replace(made, halves=Halves(light, light[..., 0].astype(np.int32)))
     back = packing.unpack(packing.pack({"left": made, "right": made}))
     assert list(back) == ["left", "right"]
@@ -152,7 +160,17 @@ def grey(number: int, light: float, at: float = 0.0) -> Stored:
     normal[..., 2] = 1.0
     depth = np.full((48, 64), 3.0, np.float32)
     camera = Camera(view, project, (64, 48))
-    return store(Frame(number, camera, plane, plane, normal, depth, samples=4))
+    return store(
+        Frame(
+            number=number,
+            camera=camera,
+            radiance=plane,
+            albedo=plane,
+            normal=normal,
+            depth=depth,
+            samples=4,
+        )
+    )
 
 
 def test_averaged_neighbours_are_judged_by_nothing() -> None:

@@ -221,18 +221,15 @@ def _with_passes(kind: Kind, rng: np.random.Generator, frame: Frame) -> Frame:
 
 def _halves(kind: Kind, rng: np.random.Generator, frame: Frame) -> Halves:
     noise = 0.1 * rng.standard_normal((*frame.shape, 1)).astype(np.float32)
-    passes = [
-        np.stack([x * (1 + noise), x * (1 - noise)])
-        for x in (frame.radiance, frame.albedo, frame.normal)
-        if x is not None
-    ]
+    light = frame.radiance
+    radiance = np.stack([light * (1 + noise), light * (1 - noise)])
     if kind.extreme:
-        where = rng.random(passes[0].shape) < 0.02
-        passes[0][where] = rng.choice(ODD, int(where.sum()))
+        where = rng.random(radiance.shape) < 0.02
+        radiance[where] = rng.choice(ODD, int(where.sum()))
     shares, counts = rng.choice([0.25, 0.5, 1.0]), None
     if kind.counts:
         counts = rng.integers(0, 5, (2, *frame.shape)).astype(np.float32)
-    return Halves(*passes, shares=(float(shares), 1 - float(shares)), counts=counts)
+    return Halves(radiance, (float(shares), 1 - float(shares)), counts)
 
 
 class Specified(specification.Work):

@@ -63,5 +63,12 @@ def frame(
     normal = -point / RADIUS @ eye.view[:3, :3].T @ away.T
     rng = np.random.default_rng(number + 1000)
     noisy = colour * (1 + noise * rng.standard_normal((*shape, 1)))
-    passes = (each.astype(np.float32) for each in (noisy, colour, normal, depth))
-    return Frame(number, eye, *passes, **more)
+    return Frame(
+        number=number,
+        camera=eye,
+        radiance=noisy.astype(np.float32),
+        albedo=colour.astype(np.float32),
+        normal=normal.astype(np.float32),
+        depth=depth.astype(np.float32),
+        **more,
+    )

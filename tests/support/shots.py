@@ -87,12 +87,12 @@ def view(
     rng = np.random.default_rng(number + 1000)
     noisy = colour * (1 + noise * rng.standard_normal((*shape, 1)))
     frame = Frame(
-        number,
-        eye,
-        noisy.astype(np.float32),
-        colour.astype(np.float32),
-        normal.astype(np.float32),
-        depth,
+        number=number,
+        camera=eye,
+        radiance=noisy.astype(np.float32),
+        albedo=colour.astype(np.float32),
+        normal=normal.astype(np.float32),
+        depth=depth,
         **more,  # type: ignore[arg-type]
     )
     return View(frame, point, name, colour.astype(np.float32))

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from xrds_core.accumulation.frame import Halves
+from xrds_core.accumulation.passes import Passes
 from xrds_core.accumulation.sample_subsets import SampleSubset
 from xrds_core.arrays import Array
 from xrds_core.denoising.light_passes import LightPart, passes_by_name
@@ -24,19 +25,19 @@ from . import session
 from .layer_session import LayerSession
 from .low_resolution import Region
 from .passes import CyclesPasses
-from .samples import COUNTS, GEOMETRY, Samples, sample_layer
+from .samples import COUNTS, GEOMETRY, sample_layer
 from .session import StageClock
 from .settings import SAMPLE_COUNT, first_look, is_of_first_sample, set_share
 
-_Passes = dict[tuple[str, str], Array]
+_Named = dict[tuple[str, str], Array]
 _Geometry = Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True)
 class Half:
-    """One view as `Samples`, and the halves that it is the mean of."""
+    """One view, and the light of the halves that it is the mean of."""
 
-    whole: Samples
+    whole: Passes
     halves: Halves
 
 
@@ -84,7 +85,7 @@ def sample_halves(
     return found, seconds_of(clocks)
 
 
-def counted(samples: Samples, part: SampleSubset, clock: StageClock) -> Samples:
+def counted(samples: Passes, part: SampleSubset, clock: StageClock) -> Passes:
     """With the number of each pixel's samples in the place of its share of the most."""
     if samples.counts is None:
         return samples
@@ -95,7 +96,7 @@ def counted(samples: Samples, part: SampleSubset, clock: StageClock) -> Samples:
 
 def sample_motion(
     engine: Any, depsgraph: Any, seed: int
-) -> tuple[dict[str, Samples], dict[str, float]]:
+) -> tuple[dict[str, Passes], dict[str, float]]:
     """Render depth and motion at the middle of the shutter: one sample, no blur.
 
     Cycles gives no vectors with motion blur. Returns as `sample_halves`; the result
@@ -122,48 +123,16 @@ def seconds_of(clocks: Sequence[StageClock]) -> dict[str, float]:
     }
 
 
-def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Half:
-    pictures = np.stack((first.picture, second.picture))
-    counts = None
-    if first.counts is not None and second.counts is not None:
-        counts = np.stack((first.counts, second.counts))
-    halves = Halves(
-        radiance=pictures[..., :3],
-        albedo=np.stack((first.albedo, second.albedo)),
-        normal=np.stack((first.normal, second.normal)),
-        alpha=pictures[..., 3],
-        shares=shares,
-        counts=counts,
-    )
-    share = halves.share()
-    whole = replace(
-        first,
-        picture=_mean(first.picture, second.picture, share[..., None]),
-        albedo=_mean(first.albedo, second.albedo, share[..., None]),
-        normal=_mean(first.normal, second.normal, share[..., None]),
-        counts=None if counts is None else counts.sum(axis=0),
-        path_length=_mean_length(first, second, share),
-        parts=_mean_parts(first, second, share[..., None]),
-    )
-    return Half(whole, halves)
+def _joined(first: Passes, second: Passes, shares: tuple[float, float]) -> Half:
+    halves = Halves.of(first, second, shares)
+    return Half(first.joined(second, halves.share()), halves)
 
 
 def _mean(one: Array, two: Array, share: Array) -> Array:
     return np.asarray(one * share + two * (np.float32(1.0) - share))
 
 
-def _mean_length(first: Samples, second: Samples, share: Array) -> Array | None:
-    one, two = first.path_length, second.path_length
-    if one is None or two is None:
-        return None
-    return _mean(one, two, share)
-
-
-def _mean_parts(first: Samples, second: Samples, share: Array) -> dict[str, Array]:
-    return {k: _mean(x, second.parts[k], share) for k, x in first.parts.items()}
-
-
-def _light(parts: Sequence[LightPart], found: Mapping[str, Half]) -> _Passes:
+def _light(parts: Sequence[LightPart], found: Mapping[str, Half]) -> _Named:
     """The passes of light: those that are divided by a colour have no plain means."""
     return {
         (view, name): pixels
@@ -173,11 +142,11 @@ def _light(parts: Sequence[LightPart], found: Mapping[str, Half]) -> _Passes:
 
 
 def _merged(
-    first: _Passes,
-    second: _Passes,
+    first: _Named,
+    second: _Named,
     shares: tuple[float, float],
     found: Mapping[str, Half],
-) -> _Passes:
+) -> _Named:
     """Passes of all samples: means, but for what only a first sample writes."""
     merged = {}
     for (view, name), pixels in first.items():
@@ -199,7 +168,7 @@ def more_samples(
     region: Region | None = None,
     share: float | None = None,
     light: Sequence[LightPart] = (),
-) -> tuple[list[dict[str, Samples]], dict[str, float]]:
+) -> tuple[list[dict[str, Passes]], dict[str, float]]:
     """Render parts of sequences; samples of each by view, and the seconds.
 
     `region` is a part of the picture, in its own pixels; None is all of it. `share`
@@ -229,12 +198,10 @@ def more_samples(
     return found, seconds_of(clocks)
 
 
-def _counted(
-    samples: Samples, part: SampleSubset, clock: session.StageClock
-) -> Samples:
+def _counted(samples: Passes, part: SampleSubset, clock: session.StageClock) -> Passes:
     """With the number of each pixel's samples, even ones as well."""
     found = counted(samples, part, clock)
     if found.counts is not None:
         return found
-    counts = np.full(samples.picture.shape[:2], part.length, np.float32)
+    counts = np.full(samples.shape, part.length, np.float32)
     return replace(samples, counts=counts)

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
 
 from ..internals.borrowed import Borrowed
 from ..planning.settings import low_size
-from .samples import Samples
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,7 @@ class LowPlace:
 class LowSamples:
     """One view as Cycles sampled it, and where."""
 
-    samples: Samples
+    samples: Passes
     place: LowPlace
 
     def denoised(self, denoise: InProcess) -> Beauty:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from xrds_core.accumulation.passes import Passes
 from xrds_core.accumulation.sample_subsets import SampleSubset
 from xrds_core.denoising.light_passes import LightPart
 
@@ -32,7 +33,7 @@ from .low_resolution import (
     Probe,
     Region,
 )
-from .samples import Samples, read_samples
+from .samples import read_samples
 from .settings import (
     ALBEDO,
     DEPTH,
@@ -144,7 +145,7 @@ class CyclesPasses(LayerSession):
         *,
         is_even: bool = True,
         light: Sequence[LightPart] = (),
-    ) -> tuple[dict[str, Samples], session.StageClock]:
+    ) -> tuple[dict[str, Passes], session.StageClock]:
         """Render samples of a part of the frame, by view; `subset` and `is_even` as in
         `set_samples`. Counts are there where `geometry` asked for them, and the parts
         of the `light`.

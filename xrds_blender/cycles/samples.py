@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
 
+from xrds_core.accumulation.passes import Passes
 from xrds_core.accumulation.sample_subsets import SampleSubset
 from xrds_core.arrays import Array
 from xrds_core.denoising.light_passes import LightPart, light_of
@@ -45,27 +45,6 @@ Reader = Callable[[str], Array | None]
 """Pixels (H, W, channels) of a pass by name, None where there is none."""
 
 
-@dataclass(frozen=True)
-class Samples:
-    """One view as Cycles sampled it.
-
-    `picture` (H, W, 4) is radiance and alpha; `albedo` and `normal` are (H, W, 3),
-    normals in camera space. `depth` (H, W) of the first hit, in the scene's units, and
-    `vector` (H, W, 4), motion in pixels, are there when asked for; so are `counts`
-    (H, W), the samples that a pixel took as a share of the most that it could, and
-    `path_length` (H, W) and `parts` as in `Frame`.
-    """
-
-    picture: Array
-    albedo: Array
-    normal: Array
-    depth: Array | None = None
-    vector: Array | None = None
-    counts: Array | None = None
-    path_length: Array | None = None
-    parts: Mapping[str, Array] = field(default_factory=dict)
-
-
 def sample_layer(
     engine: Any,
     depsgraph: Any,
@@ -76,7 +55,7 @@ def sample_layer(
     is_even: bool = True,
     geometry: Sequence[tuple[str, str]] = (),
     light: Sequence[LightPart] = (),
-) -> tuple[dict[str, Samples], session.StageClock]:
+) -> tuple[dict[str, Passes], session.StageClock]:
     """Render without Cycles' denoiser; samples by view, and what it took.
 
     `geometry` names those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS.
@@ -106,7 +85,7 @@ def samples_in(
     layer_name: str,
     wanted: Collection[str] = (),
     light: Sequence[LightPart] = (),
-) -> dict[str, Samples]:
+) -> dict[str, Passes]:
     """The samples that the result holds, by view; the rest as `read_samples` has it."""
     result = engine.get_result()
     views = [view.name for view in result.views] or [""]
@@ -120,7 +99,7 @@ def samples_in(
 
 def read_samples(
     read: Reader, wanted: Collection[str], light: Sequence[LightPart] = ()
-) -> Samples:
+) -> Passes:
     """What `read` gives of a noisy render; `wanted` are names of `geometry`."""
     # Without its denoiser Cycles leaves Combined black where there is Noisy Image.
     noisy = read(NOISY)
@@ -137,8 +116,9 @@ def read_samples(
     path = read(DEPTH) if {DEPTH, FIRST_HIT} <= {*wanted} else None
     if path is not None:
         path = np.ascontiguousarray(path[..., 0])
-    return Samples(
-        picture=np.ascontiguousarray(picture),
+    return Passes(
+        radiance=np.ascontiguousarray(picture[..., :3]),
+        alpha=np.ascontiguousarray(picture[..., 3]),
         albedo=np.ascontiguousarray(albedo),
         normal=np.ascontiguousarray(normal),
         depth=depth,

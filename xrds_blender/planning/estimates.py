@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
-from xrds_core.shot import bytes_needed
+from xrds_core.accumulation.frame import bytes_needed
 
 from .budget import Costs, Curve, ErrorModel, Model
 from .settings import (

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from xrds_core.accumulation.accumulate import Accumulated, accumulate
 from xrds_core.accumulation.equal_noise import IndependentFrames
 from xrds_core.accumulation.object_motion import Movement
+from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
 from xrds_core.denoising.light_passes import LightPart, passes_by_name
 from xrds_core.denoising.light_sums import added_up, light_in
@@ -18,7 +19,6 @@ from xrds_core.finish import finish_frame
 from xrds_core.shot import Shot
 
 from ..cycles.layer_session import LayerSession
-from ..cycles.samples import Samples
 from ..planning.plan import Decision, full_size
 from ..planning.request import Request
 from ..planning.settings import Denoising, Settings
@@ -103,7 +103,7 @@ class FullSize(Method):
         report: Report | None = None,
     ) -> Picture:
         frame = own.views[view]
-        if isinstance(frame, Samples):
+        if isinstance(frame, Passes):
             picture = self._alone(frame, report, own.light)
         else:
             neighbours = self._neighbours(own, others, view)
@@ -181,14 +181,15 @@ class FullSize(Method):
         return replace(picture, parts=passes_by_name(light, finished.parts))
 
     def _alone(
-        self, samples: Samples, report: Report | None, light: Sequence[LightPart]
+        self, samples: Passes, report: Report | None, light: Sequence[LightPart]
     ) -> Picture:
         started = time.perf_counter()
+        assert samples.radiance is not None
         denoised = self._denoiser(
             samples.picture,
             samples.albedo,
             samples.normal,
-            parts=light_in(samples.picture[..., :3], samples.parts, light),
+            parts=light_in(samples.radiance, samples.parts, light),
             progress=report,
         )
         made = denoised.radiance, denoised.parts

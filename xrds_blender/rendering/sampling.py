@@ -11,6 +11,7 @@ import numpy as np
 from xrds_core.accumulation.accumulate import Accumulated
 from xrds_core.accumulation.camera import Camera
 from xrds_core.accumulation.frame import Frame, store
+from xrds_core.accumulation.passes import Passes
 from xrds_core.accumulation.sample_subsets import (
     SampleSubset,
     consecutive_subset,
@@ -27,7 +28,6 @@ from ..cycles.samples import (
     GEOMETRY,
     LATE_DEPTH,
     PATH_LENGTH,
-    Samples,
     sample_layer,
 )
 from ..cycles.settings import has_subsets, set_share, subset_of_file
@@ -54,7 +54,7 @@ OnSampled = Callable[[Mapping[str, Frame]], object]
 class Sampled:
     """One frame before it is finished, by view, and the seconds that it took.
 
-    At full size views are `Stored`, of a still `Samples`; above scale 1 they are a
+    At full size views are `Stored`, of a still `Passes`; above scale 1 they are a
     `View` or `Inputs` of `super_resolution`; of Cycles alone finished pictures.
     `gathered` are views with their neighbours' samples, where that is known already.
     Where `samples` per pixel were requested it has these; else `share` is how much of
@@ -319,7 +319,7 @@ def sample_frame(
 
 def _alone(
     engine: Any, depsgraph: Any, request: Request, light: Sequence[LightPart]
-) -> tuple[dict[str, Samples], dict[str, float]]:
+) -> tuple[dict[str, Passes], dict[str, float]]:
     """Render a frame without neighbours, as `noisy_frame` does; seed as in the file."""
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     stages.begin(engine, stages.SAMPLES, 1, 2)
@@ -383,7 +383,7 @@ def _frames_of_halves(
     engine: Any, depsgraph: Any, how: Sampling
 ) -> tuple[dict[str, Frame], dict[str, float]]:
     """Render a frame in two halves; under motion blur its motion beside them."""
-    motion: dict[str, Samples] = {}
+    motion: dict[str, Passes] = {}
     seconds = dict.fromkeys(("sync", "beauty"), 0.0)
     if how.needs_motion:
         motion, seconds = sample_motion(engine, depsgraph, how.own_seed)
@@ -412,7 +412,7 @@ def first_sample(engine: Any, depsgraph: Any, request: Request, place: int) -> N
     sample_layer(engine, depsgraph, subset=replace(subset, offset=0, length=1))
 
 
-def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
+def light_of(how: Sampling, camera: Camera, samples: Passes) -> Frame:
     """One view's samples as accumulation takes them."""
     assert samples.depth is not None
     depth = samples.depth
@@ -422,20 +422,14 @@ def light_of(how: Sampling, camera: Camera, samples: Samples) -> Frame:
     counts = samples.counts
     if counts is not None:
         counts = counts * np.float32(how.count)
-    return Frame(
+    return Frame.of(
+        samples,
         number=how.number,
         camera=camera,
-        radiance=samples.picture[..., :3],
-        alpha=samples.picture[..., 3],
-        albedo=samples.albedo,
-        normal=samples.normal,
         depth=depth,
-        vector=samples.vector,
+        counts=counts,
         samples=how.count if counts is None else max(float(counts.mean()), _FEWEST),
         still=how.still,
-        counts=counts,
-        path_length=samples.path_length,
-        parts=samples.parts,
         subset=how.shared,
     )
 

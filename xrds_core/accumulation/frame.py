@@ -8,9 +8,9 @@ lies at (0.5, 0.5); y grows downwards.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ..native.library import Arrays, bands, in_threads, library
 from .camera import SKY_DEPTH, Camera
 from .local_filters import extreme, find_rims
 from .noise import Noise, guide_factor, light_factor
+from .passes import Passes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 
     from ..arrays import Array
 
-    Passes = tuple[Array | None, Array, Array, Array | None]
+    Packed = tuple[Array | None, Array, Array, Array | None]
     Mask = NDArray[np.bool_]
     from .noise import Noise
 
@@ -41,20 +42,26 @@ _TINY = np.float32(1e-9)
 
 @dataclass(frozen=True)
 class Halves:
-    """The two half buffers of a frame; float32, the first axis is the half.
+    """The light of a frame's two half buffers, which tells its noise.
 
-    `radiance`, `albedo`, `normal` (2, H, W, 3) and `alpha` (2, H, W), or None, are as
-    in `Frame`, which holds the means of both. The halves are two subsets of one sample
-    sequence, or have two seeds. `shares` are their shares of the samples; `counts`
-    (2, H, W) their samples in each pixel, where they differ.
+    `radiance` is (2, H, W, 3); the halves are two subsets of one sample sequence, or
+    have two seeds. `shares` are their shares of the samples; `counts` (2, H, W) their
+    samples in each pixel, where they differ.
     """
 
     radiance: Array
-    albedo: Array
-    normal: Array
-    alpha: Array | None = None
     shares: tuple[float, float] = (0.5, 0.5)
     counts: Array | None = None
+
+    @classmethod
+    def of(cls, one: Passes, two: Passes, shares: tuple[float, float]) -> Halves:
+        """The halves of a frame that was rendered in two."""
+        assert one.radiance is not None
+        assert two.radiance is not None
+        counts = None
+        if one.counts is not None and two.counts is not None:
+            counts = np.stack((one.counts, two.counts))
+        return cls(np.stack((one.radiance, two.radiance)), shares, counts)
 
     def share(self) -> Array:
         """Return the first half's share of the samples: (H, W), or one number."""
@@ -62,16 +69,6 @@ class Halves:
             return np.asarray(self.shares[0], np.float32)
         one, two = self.counts
         return np.where(one > 0.0, one / np.maximum(one + two, _TINY), 0.0)
-
-    def mean(self, name: str) -> Array | None:
-        """Return the mean of both halves of a pass by its name."""
-        halves = getattr(self, name)
-        if halves is None:
-            return None
-        share = self.share()
-        if halves.ndim == 4:
-            share = share[..., None]
-        return np.asarray(halves[0] * share + halves[1] * (np.float32(1.0) - share))
 
 
 _SEED = 7
@@ -87,7 +84,7 @@ def pack(
 
 
 def pack_with_noise(
-    passes: Passes, samples: float, halves: Halves | None
+    passes: Packed, samples: float, halves: Halves | None
 ) -> tuple[NDArray[np.float16], Mask, Noise]:
     """Return the same of a frame with radiance, and its noise, 0 at invalid pixels.
 
@@ -122,7 +119,7 @@ def pack_counts(counts: Array) -> NDArray[np.float16]:
 class _Packing:
     """One frame that the library packs."""
 
-    def __init__(self, passes: Passes) -> None:
+    def __init__(self, passes: Packed) -> None:
         radiance, albedo, normal, alpha = passes
         self._arrays = Arrays()
         self._shape = height, width = normal.shape[:2]
@@ -203,75 +200,44 @@ def _pass(arrays: Arrays, picture: Array) -> structures.Pass:
 # Relative to the surface's depth: how far behind it an image lies at least. Less is
 # the slope of a surface, or the edge of something.
 _BEHIND = 0.04
-_PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
-_OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "counts": ()}
-_OPTIONAL |= {"path_length": ()}
 
 
-@dataclass(frozen=True)
-class Frame:
-    """One frame as the renderer returns it; its arrays are never changed.
+@dataclass(frozen=True, kw_only=True)
+class Frame(Passes):
+    """One frame as the renderer returns it, and where it was seen from.
 
-    `radiance` is None in a frame of guides alone: the guides then decide whether two
-    frames show the same. `number` is the frame's number: `vector` points to number - 1
-    and number + 1, and frames of one number show one moment (the views of a stereo
-    pair). `samples` per pixel weight the frame against others. `normal` is in camera
-    space, but with Z pointing away from the viewer, as in Cycles' `Denoising Normal`.
-    `depth` (H, W) is the distance of the first hit from the camera, along the camera's
-    axis (of a panorama along the ray), at each pixel's centre; infinite, or above 1e9,
-    without a hit.
+    `number` is the frame's number: `vector` points to number - 1 and number + 1, and
+    frames of one number show one moment (the views of a stereo pair). `samples` per
+    pixel, the mean of `counts`, weight the frame against others.
 
     `still` says that nothing at all moves or changes from frame to frame, not even
-    light: frames of equal cameras differ in their noise alone.
-
-    Optional: `alpha` (H, W); `vector` (H, W, 4), Cycles' Vector pass: the surface's
-    position one frame before minus its position now, then its position now minus the
-    one a frame later, in pixels, y upwards; without it all surfaces are assumed to
-    stand still. `counts` (H, W): samples of each pixel, where they differ; `samples` is
-    their mean. `halves` are the half buffers, from which noise is estimated better than
-    from the surrounding pixels. `path_length` (H, W): the way from the camera, through
-    mirrors and glass, to what albedo and normal show (Cycles' `Denoising Depth`).
+    light: frames of equal cameras differ in their noise alone. `halves` are the half
+    buffers, from which noise is estimated better than from the surrounding pixels.
     `subset` is the number of the part that the frame has of a sequence that frames
     share: two with the same have the same noise. None of a sequence of its own.
     """
 
     number: int
     camera: Camera
-    radiance: Array | None
-    albedo: Array
-    normal: Array
     depth: Array
     samples: float = 1.0
-    alpha: Array | None = None
-    vector: Array | None = None
     still: bool = False
-    counts: Array | None = None
     halves: Halves | None = None
-    path_length: Array | None = None
-    parts: Mapping[str, Array] = field(default_factory=dict)
     subset: int | None = None
 
+    @classmethod
+    def of(cls, passes: Passes, **others: Any) -> Frame:
+        """A frame of these passes; `others` are its further fields."""
+        given = {each.name: getattr(passes, each.name) for each in fields(Passes)}
+        return cls(**(given | others))
+
     def __post_init__(self) -> None:
-        shapes = _PASSES | _OPTIONAL
-        arrays = [(name, getattr(self, name), shapes[name]) for name in shapes]
-        arrays += [(name, part, (3,)) for name, part in self.parts.items()]
-        for name, array, channels in arrays:
-            if array is not None and array.shape != self.shape + channels:
-                raise PictureError(
-                    f"{name} of frame {self.number} has shape {array.shape} where its "
-                    f"normal requires {self.shape + channels}: give passes of one "
-                    "render"
-                )
+        self.check_shapes(f"frame {self.number}")
         if not self.samples > 0:
             raise PictureError(
                 f"frame {self.number} has {self.samples} samples per pixel: give the "
                 "number it was rendered with"
             )
-
-    @property
-    def shape(self) -> tuple[int, int]:
-        """(H, W) of every array."""
-        return self.normal.shape[0], self.normal.shape[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -396,3 +362,28 @@ def _image(frame: Frame) -> Array | None:
         return None
     image = np.where(behind, end, np.float32(np.nan)).ravel()
     return image if frame.camera.orthographic else np.float32(1.0) / image
+
+
+# Per pixel: albedo and normal, in half floats, and inverse depth; then radiance and its
+# noise, a Vector pass and an alpha, in half floats, and the inverse depth of images.
+_BYTES = 2 * 3 * 2 + 4
+_IMAGE_BYTES = 4
+_LIGHT_BYTES, _VECTOR_BYTES, _ALPHA_BYTES = 12, 8, 2
+
+
+def bytes_needed(
+    width: int,
+    height: int,
+    frames: int,
+    alpha: bool = False,
+    vector: bool = False,
+    light: bool = True,
+    images: bool = False,
+) -> int:
+    """Return the bytes that `frames` frames of half floats take in a window.
+
+    Guides alone have no `light`.
+    """
+    each = _BYTES + _LIGHT_BYTES * light
+    each += _VECTOR_BYTES * vector + _ALPHA_BYTES * alpha + _IMAGE_BYTES * images
+    return width * height * each * frames

@@ -5,13 +5,14 @@ From then on they are the frame's own: it lends them as well.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..accumulation.frame import pack, pack_counts, pack_parts
 from ..accumulation.noise import brightness
+from ..accumulation.passes import Passes
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,41 +22,32 @@ if TYPE_CHECKING:
     from ..arrays import Array
 
 
-@dataclass(frozen=True)
-class ExtraSamples:
-    """Means over `samples` (H, W) more samples per pixel, 0 where there are none.
+def mean_of(several: Sequence[Passes]) -> Passes:
+    """Return the mean of several, weighted by their counts, which add up.
 
-    `radiance`, `albedo` and `normal` (H, W, 3), `alpha` (H, W) and `parts` are as in
-    `Frame`.
+    Radiance, alpha, albedo, normal, counts and parts; no other passes.
     """
-
-    radiance: Array
-    albedo: Array
-    normal: Array
-    alpha: Array
-    samples: Array
-    parts: dict[str, Array] = field(default_factory=dict)
-
-
-def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
-    """Return the mean of several, weighted by their samples, which add up."""
-    total = np.sum([part.samples for part in parts], axis=0)
-    weights = [part.samples / np.maximum(total, np.float32(1e-9)) for part in parts]
+    counts = [_counts(each) for each in several]
+    total = np.sum(counts, axis=0)
+    weights = [count / np.maximum(total, np.float32(1e-9)) for count in counts]
 
     def mean(values: Sequence[Array]) -> Array:
         wide = (...,) + (None,) * (values[0].ndim - 2)
         pairs = zip(values, weights, strict=True)
         return np.sum([x * w[wide] for x, w in pairs], axis=0)
 
-    radiance, albedo, normal, alpha = (
-        mean([getattr(part, name) for part in parts])
-        for name in ("radiance", "albedo", "normal", "alpha")
-    )
-    light = {k: mean([part.parts[k] for part in parts]) for k in parts[0].parts}
-    return ExtraSamples(radiance, albedo, normal, alpha, total, light)
+    names = ("radiance", "albedo", "normal", "alpha")
+    means = {name: mean([getattr(x, name) for x in several]) for name in names}
+    parts = {k: mean([x.parts[k] for x in several]) for k in several[0].parts}
+    return Passes(**means, counts=total, parts=parts)
 
 
-def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
+def _counts(extra: Passes) -> Array:
+    assert extra.counts is not None
+    return extra.counts
+
+
+def enriched(frame: Stored, alone: Accumulated, extra: Passes) -> Stored:
     """Return a frame whose own samples are extra ones as well.
 
     `alone` is the frame as accumulated without neighbours. `noise` stays that of the
@@ -63,7 +55,7 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
     other light beside frames that have fewer.
     """
     found = with_extra(alone, alone, extra)
-    rows = _rows(extra.samples)
+    rows = _rows(_counts(extra))
     width = frame.shape[1]
     place = slice(rows.start * width, rows.stop * width)
     picture = frame.picture.copy()
@@ -79,6 +71,7 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
     is_even = bool((total == total.flat[0]).all())
     noise = frame.noise
     if noise is not None:
+        assert extra.radiance is not None
         had = (alone.samples[rows] > 0.0).ravel().astype(np.float32)
         noise = noise.within(had, brightness(extra.radiance[rows]).ravel(), place)
     return replace(
@@ -93,22 +86,23 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
 
 
 def with_extra(
-    frame: Accumulated, alone: Accumulated, extra: ExtraSamples, worth: float = 1.0
+    frame: Accumulated, alone: Accumulated, extra: Passes, worth: float = 1.0
 ) -> Accumulated:
     """Return a frame with extra samples; itself where these are not finite.
 
     `alone` is the frame without its neighbours, whose samples count as `worth` of its
     own.
     """
-    rows = _rows(extra.samples)  # often few of many
-    usable = np.isfinite(extra.alpha[rows]) & (extra.samples[rows] > 0.0)
-    for part in (extra.radiance, extra.albedo, extra.normal):
+    more = _counts(extra)
+    rows = _rows(more)  # often few of many
+    usable = np.isfinite(extra.picture[rows]).all(axis=-1) & (more[rows] > 0.0)
+    for part in (extra.albedo, extra.normal):
         usable &= np.isfinite(part[rows]).all(axis=-1)
     neighbours = np.float32(worth)
     counts = (
         frame.samples[rows] * neighbours,
         alone.samples[rows] * (np.float32(1.0) - neighbours),
-        np.where(usable, extra.samples[rows], np.float32(0.0)),
+        np.where(usable, more[rows], np.float32(0.0)),
     )
     total = np.maximum(sum(counts), np.float32(1e-9))
     shares = [(count / total).astype(np.float32) for count in counts]

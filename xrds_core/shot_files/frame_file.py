@@ -11,6 +11,7 @@ import numpy as np
 from ..accumulation.camera import SKY_DEPTH, Camera
 from ..accumulation.frame import Frame, Halves, Stored, store
 from ..accumulation.noise import Noise
+from ..accumulation.passes import LAYOUT, Passes
 from ..accumulation.reprojection import centres, pixels_of
 from ..denoising.light_passes import Wanted, find_parts, light_of
 from ..errors import NotReusable, PictureError, Unfit
@@ -133,11 +134,10 @@ def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> Fra
         depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
         samples=_samples(file, part, reading),
         alpha=file.plane(found.alpha) if found.alpha else None,
-        counts=file.plane(found.counts[0]) if found.counts else None,
         vector=_vector(file, found, reading) if reusable else None,
-        path_length=_path_length(file, found) if reusable else None,
         still=cameras.whole_or_none(part.attributes.get(STILL)) == 1,
         parts=_light(file, light),
+        **_others(file, found),
     )
     if reading.halves is not None:
         frame = _with_other_half(frame, file, camera, reading)
@@ -207,23 +207,22 @@ def _with_other_half(
     if not same_size or (found.alpha is None) != (frame.alpha is None):
         raise Unfit(f"{path} is no half of {file.path}: its size or alpha differs")
     other.window = file.window
-    passes = {
-        "radiance": _stack(other, found.beauty),
-        "albedo": _guide(_stack(other, found.albedo)),
-        "normal": _guide(_normal(other, found, camera, reading)),
-    }
-    if found.alpha:
-        passes["alpha"] = other.plane(found.alpha)
-    halves = Halves(
-        **{name: np.stack((getattr(frame, name), x)) for name, x in passes.items()}
-    )
-    means: dict[str, Any] = {name: halves.mean(name) for name in passes}
     light = find_parts(other.names, _layer(found), reading.light)
-    more = _light(other, light)
-    if more.keys() != frame.parts.keys():
+    second = Passes(
+        radiance=_stack(other, found.beauty),
+        albedo=_guide(_stack(other, found.albedo)),
+        normal=_guide(_normal(other, found, camera, reading)),
+        alpha=other.plane(found.alpha) if found.alpha else None,
+        parts=_light(other, light),
+    )
+    if second.parts.keys() != frame.parts.keys():
         raise Unfit(f"{path} is no half of {file.path}: its parts of the light differ")
-    means["parts"] = {k: (x + more[k]) / 2 for k, x in frame.parts.items()}
-    return replace(frame, **means, samples=2 * frame.samples, halves=halves)
+    halves = Halves.of(frame, second, (0.5, 0.5))
+    return replace(
+        frame.joined(second, halves.share()),
+        samples=2 * frame.samples,
+        halves=halves,
+    )
 
 
 _REMEDY = {
@@ -318,8 +317,12 @@ def _from_depth(depth: Array) -> Array:
     return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
 
 
-def _path_length(file: File, found: Found) -> Array | None:
-    return file.plane(found.path_length[0]) if found.path_length else None
+def _others(file: File, found: Found) -> dict[str, Array]:
+    """The passes that have one name alone."""
+    return {
+        name: _stack(file, names) if LAYOUT[name].channels else file.plane(names[0])
+        for name, names in found.others.items()
+    }
 
 
 def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:

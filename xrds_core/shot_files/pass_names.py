@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
+from ..accumulation.passes import LAYOUT
 from ..errors import Unfit
 from ..exr.channels import COMPONENTS
 
@@ -14,15 +15,15 @@ if TYPE_CHECKING:
     from ..exr.channels import Channels
 
 
-NOISY, COMBINED = "Noisy Image", "Combined"  # Cycles' names
-CAMERA_NORMAL = "Denoising Normal"
-PATH_LENGTH = "Denoising Depth"
+COMBINED = "Combined"  # Cycles' name
+NOISY, ALBEDO, CAMERA_NORMAL, PATH_LENGTH = (
+    LAYOUT[name].name for name in ("radiance", "albedo", "normal", "path_length")
+)
 NOISE = "XRDS Noise"  # of the samples, as XRDS estimated it before storing them
-COUNTS = "XRDS Samples"  # of each pixel, where they differ
 # Names of passes in the order in which they are tried, case-insensitive.
 _USUAL = {
     "beauty": (NOISY, COMBINED, "beauty", "RGBA", "rgb", "C", "Ci"),
-    "albedo": ("Denoising Albedo", "albedo", "denoise_albedo", "diffuse_albedo"),
+    "albedo": (ALBEDO, "albedo", "denoise_albedo", "diffuse_albedo"),
     "normal": (CAMERA_NORMAL, "Normal", "normals", "denoise_normal", "N", "Nn"),
     "position": ("Position", "P", "Pworld"),
     "depth": ("Depth", "Z", PATH_LENGTH),
@@ -56,7 +57,7 @@ class Found:
 
     `picture` are the channels that the finished picture is written to, R, G, B, and
     `alpha` is the one that holds alpha in the input. With `has_length` depth is a
-    length along the ray.
+    length along the ray. `others` are passes of `LAYOUT` that have one name alone.
     """
 
     beauty: list[str]
@@ -64,10 +65,9 @@ class Found:
     normal: list[str]
     position: list[str]
     depth: list[str]
-    path_length: list[str]
     vector: list[str]
     noise: list[str]
-    counts: list[str]
+    others: dict[str, list[str]]
     picture: list[str]
     alpha: str | None
     has_camera_normal: bool
@@ -94,10 +94,9 @@ def find(channels: Channels, names: PassNames) -> Found:
         normal=_needed(channels, names, "normal"),
         position=_channels(channels, names, "position"),
         depth=depth,
-        path_length=_path_length(channels, names),
         vector=_channels(channels, names, "vector", _MOTION),
-        noise=_ours(channels, NOISE, "XYZ"),
-        counts=_ours(channels, COUNTS, "X"),
+        noise=_by_name(channels, NOISE, ("XYZ",)),
+        others=_others(channels, depth),
         picture=channels.of(target) or ["R", "G", "B"],
         alpha=next((x for x in alphas if x in channels.names), None),
         has_camera_normal=(normal or "").endswith(CAMERA_NORMAL),
@@ -105,10 +104,23 @@ def find(channels: Channels, names: PassNames) -> Found:
     )
 
 
-def _ours(channels: Channels, name: str, letters: str) -> list[str]:
-    """The channels of a pass of stored samples."""
-    found = channels.find(name, (letters,))
-    return [] if found is None else channels.of(found, (letters,))
+def _others(channels: Channels, depth: list[str]) -> dict[str, list[str]]:
+    """The passes that have one name alone, but for one that serves as depth."""
+    names = LAYOUT.keys() - {*_USUAL, "radiance", "alpha"}
+    found = {}
+    for name in sorted(names):
+        layout = LAYOUT[name]
+        letters = (layout.letters, *(() if layout.channels else _SINGLE))
+        there = _by_name(channels, layout.name, letters)
+        if there and there != depth:
+            found[name] = there
+    return found
+
+
+def _by_name(channels: Channels, name: str, letters: Sequence[str]) -> list[str]:
+    """The channels of a pass of this name."""
+    found = channels.find(name, letters)
+    return [] if found is None else channels.of(found, letters)
 
 
 def _target(channels: Channels, prefix: str) -> str:
@@ -158,13 +170,6 @@ def _depth(channels: Channels, names: PassNames) -> list[str]:
     usual = [x.lower() for x in wanted]
     plain = [name for name in channels.names if name.lower() in usual]
     return plain[:1] or _channels(channels, names, "depth", _SINGLE)
-
-
-def _path_length(channels: Channels, names: PassNames) -> list[str]:
-    """Cycles' Denoising Depth, where it is not the only depth."""
-    found = channels.find(PATH_LENGTH, _SINGLE)
-    path = [] if found is None else channels.of(found, _SINGLE)
-    return [] if path == _depth(channels, names) else path
 
 
 def _needed(channels: Channels, names: PassNames, kind: str) -> list[str]:

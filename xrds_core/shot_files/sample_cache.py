@@ -14,11 +14,12 @@ import numpy as np
 
 from .. import exr
 from ..accumulation.frame import pack_counts, pack_frame
+from ..accumulation.passes import LAYOUT
 from ..arrays import LARGEST_HALF
 from ..exr.openexr_io import Part
 from .cameras import to_header
 from .frame_file import KEY, NAME, RADIUS, SAMPLES, STILL, SUBSET
-from .pass_names import CAMERA_NORMAL, COUNTS, NOISE, NOISY, PATH_LENGTH
+from .pass_names import NOISE
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,30 +70,21 @@ def write_cached_frame(path: Path, frame: Frame, origin: Origin) -> None:
 
 
 def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
-    assert frame.radiance is not None
-    passes: list[tuple[str, str, NDArray[Any]]] = [
-        (NOISY, "RGB", frame.radiance),
-        ("Denoising Albedo", "RGB", frame.albedo),
-        (CAMERA_NORMAL, "XYZ", frame.normal),
-        # always: noise computed from the half floats of the rest would differ
-        (NOISE, "XYZ", _noise(frame)),
-    ]
-    if frame.alpha is not None:
-        passes.append((NOISY, "A", frame.alpha[..., None]))
-    if frame.counts is not None:
-        counts = pack_counts(frame.counts).reshape(frame.shape)
-        passes.append((COUNTS, "X", counts[..., None]))
-    if frame.vector is not None:
-        passes.append(("Vector", "XYZW", frame.vector))
-    channels: dict[str, NDArray[Any]] = {
-        f"{layer}{name}.{letter}": _half(array[..., i])
-        for name, letters, array in passes
-        for i, letter in enumerate(letters)
-    }
-    channels[f"{layer}Depth.Z"] = frame.depth.astype(np.float32)
-    if frame.path_length is not None:
-        channels[f"{layer}{PATH_LENGTH}.Z"] = frame.path_length.astype(np.float32)
+    # noise always: computed from the half floats of the rest it would differ
+    channels = _planes(f"{layer}{NOISE}", "XYZ", _noise(frame).astype(np.float16))
+    for name, pixels in frame.given.items():
+        layout = LAYOUT[name]
+        if name == "counts":
+            packed = pack_counts(pixels).reshape(frame.shape)
+        else:
+            packed = pixels.astype(np.float32) if layout.is_full else _half(pixels)
+        channels |= _planes(f"{layer}{layout.name}", layout.letters, packed)
     return channels
+
+
+def _planes(name: str, letters: str, pixels: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    planes = pixels[..., None] if pixels.ndim == 2 else pixels
+    return {f"{name}.{letter}": planes[..., i] for i, letter in enumerate(letters)}
 
 
 def _noise(frame: Frame) -> Array:

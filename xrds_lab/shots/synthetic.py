@@ -30,12 +30,12 @@ def frame(number: int, width: int, height: int) -> Frame:
     per_frame = _FOCUS * width / 2 * _STEP / depth
     zero = np.zeros_like(per_frame)
     return Frame(
-        number,
-        _camera(width, height, shift),
-        halves.mean("radiance"),
-        colour,
-        normal,
-        depth,
+        number=number,
+        camera=_camera(width, height, shift),
+        radiance=halves.radiance.mean(axis=0),
+        albedo=colour,
+        normal=normal,
+        depth=depth,
         samples=SAMPLES,
         vector=np.stack([per_frame, zero, per_frame, zero], axis=-1),
         halves=halves,
@@ -70,6 +70,4 @@ def _halves(number: int, colour: Array) -> Halves:
     dice = np.random.default_rng(number + 1000)
     both = np.stack([colour, colour])
     noise = dice.standard_normal((*both.shape[:-1], 1), np.float32)
-    normal = np.zeros_like(both)
-    normal[..., 2] = -1.0
-    return Halves(both * (1 + np.float32(_NOISE) * noise), both, normal)
+    return Halves(both * (1 + np.float32(_NOISE) * noise))

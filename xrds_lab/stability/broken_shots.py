@@ -81,13 +81,13 @@ def _with(frame: Stored, bad: np.ndarray, value: float) -> Stored:
     vector = None if frame.vector is None else frame.vector.astype(np.float32)
     spoilt = store(
         Frame(
-            frame.number,
-            frame.camera,
-            radiance,
-            albedo,
-            normal,
-            depth,
-            frame.samples,
+            number=frame.number,
+            camera=frame.camera,
+            radiance=radiance,
+            albedo=albedo,
+            normal=normal,
+            depth=depth,
+            samples=frame.samples,
             alpha=picture[:, 9].reshape(shape),
             vector=None if vector is None else vector.reshape(*shape, 4),
         )

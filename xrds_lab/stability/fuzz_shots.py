@@ -155,7 +155,15 @@ class _Shot:
         )
         eye = odd_shots.make_camera(moment, self._kind)
         depth = clean["V.Depth.Z"]
-        frame = Frame(moment, eye, light, albedo, normal, depth, samples=4)
+        frame = Frame(
+            number=moment,
+            camera=eye,
+            radiance=light,
+            albedo=albedo,
+            normal=normal,
+            depth=depth,
+            samples=4,
+        )
         write_cached_frame(path, frame, Origin("key", "V", 2))
 
 

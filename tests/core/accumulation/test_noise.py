@@ -20,7 +20,15 @@ def noise_of(
     """The noise told of a frame without halves, whose passes are grey (H, W)."""
     light, guide = (np.repeat(x[..., None], 3, axis=-1) for x in (radiance, albedo))
     flat, depth = np.zeros((*SHAPE, 3), np.float32), np.ones(SHAPE, np.float32)
-    frame = Frame(1, camera(), light, guide, flat, depth, samples)
+    frame = Frame(
+        number=1,
+        camera=camera(),
+        radiance=light,
+        albedo=guide,
+        normal=flat,
+        depth=depth,
+        samples=samples,
+    )
     noise = pack_frame(frame)[2]
     assert noise is not None
     return noise

@@ -31,18 +31,17 @@ def frame(number: int, light: Array, albedo: Array, noise: float = 0.2) -> Frame
         return (truth + grain).astype(np.float32)
 
     normal = np.broadcast_to(np.float32([0, 0, 1]), PLAIN.shape)
-    parts = Halves(
-        halves(light * albedo, noise), halves(albedo, 0.02), halves(normal, 0.01)
-    )
+    radiance = halves(light * albedo, noise)
+    guides = halves(albedo, 0.02), halves(normal, 0.01)
     return Frame(
         number=number,
         camera=camera(),
-        radiance=parts.mean("radiance"),
-        albedo=parts.mean("albedo"),
-        normal=parts.mean("normal"),
+        radiance=radiance.mean(axis=0),
+        albedo=guides[0].mean(axis=0),
+        normal=guides[1].mean(axis=0),
         depth=np.full(SHAPE, 5.0, np.float32),
         samples=SAMPLES,
-        halves=parts,
+        halves=Halves(radiance),
     )
 
 

@@ -277,11 +277,20 @@ def frame_to_pack(change: Callable[[Array], Array], **more: Any) -> Frame:
         counts = rng.integers(0, 4, (2, *shape)).astype(np.float32)
         counts = counts if others == "counts" else None
         shares = (0.5, 0.5) if others == "counts" else others
-        halves = Halves(radiance, radiance, radiance, None, shares, counts)
+        halves = Halves(radiance, shares, counts)
     radiance = odd(3) if light else None
     depth = np.ones(shape, np.float32)
-    passes = radiance, odd(3), odd(3), depth
-    return Frame(1, camera(), *passes, 3.0, alpha=alpha, halves=halves)
+    return Frame(
+        number=1,
+        camera=camera(),
+        radiance=radiance,
+        albedo=odd(3),
+        normal=odd(3),
+        depth=depth,
+        samples=3.0,
+        alpha=alpha,
+        halves=halves,
+    )
 
 
 HANDED: dict[str, Callable[[Array], Array]] = {
@@ -339,8 +348,10 @@ def test_packing_of_half_buffers(halves: Any) -> None:
 @pytest.mark.parametrize("shape", [(1, 1), (1, 2), (2, 1), (1, 300), (300, 1)])
 def test_packing_of_small_pictures(shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(2)
-    passes = (rng.random((*shape, 3)).astype(np.float32) for _ in range(3))
-    assert_packed(Frame(1, camera(), *passes, np.ones(shape, np.float32)))
+    names = ("radiance", "albedo", "normal")
+    passes = {name: rng.random((*shape, 3)).astype(np.float32) for name in names}
+    depth = np.ones(shape, np.float32)
+    assert_packed(Frame(number=1, camera=camera(), depth=depth, **passes))
 
 
 def numbers() -> Array:

@@ -13,8 +13,9 @@ from xrds_core.accumulation.accumulate import Accumulated, accumulate
 from xrds_core.accumulation.frame import Halves, Stored, store
 from xrds_core.accumulation.local_filters import BLOCK
 from xrds_core.accumulation.noise import Noise
+from xrds_core.accumulation.passes import Passes
 from xrds_core.pace.error import Rendered, error_ratio, gain
-from xrds_core.pace.extra_samples import ExtraSamples, enriched, with_extra
+from xrds_core.pace.extra_samples import enriched, with_extra
 from xrds_core.pace.worth import Ratio
 
 Array = NDArray[np.float32]
@@ -118,9 +119,15 @@ def test_blocks_whose_noise_nobody_sees_lack_nothing() -> None:
     assert np.allclose(blocks[1:], 1.0)
 
 
-def extra(samples: Array, value: float) -> ExtraSamples:
+def extra(samples: Array, value: float) -> Passes:
     light = np.full((*samples.shape, 3), value, np.float32)
-    return ExtraSamples(light, light, light, np.ones_like(samples), samples)
+    return Passes(
+        radiance=light,
+        albedo=light,
+        normal=light,
+        alpha=np.ones_like(samples),
+        counts=samples,
+    )
 
 
 def test_extra_samples_count_by_their_number() -> None:
@@ -203,7 +210,7 @@ def test_a_frame_with_extra_samples_shows_the_light_of_its_neighbours() -> None:
         size = 2, noise, *frame.depth.shape, 1
         found = (rng.exponential(size=size) ** 3 / 6).mean(axis=1)  # a few are bright
         light = (frame.radiance * found).astype(np.float32)
-        both = Halves(light, *(np.stack([x, x]) for x in (frame.albedo, frame.normal)))
+        both = Halves(light)
         mean = light.mean(axis=0)
         return store(replace(frame, radiance=mean, samples=4.0, halves=both))
 
@@ -211,8 +218,12 @@ def test_a_frame_with_extra_samples_shows_the_light_of_its_neighbours() -> None:
     alone = accumulate(more, [])
     assert alone.radiance is not None
     samples = np.full(own.shape, 64.0, np.float32)
-    extra = ExtraSamples(
-        alone.radiance, alone.albedo, alone.normal, np.ones_like(samples), samples
+    extra = Passes(
+        radiance=alone.radiance,
+        albedo=alone.albedo,
+        normal=alone.normal,
+        alpha=np.ones_like(samples),
+        counts=samples,
     )
     rich = enriched(other, accumulate(other, []), extra)
     shares = [

@@ -12,9 +12,10 @@ import numpy as np
 from xrds_core.accumulation.accumulate import sample_counts
 from xrds_core.accumulation.frame import Stored
 from xrds_core.accumulation.local_filters import block_means
+from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
 from xrds_core.pace.error import Rendered, error_ratio, root_noise
-from xrds_core.pace.extra_samples import ExtraSamples, mean_of
+from xrds_core.pace.extra_samples import mean_of
 from xrds_core.pace.worth import Ratio
 
 from ...cycles.low_resolution import Region
@@ -23,7 +24,7 @@ from ..methods import Finishing
 from ..sampling import Sampled
 from .more import Part, measured_regions, nothing, pixels_of, put
 
-Render = Callable[[Part], dict[str, ExtraSamples]]
+Render = Callable[[Part], dict[str, Passes]]
 """Renders more samples of a frame, by view."""
 
 
@@ -37,7 +38,7 @@ class Measured(NamedTuple):
 
     regions: list[Region]
     ratio: Ratio
-    extra: dict[str, ExtraSamples]
+    extra: dict[str, Passes]
     denoising: float
     asked: Array
 
@@ -62,7 +63,7 @@ def measure(
     regions = measured_regions(shape)
     cells: list[list[Rendered]] = []
     seconds = 0.0
-    extra: dict[str, ExtraSamples] = {}
+    extra: dict[str, Passes] = {}
     for region in regions:
         place = None if (region.height, region.width) == shape else region
         halves = [more(Part(length, 0.5, place, sequence=-i)) for i in (1, 2)]
@@ -81,7 +82,8 @@ def measure(
     places = [pixels_of(region) for region in regions]
     # a part by itself, as its halves are
     together = [method.radiance(own, others, view, place) for place in places]
-    both = extra[view].samples
+    both = extra[view].counts
+    assert both is not None
     asked = both if least is None else counts_of_file(both, least, samples)
     asked = np.where(both > 0.0, asked, np.float32(0.0))
     ratio = error_ratio(
@@ -95,8 +97,9 @@ def measure(
     return Measured(regions, ratio, extra, denoising, asked)
 
 
-def _rendered(method: Finishing, samples: ExtraSamples) -> Rendered:
+def _rendered(method: Finishing, samples: Passes) -> Rendered:
     radiance = samples.radiance
+    assert radiance is not None
     return Rendered(radiance, method.denoised(radiance, samples.albedo, samples.normal))
 
 

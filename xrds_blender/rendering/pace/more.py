@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from xrds_core.accumulation.accumulate import accumulate
 from xrds_core.accumulation.local_filters import BLOCK
-from xrds_core.pace.extra_samples import ExtraSamples, enriched, mean_of, with_extra
+from xrds_core.accumulation.passes import Passes
+from xrds_core.pace.extra_samples import enriched, mean_of, with_extra
 
 from ...cycles.halves import more_samples
 from ...cycles.low_resolution import Region
-from ...cycles.samples import Samples
 from ...planning.request import Request
 from .. import stages
 from ..sampling import Sampled, is_even, sampling_of
@@ -41,13 +41,13 @@ class Part:
     sequence: int = 1
 
 
-More = Callable[[Part], tuple[dict[str, ExtraSamples], dict[str, float]]]
+More = Callable[[Part], tuple[dict[str, Passes], dict[str, float]]]
 """Renders more samples of a frame, by view, and says in how many seconds."""
 
 
 def render_more(
     engine: Any, depsgraph: Any, request: Request, place: int | None, part: Part
-) -> tuple[dict[str, ExtraSamples], dict[str, float]]:
+) -> tuple[dict[str, Passes], dict[str, float]]:
     """Render more samples of the frame that the dependency graph is at.
 
     `place` is as in `sampling_of`. The result has the passes afterwards that it had
@@ -70,25 +70,10 @@ def render_more(
         )
     finally:
         stages.end()
-    return {v: mean_of([_extra(x[v]) for x in found]) for v in found[0]}, seconds
+    return {v: mean_of([x[v] for x in found]) for v in found[0]}, seconds
 
 
-def _extra(samples: Samples) -> ExtraSamples:
-    picture = samples.picture
-    assert samples.counts is not None
-    return ExtraSamples(
-        np.ascontiguousarray(picture[..., :3]),
-        samples.albedo,
-        samples.normal,
-        picture[..., 3],
-        samples.counts,
-        dict(samples.parts),
-    )
-
-
-def with_more(
-    own: Sampled, extra: Mapping[str, ExtraSamples], weight: float
-) -> Sampled:
+def with_more(own: Sampled, extra: Mapping[str, Passes], weight: float) -> Sampled:
     """A frame with extra samples; beside them neighbours' count with a weight."""
     views, gathered = dict(own.views), dict(own.gathered)
     for view, more in extra.items():
@@ -98,26 +83,30 @@ def with_more(
     return replace(own, views=views, gathered=gathered) if extra else own
 
 
-def nothing(shape: tuple[int, int], parts: Iterable[str]) -> ExtraSamples:
+def nothing(shape: tuple[int, int], parts: Iterable[str]) -> Passes:
     """No samples anywhere."""
     radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
-    alpha, samples = np.zeros((2, *shape), np.float32)
-    dark = {name: np.zeros_like(radiance) for name in parts}
-    return ExtraSamples(radiance, albedo, normal, alpha, samples, dark)
+    alpha, counts = np.zeros((2, *shape), np.float32)
+    return Passes(
+        radiance=radiance,
+        albedo=albedo,
+        normal=normal,
+        alpha=alpha,
+        counts=counts,
+        parts={name: np.zeros_like(radiance) for name in parts},
+    )
 
 
-def put(whole: ExtraSamples, region: Region, part: ExtraSamples) -> None:
+def put(whole: Passes, region: Region, part: Passes) -> None:
     """Write the samples of a region into those of the whole picture."""
     place = pixels_of(region)
-    for name in ("radiance", "albedo", "normal", "alpha", "samples"):
-        getattr(whole, name)[place] = getattr(part, name)
+    for name, pixels in whole.given.items():
+        pixels[place] = part.given[name]
     for name, pixels in part.parts.items():
         whole.parts[name][place] = pixels
 
 
-def together(
-    one: Mapping[str, ExtraSamples], two: Mapping[str, ExtraSamples]
-) -> dict[str, ExtraSamples]:
+def together(one: Mapping[str, Passes], two: Mapping[str, Passes]) -> dict[str, Passes]:
     """Both, by view."""
     names = one.keys() | two.keys()
     return {v: mean_of([x[v] for x in (one, two) if v in x]) for v in names}

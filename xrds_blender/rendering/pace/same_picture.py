@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from xrds_core.accumulation.local_filters import BLOCK
+from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
 from xrds_core.finish import rectangles
 from xrds_core.pace.error import Gain, gain
-from xrds_core.pace.extra_samples import ExtraSamples
 from xrds_core.pace.history import History
 from xrds_core.pace.worth import Clock, Worth
 
@@ -169,7 +169,7 @@ class SamePicture:
         gained = gain(accumulated[view], own.views[view])
         spent = _Seconds({"accumulate": time.perf_counter() - started})
         shape = own.views[view].shape
-        extra: dict[str, ExtraSamples] = {}
+        extra: dict[str, Passes] = {}
         regions: list[Region] = []
         noted = spent.of(self._priced(more, shape))
         # One frame of many samples is worth less than many of few: all its pixels lie
@@ -303,9 +303,9 @@ class SamePicture:
         gained: Gain,
         lacks: NDArray[np.bool_],
         more: Render,
-    ) -> dict[str, ExtraSamples]:
+    ) -> dict[str, Passes]:
         """Render more samples where a frame lacks them, up to all of the file's."""
-        extra: dict[str, ExtraSamples] = {}
+        extra: dict[str, Passes] = {}
         if not lacks.any():
             return extra
         length = self._missing(shares, gained, lacks)
@@ -327,7 +327,7 @@ class SamePicture:
     def _priced(self, more: More, shape: tuple[int, int]) -> More:
         """The same; what a call costs beside its samples is noted."""
 
-        def priced(part: Part) -> tuple[dict[str, ExtraSamples], dict[str, float]]:
+        def priced(part: Part) -> tuple[dict[str, Passes], dict[str, float]]:
             found, seconds = more(part)
             region = part.region or Region(0, 0, shape[1], shape[0])
             samples = part.length * region.width * region.height / BLOCK**2
@@ -383,7 +383,7 @@ class _Seconds:
     def of(self, more: More) -> Render:
         """The same without the seconds, which are noted here."""
 
-        def noted(part: Part) -> dict[str, ExtraSamples]:
+        def noted(part: Part) -> dict[str, Passes]:
             found, seconds = more(part)
             self.stages = self.added_to(seconds)
             return found
