@@ -317,7 +317,7 @@ def _from_depth(depth: Array) -> Array:
     return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
 
 
-def _others(file: File, found: Found) -> dict[str, Array]:
+def _others(file: File, found: Found) -> dict[str, Any]:
     """The passes that have one name alone."""
     return {
         name: _stack(file, names) if LAYOUT[name].channels else file.plane(names[0])
