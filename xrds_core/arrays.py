@@ -40,8 +40,8 @@ LARGEST_HALF = 65504.0
 _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
 
 
-def floats(x: NDArray[Any]) -> Array:
+def floats(values: NDArray[Any]) -> Array:
     """Return `x` in float32; half floats from a table, in half of NumPy's time."""
-    if x.dtype == np.float16:
-        return np.asarray(_HALVES.take(np.ascontiguousarray(x).view(np.uint16)))
-    return x.astype(np.float32, copy=False)
+    if values.dtype == np.float16:
+        return np.asarray(_HALVES.take(np.ascontiguousarray(values).view(np.uint16)))
+    return values.astype(np.float32, copy=False)

@@ -24,7 +24,7 @@ def run_python(
     is interrupted, also by `kill_all`.
     """
     environment = dict(os.environ)
-    if folders := [each for each in path if each]:  # "" is the working folder
+    if folders := [folder for folder in path if folder]:  # "" is the working folder
         environment["PYTHONPATH"] = os.pathsep.join(folders)
     command = [sys.executable, "-P", *arguments]
     with subprocess.Popen(

@@ -120,10 +120,10 @@ def _registered(folder: Path) -> Iterator[Path]:
     try:
         yield path
     finally:
-        for each in (path, link):  # the link last: it leads to what is left
-            if each in _unfinished:
-                _remove(each)
-                _unfinished.discard(each)
+        for leftover in (path, link):  # the link last: it leads to what is left
+            if leftover in _unfinished:
+                _remove(leftover)
+                _unfinished.discard(leftover)
 
 
 def _is_left(path: Path) -> bool:
@@ -239,7 +239,7 @@ def check_output(path: Path, inputs: Iterable[str | Path] = ()) -> None:
 
 def check_places(paths: Iterable[Path], inputs: Iterable[str | Path]) -> None:
     """As `check_place` of many; none may be an input, nor two the same file."""
-    read = {_identity(each) for each in inputs} - {None}
+    read = {_identity(file) for file in inputs} - {None}
     written: dict[str, Path] = {}
     for path in paths:
         check_place(path)

@@ -39,15 +39,15 @@ def rectangles(
     The rectangle that gains most by it is divided in two, as long as that leaves out
     a quarter of it, and more blocks than a `call` costs as much as.
     """
-    found = [x for x in (_bounds(blocks),) if x is not None]
-    while found and len(found) < most:
-        splits = [(_split(blocks, each), each) for each in found]
+    areas = [x for x in (_bounds(blocks),) if x is not None]
+    while areas and len(areas) < most:
+        splits = [(_split(blocks, area), area) for area in areas]
         (parts, gain), divided = max(splits, key=lambda x: x[0][1])
         if not parts or gain < max(0.25 * _blocks_in(divided), call):
             break
-        found.remove(divided)
-        found += parts
-    return found
+        areas.remove(divided)
+        areas += parts
+    return areas
 
 
 def _bounds(blocks: NDArray[np.bool_]) -> Rectangle | None:
@@ -174,13 +174,13 @@ def finish_frame(
     denoise_started = time.perf_counter()
     parts = 1 + len(areas)
     passes = _Passes.of(accumulated, light, region)
-    told = [_part(progress, number, parts) for number in range(parts)]
-    denoised = passes.denoised(denoiser, told[0])
+    callbacks = [_part(progress, number, parts) for number in range(parts)]
+    denoised = passes.denoised(denoiser, callbacks[0])
     if areas:
         alone = _filled(accumulate(own, []), accumulated)
         lacking = _Passes.of(alone, light, region, like=denoised.parts)
         mixed = denoised.radiance.copy()
-        for area, done in zip(areas, told[1:], strict=True):
+        for area, done in zip(areas, callbacks[1:], strict=True):
             single = lacking.within(area.around).denoised(denoiser, done)
             weight = share[area.place][..., None]
             pairs = [(mixed, single.radiance)]
@@ -191,12 +191,14 @@ def finish_frame(
         denoised = replace(denoised, radiance=mixed)
     names = dict.fromkeys(x.colour_name for x in light if x.colour)
     colours = {x: completed(accumulated.parts[x][region]) for x in names}
-    found = colours | added_up(denoised.radiance, denoised.parts, light, colours)
+    finished_light = colours | added_up(
+        denoised.radiance, denoised.parts, light, colours
+    )
     seconds = {
         "accumulate": denoise_started - started,
         "denoise": time.perf_counter() - denoise_started,
     }
-    return Finished(denoised, accumulated, seconds, found)
+    return Finished(denoised, accumulated, seconds, finished_light)
 
 
 def _share(accumulated: Accumulated, own: Stored) -> Array:
@@ -259,8 +261,8 @@ def _lacking(share: Array) -> list[_Area]:
     if (share == share.flat[0]).all() and float(share.flat[0]) in (0.0, 1.0):
         return []
     blocks = rectangles(block_means(np.less(share, 1.0)) > 0.0)
-    areas = [_area(each, share.shape) for each in blocks]
-    if sum(share[x.around].size for x in areas) < _PART * share.size:
+    areas = [_area(rectangle, share.shape) for rectangle in blocks]
+    if sum(share[area.around].size for area in areas) < _PART * share.size:
         return areas
     whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
     return [_Area(whole, whole, whole)]
@@ -283,10 +285,10 @@ def _filled(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
     if not holes.any():
         return alone
 
-    def fill(one: Array | None, two: Array | None) -> Array | None:
-        if one is None or two is None:
+    def fill(own: Array | None, reused: Array | None) -> Array | None:
+        if own is None or reused is None:
             return None
-        return np.where(holes if one.ndim == 2 else holes[..., None], two, one)
+        return np.where(holes if own.ndim == 2 else holes[..., None], reused, own)
 
     albedo = fill(alone.albedo, accumulated.albedo)
     normal = fill(alone.normal, accumulated.normal)

@@ -54,10 +54,10 @@ def frame_numbers(pattern: str) -> list[int]:
     [] where there are none, also of a pattern without #. Such a name may belong to a
     folder: reading it reports that.
     """
-    found = _numbered(pattern)
-    names = {name for name, _ in found}
+    numbered = _numbered(pattern)
+    names = {name for name, _ in numbered}
     return sorted(
-        n for n in {n for _, n in found} if frame_path(pattern, n).name in names
+        n for n in {n for _, n in numbered} if frame_path(pattern, n).name in names
     )
 
 

@@ -25,10 +25,10 @@ def network_devices() -> list[str]:
 
     from .superres.devices import device_name
 
-    found = [torch.device("cuda", i) for i in range(torch.cuda.device_count())]
+    devices = [torch.device("cuda", i) for i in range(torch.cuda.device_count())]
     if torch.backends.mps.is_available():
-        found.append(torch.device("mps"))
-    return ["cpu", *map(device_name, found)]
+        devices.append(torch.device("mps"))
+    return ["cpu", *map(device_name, devices)]
 
 
 def denoiser_devices() -> list[str]:

@@ -249,7 +249,7 @@ def resolve_paths(options: argparse.Namespace) -> None:
 def choice_of(options: argparse.Namespace) -> SceneChoice:
     """What of the file is rendered."""
     # `scene` is the file there
-    given = _named(options, {each.name for each in fields(SceneChoice)} - {"scene"})
+    given = _named(options, {field.name for field in fields(SceneChoice)} - {"scene"})
     return SceneChoice(options.scene_name, **given)
 
 

@@ -114,16 +114,16 @@ def _numbers(
     scene: Any, frames: Sequence[int] | None, animation: bool, output: str | None
 ) -> list[int]:
     """Numbers of the frames to render; says so where the file holds more."""
-    there = frame_range(scene)
+    whole_range = frame_range(scene)
     if chosen := frames_of(scene, frames, animation):
         if animation and output is not None:
-            picture_file.check_output(output, there)
+            picture_file.check_output(output, whole_range)
         return chosen
     current = scene.frame_current
-    if len(there) > 1 and moves_in_time(scene):
+    if len(whole_range) > 1 and moves_in_time(scene):
         warn(
-            f"frame {current} alone: the file has {in_words(there)}; -a renders them, "
-            "--frames some of them"
+            f"frame {current} alone: the file has {in_words(whole_range)}; -a renders "
+            "them, --frames some of them"
         )
     return [current]
 
@@ -135,7 +135,9 @@ def _described(last: Picture | None, request: Request) -> dict[str, Any]:
         "scale": settings.scale,
         "preset": settings.preset if settings.is_enlarged else None,
         "device": last.device if last else "",
-        "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
+        "plan": [
+            dataclasses.asdict(decision) for decision in (last.plan if last else ())
+        ],
     }
 
 

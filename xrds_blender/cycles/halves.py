@@ -75,13 +75,13 @@ def sample_halves(
             passes.append(layer.all_passes())
             clocks.append(clock)
         shares = subset.shares()
-        found = {
+        by_view = {
             view: _joined(first, parts[1][view], shares)
             for view, first in parts[0].items()
         }
         first, second = passes
-        layer.put_back(_merged(first, second, shares, found) | _light(light, found))
-    return found, seconds_of(clocks)
+        layer.put_back(_merged(first, second, shares, by_view) | _light(light, by_view))
+    return by_view, seconds_of(clocks)
 
 
 def counted(samples: Samples, part: SampleSubset, clock: StageClock) -> Samples:
@@ -148,26 +148,26 @@ def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Hal
     return Half(whole, halves)
 
 
-def _mean(one: Array, two: Array, share: Array) -> Array:
-    return np.asarray(one * share + two * (np.float32(1.0) - share))
+def _mean(first: Array, second: Array, share: Array) -> Array:
+    return np.asarray(first * share + second * (np.float32(1.0) - share))
 
 
 def _mean_length(first: Samples, second: Samples, share: Array) -> Array | None:
-    one, two = first.path_length, second.path_length
-    if one is None or two is None:
+    first_length, second_length = first.path_length, second.path_length
+    if first_length is None or second_length is None:
         return None
-    return _mean(one, two, share)
+    return _mean(first_length, second_length, share)
 
 
 def _mean_parts(first: Samples, second: Samples, share: Array) -> dict[str, Array]:
     return {k: _mean(x, second.parts[k], share) for k, x in first.parts.items()}
 
 
-def _light(parts: Sequence[LightPart], found: Mapping[str, Half]) -> _Passes:
+def _light(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Passes:
     """The passes of light: those that are divided by a colour have no plain means."""
     return {
         (view, name): pixels
-        for view, half in found.items()
+        for view, half in by_view.items()
         for name, pixels in passes_by_name(parts, half.whole.parts).items()
     }
 
@@ -176,7 +176,7 @@ def _merged(
     first: _Passes,
     second: _Passes,
     shares: tuple[float, float],
-    found: Mapping[str, Half],
+    by_view: Mapping[str, Half],
 ) -> _Passes:
     """Passes of all samples: means, but for what only a first sample writes."""
     merged = {}
@@ -184,7 +184,7 @@ def _merged(
         if is_of_first_sample(name) or (view, name) not in second:
             merged[view, name] = pixels
             continue
-        share = found[view].halves.share()[..., None]
+        share = by_view[view].halves.share()[..., None]
         if name == SAMPLE_COUNT:  # itself a share, of the most samples
             share = np.asarray(shares[0], np.float32)
         merged[view, name] = _mean(pixels, second[view, name], share)
@@ -208,7 +208,7 @@ def more_samples(
     afterwards that it had before. Raises Cancelled when the user stops it.
     """
     geometry = [] if share is None else [COUNTS]
-    found, clocks = [], []
+    rendered_parts, clocks = [], []
     with CyclesPasses(engine, depsgraph, geometry=geometry) as passes:
         whole, before = passes.region, passes.all_passes()
         region = region or Region(0, 0, whole.width, whole.height)
@@ -224,17 +224,19 @@ def more_samples(
                     place, part, is_even=share is None, light=light
                 )
                 clocks.append(clock)
-                found.append({v: _counted(x, part, clock) for v, x in rendered.items()})
+                rendered_parts.append(
+                    {v: _counted(x, part, clock) for v, x in rendered.items()}
+                )
         passes.put_back(before)
-    return found, seconds_of(clocks)
+    return rendered_parts, seconds_of(clocks)
 
 
 def _counted(
     samples: Samples, part: SampleSubset, clock: session.StageClock
 ) -> Samples:
     """With the number of each pixel's samples, even ones as well."""
-    found = counted(samples, part, clock)
-    if found.counts is not None:
-        return found
+    with_counts = counted(samples, part, clock)
+    if with_counts.counts is not None:
+        return with_counts
     counts = np.full(samples.picture.shape[:2], part.length, np.float32)
     return replace(samples, counts=counts)

@@ -96,7 +96,9 @@ class CyclesPasses(LayerSession):
         """As `beauty`, for every view by name (one without stereo)."""
         if denoise and in_process is not None:
             low = self.low_samples(scale, samples, seed=seed)
-            return {view: each.denoised(in_process) for view, each in low.items()}
+            return {
+                view: low_view.denoised(in_process) for view, low_view in low.items()
+            }
         denoise = denoise and session.has_denoiser()
         grid = self._grid(scale)
         with Borrowed() as borrowed:
@@ -157,11 +159,11 @@ class CyclesPasses(LayerSession):
             size = self.width, self.height
             is_part = region != self.region
             clock = self._run(size, region, exact=True, is_part=is_part)
-        found = {
+        samples = {
             view: read_samples(self._corner_reader(view, region), self._geometry, light)
             for view in self.views
         }
-        return found, clock
+        return samples, clock
 
     def stopped_samples(self, scale: int) -> dict[str, LowSamples]:
         """What `low_samples` has left in the result when the user stopped it."""
@@ -244,9 +246,9 @@ class CyclesPasses(LayerSession):
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             self._run_low(borrowed, grid, exact=False)
         window = grid.rendered(self._size)
-        found = [self._radiance(view, False)[..., 3:] for view in self.views]
-        found += [pixels for _, pixels in sorted(self.data_passes().items())]
-        values = [self._read_corner(pixels, window).ravel() for pixels in found]
+        pictures = [self._radiance(view, False)[..., 3:] for view in self.views]
+        pictures += [pixels for _, pixels in sorted(self.data_passes().items())]
+        values = [self._read_corner(pixels, window).ravel() for pixels in pictures]
         seconds = time.perf_counter() - started
         return Probe(np.concatenate(values), window.width, window.height, seconds)
 

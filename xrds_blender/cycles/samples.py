@@ -96,9 +96,9 @@ def sample_layer(
         subset=subset,
         is_even=is_even,
     )
-    found = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
-    live.show(next(iter(found.values())).picture)
-    return found, clock
+    by_view = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
+    live.show(next(iter(by_view.values())).picture)
+    return by_view, clock
 
 
 def samples_in(
@@ -153,9 +153,9 @@ def _read_light(read: Reader, parts: Sequence[LightPart]) -> dict[str, Array]:
     """As `light_of`."""
 
     def pixels(channels: tuple[str, ...]) -> Array:
-        found = read(channels[0].rpartition(".")[0])
-        assert found is not None
-        return found[..., :3]
+        colour = read(channels[0].rpartition(".")[0])
+        assert colour is not None
+        return colour[..., :3]
 
     return light_of(parts, pixels)
 

@@ -43,7 +43,7 @@ def can_track(scene: Any) -> bool:
     from pixel to pixel. Cameras that markers bind count, too.
     """
     bound = [m.camera for m in scene.timeline_markers if m.camera]
-    cameras = [each.data for each in (scene.camera, *bound)]
+    cameras = [camera.data for camera in (scene.camera, *bound)]
     return all(_is_tracked(data, scene.render.use_multiview) for data in cameras)
 
 

@@ -119,7 +119,7 @@ def _neighbours(
     fall = -0.5 * target.samples ** (2 / 3) / _SOFTNESS**2
     near = _nearest(target, others)
 
-    def neighbour(other: Stored) -> Aligned | Reprojected:
+    def prepare(other: Stored) -> Aligned | Reprojected:
         _check(target, other)
         if id(other) not in motions:
             return Aligned(other)
@@ -127,8 +127,8 @@ def _neighbours(
         return Reprojected(both, tile_weights(both), fall)
 
     groups: tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]] = ([], [])
-    for found in in_threads(neighbour, others, threads):
-        groups[found.other.number not in near].append(found)
+    for neighbour in in_threads(prepare, others, threads):
+        groups[neighbour.other.number not in near].append(neighbour)
     return groups
 
 

@@ -85,7 +85,8 @@ class Camera:
     def same(self, other: Camera) -> bool:
         """Whether both see the same scene point in every pixel."""
         kind, others = (
-            (each.size, each.window, each.name, each.sphere) for each in (self, other)
+            (camera.size, camera.window, camera.name, camera.sphere)
+            for camera in (self, other)
         )
         return (
             kind == others

@@ -38,22 +38,22 @@ def tile_weights(pair: Pair) -> Array:
     if pair.here.is_empty:  # there is nothing to compare
         return np.ones(tiles, np.float32)
     step = spot_stride(pair.here.shape)
-    found = compare_spots(pair, step)
-    if _is_shot_cut(pair, step, found):
+    comparison = compare_spots(pair, step)
+    if _is_shot_cut(pair, step, comparison):
         return np.zeros(tiles, np.float32)
-    return _weights(found.tiles)
+    return _weights(comparison.tiles)
 
 
-def _is_shot_cut(pair: Pair, step: int, found: Compared) -> bool:
+def _is_shot_cut(pair: Pair, step: int, comparison: Compared) -> bool:
     """Whether too few of the pixels that are in both frames match.
 
     The sky is left out if there is anything else: it looks the same in every view.
     """
     moved, followed = _moving(pair, step)
-    if found.surfaces:
-        compared, matching = found.compared_surfaces, found.matching_surfaces
+    if comparison.surfaces:
+        compared, matching = comparison.compared_surfaces, comparison.matching_surfaces
     else:
-        compared, matching = found.compared, found.matching
+        compared, matching = comparison.compared, comparison.matching
     most = compared + moved
     return most == 0 or matching + followed < _LEAST_SHARE * most
 

@@ -60,8 +60,8 @@ class Halves:
         """Return the first half's share of the samples: (H, W), or one number."""
         if self.counts is None:
             return np.asarray(self.shares[0], np.float32)
-        one, two = self.counts
-        return np.where(one > 0.0, one / np.maximum(one + two, _TINY), 0.0)
+        first, second = self.counts
+        return np.where(first > 0.0, first / np.maximum(first + second, _TINY), 0.0)
 
     def mean(self, name: str) -> Array | None:
         """Return the mean of both halves of a pass by its name."""

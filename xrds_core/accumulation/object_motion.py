@@ -106,13 +106,13 @@ class Movement:
         steps = there.number - here.number
         start = nearest(x, y, here.shape)
         flow_x, flow_y = _flow(here, start.pixel, steps)
-        found = nearest(x + flow_x, y + flow_y, there.shape)
-        back_x, back_y = _flow(there, found.pixel, -steps)
+        end = nearest(x + flow_x, y + flow_y, there.shape)
+        back_x, back_y = _flow(there, end.pixel, -steps)
         with np.errstate(invalid="ignore"):  # infinite motion is never consistent
             left = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2
-        was, near = here.inverse_depth[start.pixel], there.inverse_depth[found.pixel]
+        was, near = here.inverse_depth[start.pixel], there.inverse_depth[end.pixel]
         consistent = (left < MOVING_TOLERANCE**2) & (np.abs(near - was) < _NEARER * was)
-        consistent &= self.moving(there, frames)[found.pixel] & found.seen & start.seen
+        consistent &= self.moving(there, frames)[end.pixel] & end.seen & start.seen
         return known(x + flow_x, y + flow_y, consistent)
 
     def moving(self, frame: Stored, frames: Mapping[int, Stored]) -> Mask:
@@ -122,21 +122,21 @@ class Movement:
         end; never anything found earlier, so that parts of a shot give the same result
         as the whole. Without an adjacent camera everything is assumed to move.
         """
-        known = self._moving.setdefault(frame, {})
+        masks = self._moving.setdefault(frame, {})
         for step in (1, -1):
             beside = _beside(frame, frames, step)
             if beside is not None and frame.vector is not None:
                 steps = beside.number - frame.number
-                if steps not in known:
-                    known[steps] = _unexplained(frame, beside.camera, steps)
-                return known[steps]
+                if steps not in masks:
+                    masks[steps] = _unexplained(frame, beside.camera, steps)
+                return masks[steps]
         return np.full(frame.inverse_depth.shape, frame.vector is not None)
 
 
 def _beside(frame: Stored, frames: Mapping[int, Stored], step: int) -> Stored | None:
     """Return the nearest of `frames` after a frame, or before it (`step` -1)."""
-    there = [n for n in frames if (n - frame.number) * step > 0]
-    return frames[min(there, key=lambda n: n * step)] if there else None
+    numbers = [n for n in frames if (n - frame.number) * step > 0]
+    return frames[min(numbers, key=lambda n: n * step)] if numbers else None
 
 
 def _unexplained(frame: Stored, beside: Camera, steps: int) -> Mask:

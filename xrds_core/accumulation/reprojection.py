@@ -409,13 +409,13 @@ def reprojected_placeholder(
     first = beside[0]
     nearer = np.minimum if camera.orthographic else np.maximum
     near = np.full(first.inverse_depth.shape, np.inf if camera.orthographic else -1.0)
-    for each in beside:
-        own = grid(each.shape)
-        transform = reprojection(each.camera, camera)
-        x, y, reprojected = reproject(transform, own.x, own.y, each.inverse_depth)
-        found = nearest(x, y, first.shape)
-        lies = found.seen & np.isfinite(reprojected)
-        nearer.at(near, found.pixel[lies], reprojected[lies])
+    for frame in beside:
+        own = grid(frame.shape)
+        transform = reprojection(frame.camera, camera)
+        x, y, reprojected = reproject(transform, own.x, own.y, frame.inverse_depth)
+        places = nearest(x, y, first.shape)
+        is_seen = places.seen & np.isfinite(reprojected)
+        nearer.at(near, places.pixel[is_seen], reprojected[is_seen])
     near[~np.isfinite(near) | (near < 0.0)] = np.nan
     # pixels stretch where the camera comes nearer: adjacent pixels fill the gaps
     around = extreme(near.reshape(first.shape).astype(np.float32), np.fmax).ravel()

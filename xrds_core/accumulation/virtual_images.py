@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from .frame import Stored
     from .reprojection import Pair
 
-    Each = Callable[[Callable[[Pair], Array], Sequence[Pair]], Iterable[Array]]
+    Apply = Callable[[Callable[[Pair], Array], Sequence[Pair]], Iterable[Array]]
 
 
 # Depths, from the surface (0) to the length of the path (1), which is a little too
@@ -66,11 +66,11 @@ class Images:
         assert self.frame.image is not None
         pixels = np.flatnonzero(~np.isnan(self.frame.image))
         row, column = np.divmod(pixels, self.frame.shape[1])
-        found = self.lattice[row // self.stride, column // self.stride]
-        shows = ~np.isnan(found[:, 0])
-        pixels, found = pixels[shows], found[shows]
+        images = self.lattice[row // self.stride, column // self.stride]
+        shows = ~np.isnan(images[:, 0])
+        pixels, images = pixels[shows], images[shows]
         spots = Grid(pixels, *centres(pixels, self.frame.shape[1]))
-        return spots, _depth_of(self.frame, spots, found[:, 0]), found[:, 1:]
+        return spots, _depth_of(self.frame, spots, images[:, 0]), images[:, 1:]
 
     def positions(self, pair: Pair) -> tuple[NDArray[np.intp], Array, Array]:
         """Return pixels (n,), flat and ascending, and where their images were in the
@@ -87,7 +87,7 @@ def reach(shape: tuple[int, int]) -> int:
 
 
 def find_images(
-    target: Stored, pairs: Sequence[Pair], each: Each = map
+    target: Stored, pairs: Sequence[Pair], apply: Apply = map
 ) -> Images | None:
     """Return the images that `target` shows; None where it shows none.
 
@@ -97,7 +97,7 @@ def find_images(
     if target.image is None or not pairs:
         return None
     stride = spot_stride(target.shape)
-    lattice = _Sweep(target, pairs, stride, each).images()
+    lattice = _Sweep(target, pairs, stride, apply).images()
     return None if np.isnan(lattice[..., 0]).all() else Images(target, stride, lattice)
 
 
@@ -105,10 +105,10 @@ class _Sweep:
     """Tries candidates at the spots of a lattice, and keeps the best of each."""
 
     def __init__(
-        self, target: Stored, pairs: Sequence[Pair], stride: int, each: Each
+        self, target: Stored, pairs: Sequence[Pair], stride: int, apply: Apply
     ) -> None:
         assert target.image is not None
-        self._target, self._pairs, self._each = target, pairs, each
+        self._target, self._pairs, self._each = target, pairs, apply
         height, width = target.shape
         half = stride // 2
         self._shape = -(-height // stride), -(-width // stride)
@@ -139,8 +139,8 @@ class _Sweep:
                 if x or y:
                     self._try(images, centre, (0.0, x, y), _SURE_IF_MOVED)
         lattice = np.full((self._shape[0] * self._shape[1], 3), np.nan, np.float32)
-        found = images.cost < limit
-        lattice[self._at[found]] = images.candidates[found]
+        is_better = images.cost < limit
+        lattice[self._at[is_better]] = images.candidates[is_better]
         return _filled(lattice.reshape(*self._shape, 3))
 
     def _try(
@@ -166,12 +166,12 @@ class _Sweep:
         depth = _depth_of(self._target, self._spots, candidate[:, 0])
 
         def compare(pair: Pair) -> Array:
-            place = _positions(pair, self._spots, depth, candidate[:, 1:])
-            found = nearest(*place, pair.there.shape)
-            apart = _guides(pair.there, found.pixel, pair.turn) - self._own
-            seen = found.seen.astype(np.float32)
+            positions = _positions(pair, self._spots, depth, candidate[:, 1:])
+            places = nearest(*positions, pair.there.shape)
+            apart = _guides(pair.there, places.pixel, pair.turn) - self._own
+            seen = places.seen.astype(np.float32)
             if pair.there.invalid is not None:
-                seen[pair.there.invalid.take(found.pixel)] = 0.0
+                seen[pair.there.invalid.take(places.pixel)] = 0.0
             return np.stack([np.einsum("ij,ij->i", apart, apart) * seen, seen])
 
         error, seen = np.sum(list(self._each(compare, self._pairs)), axis=0)

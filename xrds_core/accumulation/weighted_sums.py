@@ -258,14 +258,14 @@ def find_spots(pair: Pair, step: int) -> Spots:
 def compare_spots(pair: Pair, step: int) -> Compared:
     """Compare every `step`th pixel that neither moves nor is invalid, tile by tile."""
     call = _spot_call(pair)
-    found = _spots(call, pair, step)
+    spots = _spots(call, pair, step)
     tiles = np.zeros((4, *tile_grid(pair.here.shape)))
     counts = np.zeros(5, np.int64)
     library().compare_spots(
         call.target,
         call.target.all[0],
         step,
-        *(x.ctypes.data for x in (found.pixel, found.seen, found.in_frame)),
+        *(x.ctypes.data for x in (spots.pixel, spots.seen, spots.in_frame)),
         *(x.ctypes.data for x in (tiles, counts)),
     )
     return Compared(tiles, *counts.tolist())
@@ -358,23 +358,23 @@ class _Call:
         return result
 
     def _neighbour(
-        self, found: Aligned | Reprojected, group: int
+        self, neighbour: Aligned | Reprojected, group: int
     ) -> structures.Neighbour:
-        if isinstance(found, Aligned):
+        if isinstance(neighbour, Aligned):
             result = structures.Neighbour(aligned=True)
-            result.frame = self._frame(found.other, False)
+            result.frame = self._frame(neighbour.other, False)
             result.turn[:] = np.eye(3).ravel().tolist()
         else:
-            pair = found.pair
+            pair = neighbour.pair
             result = self._reprojected(pair)
             self._moving(result, pair)
-            result.fall, result.most = found.fall, found.tiles.max()
+            result.fall, result.most = neighbour.fall, neighbour.tiles.max()
             at_rims = _AT_RIMS if pair.leads else _AT_RIMS_OF_FEW
-            result.at_rims = -at_rims / found.fall if found.fall else 0.0
-            result.tile_rows, result.tile_columns = found.tiles.shape
-            if not (found.tiles == 1.0).all():
+            result.at_rims = -at_rims / neighbour.fall if neighbour.fall else 0.0
+            result.tile_rows, result.tile_columns = neighbour.tiles.shape
+            if not (neighbour.tiles == 1.0).all():
                 result.tiles = self._arrays.at(
-                    found.tiles, np.float32, found.tiles.size
+                    neighbour.tiles, np.float32, neighbour.tiles.size
                 )
             if self._work.images is not None:
                 result.images = self._places(*self._work.images.positions(pair))
@@ -385,8 +385,8 @@ class _Call:
         motion = pair.object_motion
         if motion is None:
             return
-        there = len(pair.there.picture)
-        result.moving = self._arrays.at(motion.moving, np.bool_, there)
+        count = len(pair.there.picture)
+        result.moving = self._arrays.at(motion.moving, np.bool_, count)
         result.moved = self._places(motion.pixels, motion.x, motion.y)
 
     def _places(
@@ -411,7 +411,7 @@ class _Call:
         (height, width), at = frame.shape, self._arrays.at
         count = height * width
         channels = frame.picture.shape[1]
-        found = structures.Frame(
+        structure = structures.Frame(
             picture=at(frame.picture, np.float16, count * channels),
             depth=at(frame.inverse_depth, np.float32, count),
             counts=at(frame.counts, np.float16, count),
@@ -423,10 +423,10 @@ class _Call:
             samples=frame.samples,
         )
         if frame.noise is not None:
-            found.noise = at(frame.noise.light, np.float16, 2 * count)
+            structure.noise = at(frame.noise.light, np.float16, 2 * count)
         if is_reprojected:
-            found.rims = at(frame.rims, np.uint8, count)
-        return found
+            structure.rims = at(frame.rims, np.uint8, count)
+        return structure
 
     def _parts(self, frame: Stored) -> Any:
         parts = [frame.parts[name] for name in self._work.lit]

@@ -231,17 +231,17 @@ class Denoiser:
         if self._device is None:
             raise UsageError("this denoiser is closed; make another one")
         work = Progress(progress)
-        found = {"albedo": albedo, "normal": normal}
+        guides = {"albedo": albedo, "normal": normal}
         with self._lock, oidn_device.explained(self.device, albedo.shape):
             work.report(0.0)
-            for name, guide in found.items():
-                work.begin_stage(1 / len(found))
+            for name, guide in guides.items():
+                work.begin_stage(1 / len(guides))
                 if not self._is_clean(name, guide):
                     held = np.clip(guide, *_RANGE[name])
                     quiet = self._prefilter(name, held, name, work)
-                    found[name] = quiet.astype(np.float32)
+                    guides[name] = quiet.astype(np.float32)
             work.report(1.0)
-        return found["albedo"], found["normal"]
+        return guides["albedo"], guides["normal"]
 
     def _to_prefilter(
         self, pictures: Pictures, are_clean: bool | None

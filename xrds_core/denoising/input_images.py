@@ -68,7 +68,9 @@ def check(
     filled = {name: fill_holes(guide) for name, guide in guides.items()}
     clean = {name: clean_radiance(part) for name, part in lights.items()}
     bad_pixels += holes + sum(n for _, n in (*filled.values(), *clean.values()))
-    held, made_of = ({k: x for k, (x, _) in each.items()} for each in (filled, clean))
+    held, made_of = (
+        {k: x for k, (x, _) in images.items()} for images in (filled, clean)
+    )
     return Pictures(light, alpha, held, made_of, bad_pixels)
 
 

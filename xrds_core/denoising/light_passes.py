@@ -60,10 +60,10 @@ def _shipped() -> tuple[Renderer, ...]:
 
 def _read(path: Path) -> tuple[Renderer, ...]:
     try:
-        found = tomllib.loads(path.read_text("utf-8"))
+        renderers = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UsageError(f"cannot read the passes in {path}: {error}") from error
-    return tuple(_renderer(path, name, each) for name, each in found.items())
+    return tuple(_renderer(path, name, table) for name, table in renderers.items())
 
 
 def _renderer(path: Path, name: str, given: Any) -> Renderer:
@@ -74,7 +74,7 @@ def _renderer(path: Path, name: str, given: Any) -> Renderer:
         raise UsageError(f"{where} lobes: give a list of tables")
     return Renderer(
         name,
-        tuple(_lobe(where, each) for each in lobes),
+        tuple(_lobe(where, lobe) for lobe in lobes),
         _texts(f"{where} groups", given.get("groups", [])),
         _texts(f"{where} alone", given.get("alone", [])),
     )
@@ -150,36 +150,40 @@ def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPar
     if not wanted:
         return ()
     passes = _passes(channels, layer)
-    known = max((_of(x, passes) for x in wanted.renderers), key=len)
+    known = max((_parts_written_by(x, passes) for x in wanted.renderers), key=len)
     named = {name: part for part in known for name in part.names}
-    found: list[LightPart] = []
+    parts: list[LightPart] = []
     for which in wanted.which:
         if which == GROUPS:
-            found += [part for part in known if part.sum == GROUPS]
+            parts += [part for part in known if part.sum == GROUPS]
         elif which == ALL:
-            found += known
+            parts += known
         elif which != NONE:
-            found.append(_named(channels, which, named, known))
+            parts.append(_find_part(channels, which, named, known))
     for name in wanted.alone:
         if name not in passes:
             raise _unknown(channels, name, passes)
-        found.append(LightPart(name, passes[name], names=(name,)))
-    return tuple({part.channels: part for part in found}.values())
+        parts.append(LightPart(name, passes[name], names=(name,)))
+    return tuple({part.channels: part for part in parts}.values())
 
 
 def _passes(channels: Channels, layer: str) -> dict[str, tuple[str, ...]]:
     """The channels of all colours in a layer, or in none, by the passes' names."""
     ahead = f"{layer}." if layer else ""
     prefixes = sorted({name.rpartition(".")[0] for name in channels.names})
-    found = ((prefix, channels.of(prefix, ("RGB", "rgb"))) for prefix in prefixes)
+    channels_by_prefix = (
+        (prefix, channels.of(prefix, ("RGB", "rgb"))) for prefix in prefixes
+    )
     return {
         prefix.removeprefix(ahead): tuple(names)
-        for prefix, names in found
+        for prefix, names in channels_by_prefix
         if names and prefix and (prefix.startswith(ahead) or "." not in prefix)
     }
 
 
-def _of(renderer: Renderer, passes: dict[str, tuple[str, ...]]) -> list[LightPart]:
+def _parts_written_by(
+    renderer: Renderer, passes: dict[str, tuple[str, ...]]
+) -> list[LightPart]:
     """The parts that a renderer would have written."""
     parts = []
     for lobe in renderer.lobes:
@@ -207,7 +211,7 @@ def _short(name: str, pattern: str) -> str:
     return name.removeprefix(pattern.rstrip("*"))
 
 
-def _named(
+def _find_part(
     channels: Channels,
     name: str,
     named: dict[str, LightPart],
@@ -221,8 +225,8 @@ def _named(
 
 
 def _unknown(channels: Channels, name: str, known: Collection[str]) -> UsageError:
-    there = ", ".join(sorted(known)) or "none"
-    return UsageError(f"{channels.path} has no light {name!r}; it holds {there}")
+    names = ", ".join(sorted(known)) or "none"
+    return UsageError(f"{channels.path} has no light {name!r}; it holds {names}")
 
 
 def light_of(
@@ -251,20 +255,20 @@ def passes_of(
 
     `light` is as `light_of` returns it.
     """
-    found: dict[tuple[str, ...], Array] = {}
+    passes: dict[tuple[str, ...], Array] = {}
     for part in parts:
         pixels = light[part.name]
         if part.colour:
-            colour = found[part.colour] = light[part.colour_name]
+            colour = passes[part.colour] = light[part.colour_name]
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 pixels = np.where(colour > 0.0, pixels / colour, np.float32(0.0))
-        found[part.channels] = pixels
-    return found
+        passes[part.channels] = pixels
+    return passes
 
 
 def passes_by_name(
     parts: Sequence[LightPart], light: Mapping[str, Array]
 ) -> dict[str, Array]:
     """Return as `passes_of`, by the names of the passes."""
-    found = passes_of(parts, light)
-    return {channels[0].rpartition(".")[0]: x for channels, x in found.items()}
+    passes = passes_of(parts, light)
+    return {channels[0].rpartition(".")[0]: x for channels, x in passes.items()}

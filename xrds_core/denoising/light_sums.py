@@ -31,24 +31,24 @@ def add_up(
     light there, others take it. A part that is dark everywhere stays so.
     """
     lit = [name for name, part in parts.items() if part.any()] or list(parts)
-    found = dict(parts) | {name: np.empty_like(parts[name]) for name in lit}
+    result = dict(parts) | {name: np.empty_like(parts[name]) for name in lit}
     for first in range(0, len(picture), _ROWS):
         rows = slice(first, first + _ROWS)
         whole = np.maximum(picture[rows], np.float32(0.0))
-        held = {name: _held(parts[name][rows]) for name in lit}
-        can = {name: _can(name, rows, masks or {}) for name in lit}
-        weights = {k: (np.square(x) + _TINY) * can[k] for k, x in held.items()}
+        light = {name: _finite_light(parts[name][rows]) for name in lit}
+        allowed = {name: _allowed_light(name, rows, masks or {}) for name in lit}
+        weights = {k: (np.square(x) + _TINY) * allowed[k] for k, x in light.items()}
         total = np.maximum(sum(weights.values()), _TINY * _TINY)
-        rest = (whole - sum(held[k] * can[k] for k in held)) / total
-        for name, part in held.items():
-            shared = part * can[name] + rest * weights[name]
-            held[name] = np.maximum(shared, np.float32(0.0))
-        made = sum(held.values())
+        rest = (whole - sum(light[k] * allowed[k] for k in light)) / total
+        for name, part in light.items():
+            shared = part * allowed[name] + rest * weights[name]
+            light[name] = np.maximum(shared, np.float32(0.0))
+        made = sum(light.values())
         scale = whole / np.maximum(made, _TINY * _TINY)
-        for name, part in held.items():
+        for name, part in light.items():
             by_weight = whole * (weights[name] / total)
-            found[name][rows] = np.where(made > 0.0, part * scale, by_weight)
-    return found
+            result[name][rows] = np.where(made > 0.0, part * scale, by_weight)
+    return result
 
 
 def completed(colour: Array) -> Array:
@@ -64,11 +64,13 @@ def completed(colour: Array) -> Array:
     return np.where(known > 0.0, known, around)
 
 
-def _held(part: Array) -> Array:
+def _finite_light(part: Array) -> Array:
     return np.maximum(np.nan_to_num(part, posinf=0.0), np.float32(0.0))
 
 
-def _can(name: str, rows: slice, masks: Mapping[str, Array]) -> Array | np.float32:
+def _allowed_light(
+    name: str, rows: slice, masks: Mapping[str, Array]
+) -> Array | np.float32:
     """Where a part can have light: 1, elsewhere 0."""
     if name not in masks:
         return np.float32(1.0)
@@ -90,16 +92,16 @@ def light_in(
     Where those of one sum do not make up the radiance, what they miss is one more; or
     where it is among the names that the result is to be `like`.
     """
-    found = {part.name: light[part.name] for part in parts}
-    if radiance is None or not found:
-        return found
+    light_by_name = {part.name: light[part.name] for part in parts}
+    if radiance is None or not light_by_name:
+        return light_by_name
     least = _ALL * float(np.nan_to_num(radiance).mean())
     for name, members in _sums(parts).items():
-        missing = radiance - sum(found[part.name] for part in members)
+        missing = radiance - sum(light_by_name[part.name] for part in members)
         is_much = float(np.nan_to_num(np.abs(missing)).mean()) > least
         if is_much if like is None else _rest(name) in like:
-            found[_rest(name)] = np.maximum(missing, np.float32(0.0))
-    return found
+            light_by_name[_rest(name)] = np.maximum(missing, np.float32(0.0))
+    return light_by_name
 
 
 def added_up(
@@ -112,7 +114,7 @@ def added_up(
 
     `colours` (H, W, 3) are those that parts are divided by, by name.
     """
-    found = {part.name: denoised[part.name] for part in parts}
+    light_by_name = {part.name: denoised[part.name] for part in parts}
     for name, members in _sums(parts).items():
         sums = {part.name: denoised[part.name] for part in members}
         if _rest(name) in denoised:
@@ -120,8 +122,8 @@ def added_up(
         masks = {
             part.name: colours[part.colour_name] for part in members if part.colour
         }
-        found |= add_up(picture[..., :3], sums, masks)
-    return {part.name: found[part.name] for part in parts}
+        light_by_name |= add_up(picture[..., :3], sums, masks)
+    return {part.name: light_by_name[part.name] for part in parts}
 
 
 def _sums(parts: Sequence[LightPart]) -> dict[str, list[LightPart]]:

@@ -33,8 +33,8 @@ def load() -> ModuleType:
 
 def devices() -> list[str]:
     """Return the devices that are here, the fastest first; raises as `load`."""
-    found = (device.type.name.lower() for device in load().physical_devices())
-    return [name for name in dict.fromkeys(found) if name in DEVICES]
+    names = (device.type.name.lower() for device in load().physical_devices())
+    return [name for name in dict.fromkeys(names) if name in DEVICES]
 
 
 def open_device(name: str, threads: int) -> Any:

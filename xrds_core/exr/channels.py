@@ -59,8 +59,8 @@ class Channels:
     def of(self, prefix: str, letters: Sequence[str] = COMPONENTS) -> list[str]:
         """Return the channels of a pass, the first of `letters` that are all there."""
         dotted = f"{prefix}." if prefix else ""
-        for each in letters:
-            names = [dotted + letter for letter in each]
+        for components in letters:
+            names = [dotted + letter for letter in components]
             if all(name in self.names for name in names):
                 return names
         return []
@@ -98,22 +98,26 @@ def by_view(
     views = _views(parts, places)
     if len(views) < 2:
         return {"": dict(places)}
-    found: dict[str, dict[str, Any]] = {view: {} for view in views}
+    by_name: dict[str, dict[str, Any]] = {view: {} for view in views}
     for name, place in places.items():
         *layers, letter = name.split(".")
-        named = [x for x in layers if x in found]
+        named = [x for x in layers if x in by_name]
         if named:
             del layers[len(layers) - 1 - layers[::-1].index(named[-1])]
-            found[named[-1]][".".join((*layers, letter))] = place
+            by_name[named[-1]][".".join((*layers, letter))] = place
         else:
-            found[views[0]].setdefault(name, place)
-    return {view: channels for view, channels in found.items() if channels} or {"": {}}
+            by_name[views[0]].setdefault(name, place)
+    return {view: channels for view, channels in by_name.items() if channels} or {
+        "": {}
+    }
 
 
 def _views(parts: Sequence[Part], names: Mapping[str, Any]) -> list[str]:
-    for told in (part.attributes.get(VIEWS) for part in parts):
-        if isinstance(told, list) and all(x and isinstance(x, str) for x in told):
-            return list(dict.fromkeys(told))
+    for declared in (part.attributes.get(VIEWS) for part in parts):
+        if isinstance(declared, list) and all(
+            x and isinstance(x, str) for x in declared
+        ):
+            return list(dict.fromkeys(declared))
     of_parts = [part.attributes.get("view") for part in parts]
     views = list(dict.fromkeys(x for x in of_parts if isinstance(x, str)))
     if views:

@@ -159,18 +159,18 @@ def copy(
     Raises PictureError.
     """
     limit = limit_of(check_input(Path(source)))
-    told = dict(metadata or {})
+    added = dict(metadata or {})
     if not _is_shadowed():
-        _copy(source, path, planes, alone, window, told, limit)
+        _copy(source, path, planes, alone, window, added, limit)
         return
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         unread = ((0, 0), (0, 0))  # the source has them
         options: Attributes = {"source": os.fspath(source), "alone": alone}
-        options |= {"window": window, "metadata": told}
+        options |= {"window": window, "metadata": added}
         parts = [
-            Part("", unread, unread, dict(each), options | {"part": number})
-            for number, each in planes.items()
+            Part("", unread, unread, dict(channels), options | {"part": number})
+            for number, channels in planes.items()
         ]
         _pack(archive, parts)
         _apart("copy", path, archive, str(limit))
@@ -203,13 +203,13 @@ def _library() -> Any:
 def _read(path: str | Path, limit: int) -> list[Part]:
     parts = _opened(path, limit).parts
     return [
-        _part(each, {name: x.pixels for name, x in each.channels.items()})
-        for each in parts
+        _part(part, {name: channel.pixels for name, channel in part.channels.items()})
+        for part in parts
     ]
 
 
 def _read_headers(path: str | Path) -> list[Part]:
-    return [_part(each, {}) for each in _whole_headers(path)]
+    return [_part(part, {}) for part in _whole_headers(path)]
 
 
 def _whole_headers(path: str | Path) -> Any:
@@ -233,8 +233,8 @@ def _part(part: Any, channels: dict[str, Pixels]) -> Part:
 
 def _headers(path: str | Path, limit: float = math.inf) -> Any:
     openexr = _library()
-    with readable(path) as there:
-        headers = openexr.File(str(there), header_only=True).parts
+    with readable(path) as readable_path:
+        headers = openexr.File(str(readable_path), header_only=True).parts
     check_claims(path, [part.header for part in headers], limit)
     return headers
 
@@ -246,8 +246,8 @@ def _opened(path: str | Path, limit: int) -> Any:
         # OpenEXR leaves out a part that it cannot read and says why on stdout
         with _silent_library(), redirect_stdout(StringIO()) as output:
             headers = _headers(path, limit)
-            with readable(path) as there:
-                file = openexr.File(str(there), separate_channels=True)
+            with readable(path) as readable_path:
+                file = openexr.File(str(readable_path), separate_channels=True)
     except _FAULTS as error:
         raise _incomplete(path, error) from error
     if not file.parts or len(file.parts) != len(headers):
@@ -376,7 +376,7 @@ def _copy(
 ) -> None:
     openexr = _library()
     if alone:
-        ((number, only),) = planes.items()
+        ((number, new_channels),) = planes.items()
         whole = _whole_headers(source)[number].header
         header = {k: v for k, v in whole.items() if k not in _OF_CHANNELS}
         header["compression"] = _lossless(header["compression"])
@@ -385,13 +385,13 @@ def _copy(
             header["dataWindow"] = _corners(window)
         header |= metadata
         channels: dict[str, Any] = {}
-        _put(channels, only)
+        _set_channels(channels, new_channels)
     else:
         file = _opened(source, limit)
         if window is not None:
             _crop(file.parts, window)
-        for number, each in planes.items():
-            _put(file.parts[number].channels, each)
+        for number, new_channels in planes.items():
+            _set_channels(file.parts[number].channels, new_channels)
             file.parts[number].header |= metadata
     try:
         if alone:
@@ -430,7 +430,7 @@ def _corners(window: Window) -> tuple[Any, Any]:
     return first, last
 
 
-def _put(channels: dict[str, Any], planes: Mapping[str, Pixels]) -> None:
+def _set_channels(channels: dict[str, Any], planes: Mapping[str, Pixels]) -> None:
     """Replace or add channels of a part."""
     openexr = _library()
     for name, pixels in planes.items():

@@ -175,10 +175,17 @@ def readable(path: str | Path) -> Iterator[Path]:
 
 def restore(source: str | Path, path: str | Path) -> None:
     """Give a file that was made of a `source` its names and kinds of attributes."""
-    heads = {x.veiled: x.head for x in _refused(source)}
+    heads = {attribute.veiled: attribute.head for attribute in _refused(source)}
     if heads:
-        found = attributes_in(_beginning(path))
-        _patch(path, {x.place: heads[x.head] for x in found if x.head in heads})
+        attributes = attributes_in(_beginning(path))
+        _patch(
+            path,
+            {
+                attribute.place: heads[attribute.head]
+                for attribute in attributes
+                if attribute.head in heads
+            },
+        )
 
 
 def _refused(path: str | Path) -> list[Attribute]:

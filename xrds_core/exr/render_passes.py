@@ -122,13 +122,13 @@ def copy_picture(
     is written. Raises PictureError as `write_picture`.
     """
     planes = {
-        part: {k: np.ascontiguousarray(v, np.float32) for k, v in each.items()}
-        for part, each in channels.items()
+        part: {k: np.ascontiguousarray(v, np.float32) for k, v in pixels.items()}
+        for part, pixels in channels.items()
     }
     with _whole(path) as unfinished:
-        told = dict(metadata or {})
+        added = dict(metadata or {})
         openexr_io.copy(
-            source, unfinished, planes, alone=alone, window=window, metadata=told
+            source, unfinished, planes, alone=alone, window=window, metadata=added
         )
         check()
 
@@ -177,13 +177,13 @@ class File:
 
     def views(self) -> list[File]:
         """Return the same file for each of its views, with its channels alone."""
-        found: list[File] = []
+        views: list[File] = []
         for view, places in by_view(self.parts, self._places).items():
-            each = copy(self)
-            each._places, each.names = places, Channels(self.path, places)
-            each.view, each.is_first = view, not found
-            found.append(each)
-        return found
+            file = copy(self)
+            file._places, file.names = places, Channels(self.path, places)
+            file.view, file.is_first = view, not views
+            views.append(file)
+        return views
 
     def _add(self, name: str, path: Path) -> None:
         parts = openexr_io.read(path)

@@ -153,16 +153,16 @@ def _objects(platform: str, work: Path) -> dict[Path, list[str]]:
     windows = target.startswith("x86_64-windows")
     base = ["-target", target, *_FLAGS, *([] if windows else ["-fPIC"])]
     levels = _LEVELS if target.startswith("x86_64") else {"v1": ""}
-    found = {}
+    arguments = {}
     for level, processor in levels.items():
         named = [f"-DNAME(x)=x##_{level}", *_processor(processor)]
-        found[f"kernels_{level}"] = ["kernels.c", *named]
-    found["dispatch"] = ["dispatch.c", *_processor(levels["v1"])]
+        arguments[f"kernels_{level}"] = ["kernels.c", *named]
+    arguments["dispatch"] = ["dispatch.c", *_processor(levels["v1"])]
     if windows:
-        found["windows"] = ["windows.c", *_processor(levels["v1"])]
+        arguments["windows"] = ["windows.c", *_processor(levels["v1"])]
     return {
         work / f"{platform}-{name}.o": [*base, *words, str(HERE / source)]
-        for name, (source, *words) in found.items()
+        for name, (source, *words) in arguments.items()
     }
 
 

@@ -86,21 +86,21 @@ def library() -> CDLL:
     path = FOLDER / file_name()
     try:
         _check_length(path)
-        found = CDLL(str(path))
+        compiled = CDLL(str(path))
     except OSError as error:
         raise LibraryError(
             f"the compiled library {path} cannot be loaded ({error}): install XRDS "
             "again, or in a checkout run make native"
         ) from error
     for name, (result, arguments) in _FUNCTIONS.items():
-        function = getattr(found, name, None)
+        function = getattr(compiled, name, None)
         if function is None:
             raise LibraryError(_other_version(path))
         function.restype, function.argtypes = result, arguments
-    sizes = [found.struct_size(number) for number in range(len(IN_ORDER))]
-    if sizes != [sizeof(each) for each in IN_ORDER]:
+    sizes = [compiled.struct_size(number) for number in range(len(IN_ORDER))]
+    if sizes != [sizeof(structure) for structure in IN_ORDER]:
         raise LibraryError(_other_version(path))
-    return found
+    return compiled
 
 
 def _check_length(path: Path) -> None:

@@ -63,8 +63,8 @@ def error_ratio(
     ratio is infinite where noise hides the error of all samples.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
-        ours, one = _errors(picture, noisy, parts, exposure)
-        return Ratio(*_ratio(ours, one * share**FALL))
+        errors, part_errors = _errors(picture, noisy, parts, exposure)
+        return Ratio(*_ratio(errors, part_errors * share**FALL))
 
 
 def _errors(
@@ -75,8 +75,8 @@ def _errors(
     An error by two noisy renders has the product of their noises in it. So the
     picture's is that of a part, and their difference by one render.
     """
-    one, two = parts
-    shown = (picture + one.denoised + two.denoised) / 3
+    first_part, second_part = parts
+    shown = (picture + first_part.denoised + second_part.denoised) / 3
     dark = max(float(np.nan_to_num(luminance(shown)).mean()) * _DARKEST, _TINY)
     light = [box(np.nan_to_num(shown[..., i]), _SEEN) for i in range(3)]
     bright = np.maximum(np.stack(light, axis=-1), 0.0) + np.float32(dark)
@@ -84,13 +84,18 @@ def _errors(
     scale = np.nan_to_num(1.0 / (bright * pressed**2), posinf=0.0)
 
     def product(first: Array, second: Array) -> Array:
-        found = (first * second * scale).mean(-1)
-        return block_means(np.nan_to_num(found, posinf=0.0, neginf=0.0))
+        products = (first * second * scale).mean(-1)
+        return block_means(np.nan_to_num(products, posinf=0.0, neginf=0.0))
 
-    noise = product(one.noisy - two.noisy, one.noisy - two.noisy)
+    noise = product(
+        first_part.noisy - second_part.noisy, first_part.noisy - second_part.noisy
+    )
     kept = noise <= np.quantile(noise, 1.0 - _NOISIEST)
     half, more = np.zeros((2, *noise.shape))
-    for made, other in ((one.denoised, two.noisy), (two.denoised, one.noisy)):
+    for made, other in (
+        (first_part.denoised, second_part.noisy),
+        (second_part.denoised, first_part.noisy),
+    ):
         apart = made - other
         half += product(apart, made - noisy)
         # the difference of two squares: noise counts once in it, and little
@@ -100,14 +105,14 @@ def _errors(
     return half + more, half
 
 
-def _ratio(one: Array, two: Array) -> tuple[float, float]:
+def _ratio(errors: Array, reference: Array) -> tuple[float, float]:
     """Return the ratio of two sums over blocks, and its standard error."""
-    whole = float(two.sum())
-    if whole <= 2.0 * _spread(two):
+    whole = float(reference.sum())
+    if whole <= 2.0 * _spread(reference):
         return float("inf"), 0.0
-    ratio = max(float(one.sum()), 0.0) / whole
+    ratio = max(float(errors.sum()), 0.0) / whole
     # blocks that are hard to render are so both ways: what is left counts
-    return ratio, _spread(one - ratio * two) / whole
+    return ratio, _spread(errors - ratio * reference) / whole
 
 
 def _spread(errors: Array) -> float:

@@ -62,7 +62,7 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
     samples which the frame had: the mean root of more samples is larger, and would be
     other light beside frames that have fewer.
     """
-    found = with_extra(alone, alone, extra)
+    combined = with_extra(alone, alone, extra)
     rows = _rows(extra.samples)
     width = frame.shape[1]
     place = slice(rows.start * width, rows.stop * width)
@@ -71,11 +71,11 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
     if frame.invalid is not None:
         invalid |= frame.invalid
     light, alpha = (
-        None if x is None else x[rows] for x in (found.radiance, found.alpha)
+        None if x is None else x[rows] for x in (combined.radiance, combined.alpha)
     )
-    guides = found.albedo[rows], found.normal[rows]
+    guides = combined.albedo[rows], combined.normal[rows]
     picture[place], invalid[place] = pack(light, *guides, alpha)
-    total = found.samples
+    total = combined.samples
     is_even = bool((total == total.flat[0]).all())
     noise = frame.noise
     if noise is not None:
@@ -88,7 +88,7 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=noise,
-        parts=pack_parts(found.parts),
+        parts=pack_parts(combined.parts),
     )
 
 
@@ -117,27 +117,31 @@ def with_extra(
         whole = values[0]
         wide = (...,) + (None,) * (whole.ndim - 2)
         mixed = np.zeros_like(whole[rows])
-        for each, share in zip(values, shares, strict=True):
+        for plane, share in zip(values, shares, strict=True):
             if share.any():
                 # NaN where there are no samples
-                mixed += np.where(share[wide] > 0.0, each[rows], 0.0) * share[wide]
+                mixed += np.where(share[wide] > 0.0, plane[rows], 0.0) * share[wide]
         return _with_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
 
-    def of(name: str) -> Array | None:
+    def mean_pass(name: str) -> Array | None:
         whole = getattr(frame, name)
-        return None if whole is None else mean(whole, *(getattr(x, name) for x in rest))
+        return (
+            None
+            if whole is None
+            else mean(whole, *(getattr(samples, name) for samples in others))
+        )
 
-    rest = alone, extra
-    albedo, normal = of("albedo"), of("normal")
+    others = alone, extra
+    albedo, normal = mean_pass("albedo"), mean_pass("normal")
     assert albedo is not None
     assert normal is not None
     counted = np.where(usable, total, frame.samples[rows])
     return replace(
         frame,
-        radiance=of("radiance"),
+        radiance=mean_pass("radiance"),
         albedo=albedo,
         normal=normal,
-        alpha=of("alpha"),
+        alpha=mean_pass("alpha"),
         parts={
             name: mean(part, alone.parts[name], extra.parts[name])
             for name, part in frame.parts.items()
@@ -148,11 +152,11 @@ def with_extra(
 
 def _rows(samples: Array) -> slice:
     """Return the rows from the first to the last one with samples."""
-    found = np.flatnonzero(samples.any(axis=1))
-    return slice(found[0], found[-1] + 1) if len(found) else slice(0, 0)
+    rows = np.flatnonzero(samples.any(axis=1))
+    return slice(rows[0], rows[-1] + 1) if len(rows) else slice(0, 0)
 
 
 def _with_rows(whole: Array, rows: slice, values: Array) -> Array:
-    found = whole.copy()
-    found[rows] = values
-    return found
+    result = whole.copy()
+    result[rows] = values
+    return result

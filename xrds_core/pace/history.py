@@ -58,11 +58,16 @@ def extended(history: Stored | None, frame: Stored, movement: Movement) -> Store
     """Return a history with the samples of a frame that comes after it."""
     if history is None:
         return frame
-    found = accumulate(frame, [history], movement)
+    accumulated = accumulate(frame, [history], movement)
     own = sample_counts(frame)
-    total = found.samples.ravel()
+    total = accumulated.samples.ravel()
     counts = np.minimum(total, own * LONGEST)
-    passes = found.radiance, found.albedo, found.normal, found.alpha
+    passes = (
+        accumulated.radiance,
+        accumulated.albedo,
+        accumulated.normal,
+        accumulated.alpha,
+    )
     picture, invalid = pack(*passes)
     share = np.where(total > 0.0, own / np.maximum(total, 1e-9), 1.0)
     noise = frame.noise
@@ -75,5 +80,5 @@ def extended(history: Stored | None, frame: Stored, movement: Movement) -> Store
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=noise,
-        parts=pack_parts(found.parts),
+        parts=pack_parts(accumulated.parts),
     )

@@ -43,9 +43,9 @@ class Loader:
         self._any_is_fit = False
         self._seconds = 0.0
 
-    def look(self, numbers: Sequence[int], there: Container[int]) -> None:
+    def look(self, numbers: Sequence[int], existing: Container[int]) -> None:
         """Report frames without a file, in one line; `there` are those with one."""
-        missing = [n for n in numbers if n not in there]
+        missing = [n for n in numbers if n not in existing]
         paths = {n: frame_path(self._pattern, n) for n in missing}
         self.failed |= {n: f"no file {path}" for n, path in paths.items()}
         self._ahead |= dict.fromkeys(missing)
@@ -176,18 +176,18 @@ class NeighbourSelection:
         return not why
 
 
-def _difference(one: FrameFile, two: FrameFile) -> str:
+def _difference(own: FrameFile, other: FrameFile) -> str:
     """Return why two frames cannot share samples; "" if they can."""
-    if one.stored.shape != two.stored.shape:
-        old, new = (f"{w}x{h}" for h, w in (one.stored.shape, two.stored.shape))
+    if own.stored.shape != other.stored.shape:
+        old, new = (f"{w}x{h}" for h, w in (own.stored.shape, other.stored.shape))
         return f"their sizes are {old} and {new} pixels"
-    if one.stored.picture.shape[1] != two.stored.picture.shape[1]:
+    if own.stored.picture.shape[1] != other.stored.picture.shape[1]:
         return "one has alpha, the other has not"
-    if one.stored.parts.keys() != two.stored.parts.keys():
+    if own.stored.parts.keys() != other.stored.parts.keys():
         return "they hold different parts of the light"
-    if one.key != two.key:
+    if own.key != other.key:
         return "they were rendered from other files or with other settings"
-    if one.subset is not None and one.subset == two.subset:
+    if own.subset is not None and own.subset == other.subset:
         return (
             "they have the same noise, of frames in other steps; render both with the "
             "frames of the whole shot"

@@ -49,8 +49,8 @@ class Recipe:
         halves = self.reading.halves and "given"
         reading = replace(self.reading, cameras=None, halves=halves, also=())
         parts = (number, sorted(states.items()), sorted(seen.items()))
-        told = repr((*parts, reading, self.settings))
-        return hashlib.blake2b(told.encode(), digest_size=16).hexdigest()
+        text = repr((*parts, reading, self.settings))
+        return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
 def is_made_of(path: Path, digest: str) -> bool:
@@ -66,7 +66,7 @@ def is_complete(path: Path) -> bool:
 def _digests(path: Path) -> list[str | None]:
     """Return those of all parts; none of a file that is damaged."""
     try:
-        return [each.get(MADE_OF) for each in exr.attributes(path)]
+        return [attributes.get(MADE_OF) for attributes in exr.attributes(path)]
     except PictureError:
         return []
 
@@ -82,5 +82,5 @@ def _state(path: Path) -> tuple[str, int, int, str] | None:
         header = header_bytes(path) if path.is_file() else b""
     except OSError:
         return None
-    told = hashlib.blake2b(header, digest_size=16).hexdigest()
-    return path.name, status.st_size, status.st_mtime_ns, told
+    digest = hashlib.blake2b(header, digest_size=16).hexdigest()
+    return path.name, status.st_size, status.st_mtime_ns, digest

@@ -51,7 +51,7 @@ PASSES = tuple(field.name for field in fields(PassNames))
 
 
 @dataclass(frozen=True)
-class Found:
+class PassChannels:
     """The full names of the channels of the passes that a file has.
 
     `picture` are the channels that the finished picture is written to, R, G, B, and
@@ -74,7 +74,7 @@ class Found:
     has_length: bool
 
 
-def find(channels: Channels, names: PassNames) -> Found:
+def find_passes(channels: Channels, names: PassNames) -> PassChannels:
     """Find the passes of a file.
 
     Raises Unfit where beauty, albedo or normal is missing, or a pass requested by name;
@@ -82,14 +82,14 @@ def find(channels: Channels, names: PassNames) -> Found:
     """
     beauty = _pass(channels, names, "beauty")
     prefix = "" if beauty is None else beauty
-    here = channels.of(prefix)
-    if not here:
+    radiance = channels.of(prefix)
+    if not radiance:
         raise _missing(channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB")
     target = _target(channels, prefix)
     alphas = [f"{x}.A" if x else "A" for x in (prefix, target)]
     normal, depth = _pass(channels, names, "normal"), _depth(channels, names)
-    return Found(
-        beauty=here,
+    return PassChannels(
+        beauty=radiance,
         albedo=_needed(channels, names, "albedo"),
         normal=_needed(channels, names, "normal"),
         position=_channels(channels, names, "position"),
@@ -107,8 +107,8 @@ def find(channels: Channels, names: PassNames) -> Found:
 
 def _ours(channels: Channels, name: str, letters: str) -> list[str]:
     """The channels of a pass of stored samples."""
-    found = channels.find(name, (letters,))
-    return [] if found is None else channels.of(found, (letters,))
+    full_name = channels.find(name, (letters,))
+    return [] if full_name is None else channels.of(full_name, (letters,))
 
 
 def _target(channels: Channels, prefix: str) -> str:
@@ -129,16 +129,16 @@ def _pass(
     """The full name of a pass; None where there is none of the usual names."""
     requested = getattr(names, kind)
     if requested is not None:
-        found = channels.find(requested, letters)
-        if found is None:
+        full_name = channels.find(requested, letters)
+        if full_name is None:
             raise _missing(channels, kind, requested)
-        return found
+        return full_name
     if kind == "beauty" and channels.of("") and not channels.find(NOISY):
         return None  # plain R, G, B
     for wanted in _USUAL[kind]:
-        found = channels.find(wanted, letters, any_case=True)
-        if found is not None:
-            return found
+        full_name = channels.find(wanted, letters, any_case=True)
+        if full_name is not None:
+            return full_name
     return None
 
 
@@ -148,8 +148,8 @@ def _channels(
     kind: str,
     letters: Sequence[str] = COMPONENTS,
 ) -> list[str]:
-    found = _pass(channels, names, kind, letters)
-    return [] if found is None else channels.of(found, letters)
+    full_name = _pass(channels, names, kind, letters)
+    return [] if full_name is None else channels.of(full_name, letters)
 
 
 def _depth(channels: Channels, names: PassNames) -> list[str]:
@@ -162,16 +162,16 @@ def _depth(channels: Channels, names: PassNames) -> list[str]:
 
 def _path_length(channels: Channels, names: PassNames) -> list[str]:
     """Cycles' Denoising Depth, where it is not the only depth."""
-    found = channels.find(PATH_LENGTH, _SINGLE)
-    path = [] if found is None else channels.of(found, _SINGLE)
+    full_name = channels.find(PATH_LENGTH, _SINGLE)
+    path = [] if full_name is None else channels.of(full_name, _SINGLE)
     return [] if path == _depth(channels, names) else path
 
 
 def _needed(channels: Channels, names: PassNames, kind: str) -> list[str]:
-    found = _channels(channels, names, kind)
-    if not found:
+    channel_names = _channels(channels, names, kind)
+    if not channel_names:
         raise _missing(channels, kind, getattr(names, kind) or _USUAL[kind][0])
-    return found
+    return channel_names
 
 
 def _missing(channels: Channels, kind: str, name: str) -> Unfit:

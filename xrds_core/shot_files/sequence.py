@@ -116,7 +116,7 @@ class Files:
             return is_made_of(output, digest)
         return is_complete(output)
 
-    def check(self, numbers: Sequence[int], there: Sequence[int]) -> None:
+    def check(self, numbers: Sequence[int], existing: Sequence[int]) -> None:
         """Reject impossible outputs; make their folder.
 
         `there` are all frames that have a file: none may be overwritten.
@@ -129,20 +129,20 @@ class Files:
                 "#### for the frame number"
             )
         for pattern in self.patterns[1:]:
-            self._check_beside(pattern, there)
-        inputs = [frame_path(pattern, n) for pattern in self.patterns for n in there]
-        known = set(there)
+            self._check_beside(pattern, existing)
+        inputs = [frame_path(pattern, n) for pattern in self.patterns for n in existing]
+        known = set(existing)
         outputs = (frame_path(self.output, n) for n in numbers if n in known)
         check_places(outputs, [*inputs, *self.others])
         check_folder(Path(self.output).parent)
 
-    def _check_beside(self, pattern: str, there: Sequence[int]) -> None:
+    def _check_beside(self, pattern: str, existing: Sequence[int]) -> None:
         """Reject one file beside many frames, and the frames themselves."""
         if "#" in Path(self.source).name and "#" not in Path(pattern).name:
             raise UsageError(
                 f"{pattern!r} is one file for all frames; add #### for the frame number"
             )
-        for number in there:
+        for number in existing:
             source, path = (frame_path(x, number) for x in (self.source, pattern))
             if path.exists() and source.samefile(path):
                 raise UsageError(
@@ -181,17 +181,17 @@ def denoise_sequence(
             be written; outputs before it are complete.
     """
     numbers = _numbers(files, frames, say)
-    there = _there(files.source, numbers)
-    files.check(numbers, there)
+    existing = _existing_frames(files.source, numbers)
+    files.check(numbers, existing)
     radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
     recipe = _recipe(files, reading or Reading(), denoiser)
     loader = Loader(files.source, recipe, reusable=radius != 0, say=say)
-    loader.look(numbers, set(there))
+    loader.look(numbers, set(existing))
     readable = [n for n in numbers if n not in loader.failed]
     first = loader.first(readable)
     if radius is None:
         radius = RADIUS if first is None or first.radius is None else first.radius
-    beside = (*numbers, *there)
+    beside = (*numbers, *existing)
     shot = Shot((), radius, others=beside)
     done = _done(files, recipe, shot, numbers, say) if resume else set()
     if first is None and not done:
@@ -224,26 +224,28 @@ def _entries(
     """
     selection, fails = NeighbourSelection(say), False
     movement, clock = Movement(), Clock()
-    for found in Window(shot, loader.load):
-        number, own = found.number, found.own
+    for neighbourhood in Window(shot, loader.load):
+        number, own = neighbourhood.number, neighbourhood.own
         near = sorted((number, *shot.neighbours(number)))
         digest = recipe.digest({n: loader.states.get(n, ()) for n in near}, number)
         if resume and files.is_done(number, digest):  # another machine was quicker
             continue
         try:
             views, others = {}, {}
-            for view, each in {"": own, **own.others}.items():
-                others[view] = selection.select(number, each, _of(found, view))
-                region, within = _regions(each, files.crop)
+            for view, frame in {"": own, **own.others}.items():
+                others[view] = selection.select(
+                    number, frame, _neighbours_in_view(neighbourhood, view)
+                )
+                region, within = _regions(frame, files.crop)
                 done = finish_frame(
-                    each.stored,
+                    frame.stored,
                     others[view],
                     denoiser,
                     movement,
                     region=region,
-                    light=each.light,
+                    light=frame.light,
                 )
-                views[view] = each, done.within(within)
+                views[view] = frame, done.within(within)
             finished = views[""][1]
             started = time.perf_counter()
             metadata = {**_metadata(own, finished, denoiser), MADE_OF: digest}
@@ -259,7 +261,7 @@ def _entries(
         selection.record(others[""], finished.accumulated)
         seconds = {"read": loader.seconds()}
         for stage in finished.seconds:
-            seconds[stage] = sum(each.seconds[stage] for _, each in views.values())
+            seconds[stage] = sum(result.seconds[stage] for _, result in views.values())
         seconds["write"] = time.perf_counter() - started
         left = sum(n > number and n not in loader.failed for n in shot.frames)
         say(f"frame {number}: {path}, {clock.lap(left)}")
@@ -278,7 +280,7 @@ def _done(
     files: Files, recipe: Recipe, shot: Shot, numbers: Sequence[int], say: Say
 ) -> set[int]:
     """The frames that are complete; a line tells those that are made anew."""
-    written = set(_there(files.output, numbers))
+    written = set(_existing_frames(files.output, numbers))
     written.intersection_update(numbers)
     near = {n: sorted((n, *shot.neighbours(n))) for n in sorted(written)}
     states = states_of(recipe, {x for numbers in near.values() for x in numbers})
@@ -307,12 +309,16 @@ def _metadata(own: FrameFile, finished: Finished, denoiser: Denoiser) -> dict[st
     }
 
 
-def _of(found: Neighbourhood[FrameFile], view: str) -> dict[int, FrameFile]:
+def _neighbours_in_view(
+    neighbourhood: Neighbourhood[FrameFile], view: str
+) -> dict[int, FrameFile]:
     """The same view of a frame's neighbours, "" for the first one."""
     if not view:
-        return found.neighbours
-    near = found.neighbours.items()
-    return {n: each.others[view] for n, each in near if view in each.others}
+        return neighbourhood.neighbours
+    near = neighbourhood.neighbours.items()
+    return {
+        n: neighbour.others[view] for n, neighbour in near if view in neighbour.others
+    }
 
 
 def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Rectangle]:
@@ -372,7 +378,7 @@ def _all_frames(pattern: str) -> list[int]:
     return numbers
 
 
-def _there(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
+def _existing_frames(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
     """The frames that have a file; without # there is one for every number."""
     if "#" in Path(pattern).name:
         return frame_numbers(pattern)

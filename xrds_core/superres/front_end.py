@@ -126,7 +126,7 @@ def transfer(x: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
         exposed = x.float() * (TRANSFER_GAIN * exposure)
         return torch.log1p(exposed.clamp(0.0, _LARGEST_EXPOSED))
     with np.errstate(over="ignore"):
-        exposed = x.astype(np.float32, copy=False) * _gain(exposure)
+        exposed = x.astype(np.float32, copy=False) * _exposure_gain(exposure)
     return np.log1p(np.clip(exposed, 0.0, _LARGEST_EXPOSED))
 
 
@@ -138,10 +138,10 @@ def inverse_transfer(t: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTenso
     with np.errstate(over="ignore"):
         t = t.astype(np.float32, copy=False)
         exposed = np.expm1(np.minimum(t, np.float32(LARGEST_TRANSFERRED)))
-        return np.minimum(exposed / _gain(exposure), _LARGEST)
+        return np.minimum(exposed / _exposure_gain(exposure), _LARGEST)
 
 
-def _gain(exposure: float | Tensor) -> np.float32:
+def _exposure_gain(exposure: float | Tensor) -> np.float32:
     return np.float32(TRANSFER_GAIN * float(exposure))
 
 
@@ -179,7 +179,7 @@ def regressed_base(
     decides how much of the albedo and of the normal's shading goes into E, and gets
     back into L what denoising took of these: see `regression.explain`.
     """
-    gain = _gain(auto_exposure(radiance))
+    gain = _exposure_gain(auto_exposure(radiance))
     guides = torch.cat((to_planes(albedo), to_planes(normal)), dim=1)
     low, before = to_planes(radiance * gain), to_planes(noisy * gain)
     explained = explain(low, before, guides, scale)

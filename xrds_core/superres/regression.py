@@ -72,13 +72,13 @@ def explain(radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int) -> Expl
     for top in range(0, height, BAND):
         first, last = max(top - REACH, 0), min(top + BAND + REACH, height)
         rows = slice(first, last)
-        found = explain_band(
+        explained = explain_band(
             radiance[..., rows, :],
             noisy[..., rows, :],
             guides[..., first * scale : last * scale, :],
             scale,
         )
-        bands.append(found.rows(top - first, min(BAND, height - top), scale))
+        bands.append(explained.rows(top - first, min(BAND, height - top), scale))
     return (
         bands[0]
         if len(bands) == 1

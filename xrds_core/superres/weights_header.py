@@ -86,15 +86,15 @@ def headers(folder: Path | None = None) -> list[WeightsHeader]:
     A file that is no network's is left out: loading it will say why.
     """
     paths = sorted((folder or DIRECTORY).glob("*_x*.safetensors"))
-    found = (read_header(path) for path in paths)
-    return [header for header in found if header is not None]
+    headers_or_none = (read_header(path) for path in paths)
+    return [header for header in headers_or_none if header is not None]
 
 
 def read_header(path: Path) -> WeightsHeader | None:
     """That of one file; None where it holds no network, or is cut short."""
     try:
-        told = path.stat()
-        return _read(path, told.st_size, told.st_mtime_ns)
+        status = path.stat()
+        return _read(path, status.st_size, status.st_mtime_ns)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 

@@ -114,10 +114,10 @@ def _foreseen(scene: Any, request: Request, here: Capabilities) -> str:
 
     networks = sorted(here.networks) if here.torch else []
     shot = is_shot(scene, request)
-    found = foresee(scene, request, networks, shot) if here.any_denoiser else None
-    if found is None:
+    foreseen = foresee(scene, request, networks, shot) if here.any_denoiser else None
+    if foreseen is None:
         return translated("known after a first render")
-    return _named(found.settings)
+    return _named(foreseen.settings)
 
 
 def _named(settings: Settings) -> str:
@@ -139,7 +139,7 @@ def _enlarged(scene: Any, request: Request) -> list[Row]:
         ("Memory", f"≤ {_amount(taken)}"),
         *_neighbours(scene, request),
     ]
-    skipped = ", ".join(translated(each) for each in _skipped(chosen))
+    skipped = ", ".join(translated(name) for name in _skipped(chosen))
     return [*rows, ("Skipped", skipped)] if skipped else rows
 
 
@@ -150,8 +150,8 @@ def _skipped(chosen: Plan) -> list[str]:
         "mirrors in the guides": chosen.render_guides and not chosen.guides.bounces,
         "the denoiser": not chosen.denoise,
         "motion blur": any(
-            each.decision == "motion blur" and each.value == "skipped"
-            for each in chosen.decisions
+            decision.decision == "motion blur" and decision.value == "skipped"
+            for decision in chosen.decisions
         ),
     }
     return [name for name, is_skipped in parts.items() if is_skipped]
@@ -250,23 +250,23 @@ def expected(
     )
 
 
-def draw(layout: Any, context: Any, found: Expected) -> None:
+def draw(layout: Any, context: Any, times: Expected) -> None:
     """Draw what it takes in Cycles and in XRDS, and where that is from."""
     column = layout.column(align=True)
-    title = translated("Animation, {count} frames", count=found.frames)
+    title = translated("Animation, {count} frames", count=times.frames)
     column.label(text=title, translate=False)
-    limit = "≤ " if found.at_most else ""
+    limit = "≤ " if times.at_most else ""
     rows = [
-        ("Cycles", _both(found.cycles, found.frames)),
-        ("XRDS", _both(found.ours, found.frames, limit)),
-        (translated("Picture"), found.picture),
+        ("Cycles", _both(times.cycles, times.frames)),
+        ("XRDS", _both(times.ours, times.frames, limit)),
+        (translated("Picture"), times.picture),
     ]
     for name, value in rows:
         split = column.split(factor=0.3)
         split.label(text=name, translate=False)
         split.label(text=value, translate=False)
-    known = None not in (found.cycles, found.ours)
-    notes = [EXPECTED if known else UNKNOWN, STILLS if found.is_shot else ALONE]
+    known = None not in (times.cycles, times.ours)
+    notes = [EXPECTED if known else UNKNOWN, STILLS if times.is_shot else ALONE]
     for note in notes:
         paragraph.draw(layout, context, translated(note))
 
@@ -275,5 +275,5 @@ def _both(seconds: float | None, frames: int, limit: str = "") -> str:
     """The time of all frames, and of one."""
     if seconds is None:
         return "?"
-    whole, each = limit + duration(seconds * frames), duration(seconds)
-    return translated("{whole}, a frame {each}", whole=whole, each=each)
+    whole, per_frame = limit + duration(seconds * frames), duration(seconds)
+    return translated("{whole}, a frame {each}", whole=whole, each=per_frame)
