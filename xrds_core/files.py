@@ -186,10 +186,23 @@ _WAIT = 10.0  # seconds for somebody to write into a pipe
 
 
 def read_stream(path: Path, most: int) -> bytes:
-    """Return what a file or a pipe holds, up to `most` bytes.
+    """Return what a file or a pipe holds.
 
-    Raises UsageError where it cannot be read, holds more, or is a pipe into which
-    nobody writes.
+    Parameters
+    ----------
+    path : Path
+        The file or pipe.
+    most : int
+        Most bytes.
+
+    Returns
+    -------
+    data : bytes
+
+    Raises
+    ------
+    UsageError
+        If it cannot be read, holds more, or is a pipe into which nobody writes.
     """
     try:
         # else a pipe waits for ever for somebody who opens its other end
@@ -230,15 +243,39 @@ def _read_up_to(file: int, most: int) -> bytes:
 def check_output(path: Path, inputs: Iterable[str | Path] = ()) -> None:
     """Refuse a file that cannot be written, and an input of the work as its output.
 
-    Makes the folder, and sweeps up what killed processes left in it. Raises
-    PictureError.
+    The folder is made, and what killed processes left in it is removed.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    inputs : iterable of str or Path
+        Files that the work reads.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written, or is an input.
     """
     check_places([path], inputs)
     check_folder(Path(os.path.realpath(path)).parent)
 
 
 def check_places(paths: Iterable[Path], inputs: Iterable[str | Path]) -> None:
-    """As `check_place` of many; none may be an input, nor two the same file."""
+    """Refuse files that cannot be written, inputs, and two names of one file.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        Files to write.
+    inputs : iterable of str or Path
+        Files that the work reads.
+
+    Raises
+    ------
+    PictureError
+        If one of them must not be written.
+    """
     read = {_identity(file) for file in inputs} - {None}
     written: dict[str, Path] = {}
     for path in paths:

@@ -21,10 +21,20 @@ _MOST_RUNS = 50  # of frame numbers that a line has room for
 
 
 def frame_path(pattern: str, frame: int) -> Path:
-    """Put the frame number in place of the last run of #, as Blender does.
+    """Put the frame number in place of the last run of #: so Blender names its files.
 
-    Three # are three digits at least; without # the pattern is the path. A file of a
-    frame below zero may also be called as C does, whose digits count the sign.
+    Parameters
+    ----------
+    pattern : str
+        Path in which three # stand for three digits at least; without # it is the path.
+    frame : int
+        Frame number.
+
+    Returns
+    -------
+    path : Path
+        For a frame below zero, a file named C's way, where the sign counts as a digit,
+        if only that exists.
     """
     parts = _split(pattern)
     if parts is None:

@@ -26,9 +26,20 @@ def describe_bad_pixels(bad_pixels: int) -> str:
 
 
 def clean_radiance(radiance: Array) -> tuple[Array, int]:
-    """Return (x, bad pixels): NaN, infinities and overflows filled in, negative 0.
+    """Replace pixels that hold no light.
 
-    `x` itself is returned where nothing is wrong with it; else a copy.
+    Parameters
+    ----------
+    radiance : (..., C) float32 array
+        Scene-linear radiance.
+
+    Returns
+    -------
+    cleaned : (..., C) float32 array
+        NaN, infinities and overflows are filled in, negative values are 0. `radiance`
+        itself where nothing is wrong with it; else a copy.
+    bad_pixels : int
+        How many pixels were replaced.
     """
     # min and max propagate NaN and need no array of the size of the picture
     if not radiance.size or (radiance.min() >= 0.0 and radiance.max() <= BRIGHTEST):
@@ -41,9 +52,20 @@ def clean_radiance(radiance: Array) -> tuple[Array, int]:
 
 
 def clean_alpha(alpha: Array) -> tuple[Array, int]:
-    """Return (x, holes) as `fill_holes`, but 1 where no pixel has an alpha.
+    """Fill in NaN and infinities of an alpha; 1 where no pixel has a valid alpha.
 
     So a picture without a valid alpha keeps its colour.
+
+    Parameters
+    ----------
+    alpha : (H, W, 1) float32 array
+        Alpha.
+
+    Returns
+    -------
+    cleaned : (H, W, 1) float32 array
+    holes : int
+        How many pixels were filled in.
     """
     filled, holes = fill_holes(alpha)
     return (
@@ -54,10 +76,19 @@ def clean_alpha(alpha: Array) -> tuple[Array, int]:
 
 
 def fill_holes(picture: Array) -> tuple[Array, int]:
-    """Return (x, holes): NaN and infinities get the mean of finite pixels near them.
+    """Fill in NaN and infinities with the mean of finite pixels near them.
 
-    `x` itself is returned where there are none. A picture without a single finite
-    pixel becomes 0.
+    Parameters
+    ----------
+    picture : (H, W, C) float32 array
+        A picture.
+
+    Returns
+    -------
+    filled : (H, W, C) float32 array
+        `picture` itself where it has no holes; 0 where it has no finite pixel.
+    holes : int
+        How many pixels were filled in.
     """
     if not picture.size or (np.isfinite(picture.min()) and np.isfinite(picture.max())):
         return picture, 0

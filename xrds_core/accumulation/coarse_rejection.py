@@ -33,7 +33,18 @@ _HARMLESS = 0.01
 
 
 def tile_weights(pair: Pair) -> Array:
-    """Return the weights (rows, columns) of `pair.here`'s tiles, 0 across a cut."""
+    """Return a weight for each tile of a neighbour frame.
+
+    Parameters
+    ----------
+    pair : Pair
+        The frame (`here`) and its neighbour (`there`).
+
+    Returns
+    -------
+    weights : (rows, columns) float32 array
+        From 0 to 1 for each tile of `pair.here`; 0 everywhere across a shot cut.
+    """
     tiles = tile_grid(pair.here.shape)
     if pair.here.is_empty:  # there is nothing to compare
         return np.ones(tiles, np.float32)

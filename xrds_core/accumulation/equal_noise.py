@@ -50,8 +50,12 @@ _SEEN: WeakKeyDictionary[Stored, _Spots] = WeakKeyDictionary()
 class IndependentFrames:
     """Leaves out neighbours whose noise a frame, or a nearer neighbour, has as well.
 
-    `say` takes one line about the first such pair of a shot. One instance serves a
-    whole shot, since each pair of frames is looked at once.
+    One instance serves a whole shot, so that each pair of frames is compared once.
+
+    Parameters
+    ----------
+    say : callable
+        Takes one line of text, about the first such pair of the shot.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
@@ -95,7 +99,18 @@ class IndependentFrames:
 
 
 def have_equal_noise(frame: Stored, other: Stored) -> bool:
-    """Whether two frames have the same noise; False where too little of it is seen."""
+    """Whether two frames have the same noise, pixel by pixel.
+
+    Parameters
+    ----------
+    frame, other : Stored
+        Frames of one shot, the earlier one first.
+
+    Returns
+    -------
+    bool
+        False as well where too few pixels have noise to compare.
+    """
     if frame.noise is None or other.noise is None or frame.shape != other.shape:
         return False
     first, second = _spots_of(frame), _spots_of(other)

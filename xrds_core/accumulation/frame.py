@@ -41,12 +41,21 @@ _TINY = np.float32(1e-9)
 
 @dataclass(frozen=True)
 class Halves:
-    """The two half buffers of a frame; float32, the first axis is the half.
+    """The two half buffers of a frame: each the mean over one half of its samples.
 
-    `radiance`, `albedo`, `normal` (2, H, W, 3) and `alpha` (2, H, W), or None, are as
-    in `Frame`, which holds the means of both. The halves are two subsets of one sample
-    sequence, or have two seeds. `shares` are their shares of the samples; `counts`
-    (2, H, W) their samples in each pixel, where they differ.
+    They are two subsets of one sample sequence, or have two seeds. The first axis of
+    the arrays is the half.
+
+    Attributes
+    ----------
+    radiance, albedo, normal : (2, H, W, 3) float32 array
+        Passes of `Frame`, which holds the means of both halves.
+    alpha : (2, H, W) float32 array or None
+        Alpha of both halves.
+    shares : tuple of float
+        Share of the frame's samples that each half has.
+    counts : (2, H, W) float32 array or None
+        Samples of each pixel, where pixels have different numbers of them.
     """
 
     radiance: Array
@@ -80,7 +89,24 @@ _SEED = 7
 def pack(
     radiance: Array | None, albedo: Array, normal: Array, alpha: Array | None
 ) -> tuple[NDArray[np.float16], Mask]:
-    """Return `Stored.picture` of passes as in `Frame`, and its invalid pixels (H W)."""
+    """Pack the passes of a frame in half floats, channel beside channel.
+
+    Parameters
+    ----------
+    radiance : (H, W, 3) float32 array or None
+        Scene-linear radiance; None for a frame of guides alone.
+    albedo, normal : (H, W, 3) float32 array
+        Guides.
+    alpha : (H, W) float32 array or None
+        Alpha, if there is one.
+
+    Returns
+    -------
+    picture : (H W, 6 to 10) float16 array
+        Radiance, albedo, normal and alpha; values beyond +-65504 are clipped.
+    invalid : (H W,) bool array
+        Pixels that held NaN or infinities and are 0 now.
+    """
     packing = _Packing((radiance, albedo, normal, alpha))
     packing.run()
     return packing.picture, packing.invalid
@@ -89,9 +115,26 @@ def pack(
 def pack_with_noise(
     passes: Passes, samples: float, halves: Halves | None
 ) -> tuple[NDArray[np.float16], Mask, Noise]:
-    """Return the same of a frame with radiance, and its noise, 0 at invalid pixels.
+    """Pack the passes of a frame with radiance, and estimate its noise.
 
-    The noise is that of its `halves`, where there are any.
+    Parameters
+    ----------
+    passes : tuple of arrays
+        Radiance, albedo and normal (H, W, 3), and alpha (H, W) or None.
+    samples : float
+        Mean samples per pixel.
+    halves : Halves or None
+        Half buffers that noise is estimated from; without them it is estimated from the
+        surrounding pixels.
+
+    Returns
+    -------
+    picture : (H W, 9 or 10) float16 array
+        Radiance, albedo, normal and alpha; values beyond +-65504 are clipped.
+    invalid : (H W,) bool array
+        Pixels that held NaN or infinities and are 0 now.
+    noise : Noise
+        Its noise, 0 at invalid pixels.
     """
     packing = _Packing(passes)
     noise = packing.run_with_noise(samples, halves)
@@ -99,7 +142,20 @@ def pack_with_noise(
 
 
 def pack_parts(parts: Mapping[str, Array]) -> dict[str, NDArray[np.float16] | None]:
-    """Return `Stored.parts`; a part is 0 where it is not finite, the picture stays."""
+    """Pack AOVs and light passes in half floats.
+
+    A part is 0 where it is not finite; the pixel stays valid.
+
+    Parameters
+    ----------
+    parts : mapping of str to (H, W, 3) float32 array
+        AOVs and light passes, scene-linear, by name.
+
+    Returns
+    -------
+    packed : dict of str to (H W, 3) float16 array or None
+        None for a part that is dark everywhere.
+    """
     return {name: _packed_part(part) for name, part in parts.items()}
 
 
@@ -109,12 +165,15 @@ def _packed_part(part: Array) -> NDArray[np.float16] | None:
 
 
 def pack_vectors(vector: Array) -> NDArray[np.float16]:
-    """Return (H W, 4); infinite beyond half's range, where vectors are useless."""
+    """Pack motion vectors (H, W, 4) as float16 (H W, 4).
+
+    Vectors beyond the range of half floats are useless anyway and become infinite.
+    """
     return _to_halves(vector, keeps_infinities=True)[0]
 
 
 def pack_counts(counts: Array) -> NDArray[np.float16]:
-    """Flat, in half floats; what is no count becomes 0."""
+    """Pack sample counts (H, W) as float16 (H W,); what is not finite becomes 0."""
     counts = np.nan_to_num(counts.ravel(), posinf=0.0, neginf=0.0)
     return np.clip(counts, 0.0, LARGEST_HALF).astype(np.float16)
 
@@ -212,27 +271,55 @@ _OPTIONAL |= {"path_length": ()}
 class Frame:
     """One frame as the renderer returns it; its arrays are never changed.
 
-    `radiance` is None in a frame of guides alone: the guides then decide whether two
-    frames show the same. `number` is the frame's number: `vector` points to number - 1
-    and number + 1, and frames of one number show one moment (the views of a stereo
-    pair). `samples` per pixel weight the frame against others. `normal` is in camera
-    space, but with Z pointing away from the viewer, as in Cycles' `Denoising Normal`.
-    `depth` (H, W) is the distance of the first hit from the camera, along the camera's
-    axis (of a panorama along the ray), at each pixel's centre; infinite, or above 1e9,
-    without a hit.
+    Arrays are float32, row 0 on top, scene-linear where they hold colour.
 
-    `still` says that nothing at all moves or changes from frame to frame, not even
-    light: frames of equal cameras differ in their noise alone.
+    Attributes
+    ----------
+    number : int
+        The frame's number. Frames of one number show one moment, such as the views of a
+        stereo pair.
+    camera : Camera
+        The camera, and the part of its frame that the arrays hold.
+    radiance : (H, W, 3) array or None
+        None for a frame of guides alone: the guides then decide whether two frames show
+        the same.
+    albedo : (H, W, 3) array
+        Albedo.
+    normal : (H, W, 3) array
+        Normal in camera space, but with Z pointing away from the
+        viewer: so Cycles writes `Denoising Normal`.
+    depth : (H, W) array
+        Distance of the first hit at each pixel's centre, along the camera's axis (of a
+        panorama along the ray); infinite, or above 1e9, without a hit.
+    samples : float
+        Mean samples per pixel, by which the frame is weighted against others.
+    alpha : (H, W) array or None
+        Alpha, if there is one.
+    vector : (H, W, 4) array or None
+        Cycles' Vector pass in pixels, y upwards: the surface's position in frame
+        `number` - 1 minus its position now, then its position now minus the one in
+        frame `number` + 1. Without it all surfaces are assumed to stand still.
+    still : bool
+        Whether nothing at all moves or changes from frame to frame, not even light:
+        frames of equal cameras then differ in their noise alone.
+    counts : (H, W) array or None
+        Samples of each pixel, where they differ; `samples` is their mean.
+    halves : Halves or None
+        Half buffers, from which noise is estimated better than from the surrounding
+        pixels.
+    path_length : (H, W) array or None
+        Length of the path from the camera, through mirrors and glass, to what albedo
+        and normal show: Cycles' `Denoising Depth`.
+    parts : mapping of str to (H, W, 3) array
+        AOVs and light passes, by name.
+    subset : int or None
+        Number of the frame's part of a sample sequence that frames share: two frames
+        with the same number have the same noise. None for a sequence of its own.
 
-    Optional: `alpha` (H, W); `vector` (H, W, 4), Cycles' Vector pass: the surface's
-    position one frame before minus its position now, then its position now minus the
-    one a frame later, in pixels, y upwards; without it all surfaces are assumed to
-    stand still. `counts` (H, W): samples of each pixel, where they differ; `samples` is
-    their mean. `halves` are the half buffers, from which noise is estimated better than
-    from the surrounding pixels. `path_length` (H, W): the way from the camera, through
-    mirrors and glass, to what albedo and normal show (Cycles' `Denoising Depth`).
-    `subset` is the number of the part that the frame has of a sequence that frames
-    share: two with the same have the same noise. None of a sequence of its own.
+    Raises
+    ------
+    PictureError
+        If an array has another size than `normal`, or `samples` is not above 0.
     """
 
     number: int
@@ -278,15 +365,37 @@ class Frame:
 class Stored:
     """A frame as the window stores it: flat, packed, and free of NaN.
 
-    `picture` (H W, 6 to 10) holds radiance (not in a frame of guides alone), albedo,
-    normal and alpha (if any), in half floats to save memory. `inverse_depth` (H W) is
-    1 / depth, 0 without a hit; the depth itself for an orthographic camera; NaN where
-    unknown. `invalid` (H W) is the validity mask, negated: pixels that held NaN or
-    infinities and are 0 now; None if there were none. `counts` (H W): samples of each
-    pixel where they differ. `noise` is None in a frame of guides
-    alone. `image` (H W) is as `inverse_depth`, of the image that a mirror or glass
-    shows, NaN where there is none; None if there is none anywhere. `parts` (H W, 3), by
-    name, are light that the radiance is made of; None for one that is dark everywhere.
+    Attributes
+    ----------
+    number : int
+        The frame's number.
+    camera : Camera
+        The camera, and the part of its frame that the arrays hold.
+    shape : tuple of int
+        Height and width.
+    samples : float
+        Mean samples per pixel.
+    picture : (H W, 6 to 10) float16 array
+        Radiance (not in a frame of guides alone), albedo, normal and alpha (if any).
+    inverse_depth : (H W,) float32 array
+        1 / depth, 0 without a hit; the depth itself for an orthographic camera. NaN
+        where unknown.
+    invalid : (H W,) bool array or None
+        Pixels that held NaN or infinities and are 0 now; None if there were none.
+    vector : (H W, 4) float16 array or None
+        Cycles' Vector pass.
+    still : bool
+        Whether nothing at all moves or changes from frame to frame.
+    counts : (H W,) float16 array or None
+        Samples of each pixel, where they differ.
+    noise : Noise or None
+        Estimated noise; None for a frame of guides alone.
+    image : (H W,) float32 array or None
+        Inverse depth of the virtual image that a mirror or glass shows (for an
+        orthographic camera its depth), NaN where there is none; None if there is none
+        anywhere.
+    parts : mapping of str to (H W, 3) float16 array or None
+        AOVs and light passes, by name; None for one that is dark everywhere.
     """
 
     number: int
@@ -323,7 +432,7 @@ class Stored:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no pixel has a sample, as in a reprojected placeholder."""
+        """Whether no pixel has a sample, which is so for a reprojected placeholder."""
         return self.invalid is not None and bool(self.invalid.all())
 
     def shows_same(self, other: Stored) -> bool:
@@ -335,9 +444,21 @@ class Stored:
 def pack_frame(
     frame: Frame,
 ) -> tuple[NDArray[np.float16], NDArray[np.bool_], Noise | None]:
-    """Return `Stored.picture`, its invalid pixels, and the noise, 0 at these.
+    """Pack a frame, and estimate its noise if it has radiance.
 
-    There is none of guides alone.
+    Parameters
+    ----------
+    frame : Frame
+        A frame as rendered.
+
+    Returns
+    -------
+    picture : (H W, 6 to 10) float16 array
+        Radiance, albedo, normal and alpha, as far as the frame has them.
+    invalid : (H W,) bool array
+        Pixels that held NaN or infinities and are 0 now.
+    noise : Noise or None
+        Its noise, 0 at invalid pixels; None for a frame of guides alone.
     """
     passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
     if frame.radiance is None:
@@ -349,6 +470,16 @@ def store(frame: Frame) -> Stored:
     """Pack a frame; pixels with NaN or infinities in any pass are invalid.
 
     Values beyond +-65504, the largest half float, are clipped.
+
+    Parameters
+    ----------
+    frame : Frame
+        A frame as rendered.
+
+    Returns
+    -------
+    stored : Stored
+        The same frame, flat and in half floats.
     """
     picture, invalid, noise = pack_frame(frame)
     return Stored(

@@ -17,10 +17,20 @@ if TYPE_CHECKING:
 
 
 def extreme(x: NDArray[Any], smaller: np.ufunc, step: int = 1) -> NDArray[Any]:
-    """Return the least (`np.fmin`) or largest (`np.fmax`) value of 3x3 pixels.
+    """Return the least or largest value of the 3x3 pixels around each pixel.
 
-    NaN is ignored. On masks `np.logical_or` is a dilation. The pixels lie `step` apart,
-    the middle one at the pixel itself.
+    Parameters
+    ----------
+    x : (H, W) array
+        Values; NaN is ignored.
+    smaller : ufunc
+        `np.fmin` or `np.fmax`; on masks `np.logical_or`, which makes a dilation.
+    step : int
+        Distance between the 3x3 pixels; the middle one lies at the pixel itself.
+
+    Returns
+    -------
+    (H, W) array
     """
     wide = np.pad(x, step, "edge")
     end = slice(2 * step, None)
@@ -66,10 +76,21 @@ def _sums(x: Array, count: int, size: int) -> Array:
 def find_rims(
     depth: Array, shape: tuple[int, int], nearer_is_less: bool
 ) -> NDArray[np.uint8]:
-    """Return (H W): pixels next to a nearer surface, some of whose light they contain.
+    """Find pixels next to a nearer surface: they contain some of its light.
 
-    0, or 1 + which of the 3x3 pixels around has the nearest surface. `depth` (H W) is
-    inverse depth, NaN where unknown, or depth where `nearer_is_less`.
+    Parameters
+    ----------
+    depth : (H W,) float32 array
+        Inverse depth, NaN where unknown; or depth where `nearer_is_less`.
+    shape : tuple of int
+        Height and width.
+    nearer_is_less : bool
+        Whether a smaller value is nearer.
+
+    Returns
+    -------
+    rims : (H W,) uint8 array
+        0, or 1 + which of the 3x3 pixels around has the nearest surface.
     """
     height, width = shape
     rims = np.empty(height * width, np.uint8)
@@ -84,8 +105,19 @@ def find_rims(
 
 
 def find_ranges(depth: Array, shape: tuple[int, int]) -> tuple[Array, Array]:
-    """Return the least and the largest `depth` (H W) of the 9x9 pixels around each one,
-    with some slack; NaN where nothing is known around.
+    """Find the range of depth in the 9x9 pixels around each pixel, with some slack.
+
+    Parameters
+    ----------
+    depth : (H W,) float32 array
+        Depth or inverse depth, NaN where unknown.
+    shape : tuple of int
+        Height and width.
+
+    Returns
+    -------
+    least, most : (H W,) float32 array
+        The range; NaN where nothing is known around.
     """
     height, width = shape
     least, most = np.empty((2, height * width), np.float32)

@@ -54,10 +54,22 @@ class Movement:
     def object_motions(
         self, here: Stored, others: Sequence[Stored]
     ) -> list[ObjectMotion | None]:
-        """Return for each of `others` where the moving objects of `here` were.
+        """Return where the moving objects of a frame were in its neighbours.
 
-        Frames with the number of `here` show the same moment and need none. Vectors are
-        chained from each frame to the nearest one available.
+        Vectors are chained from each frame to the nearest one available.
+
+        Parameters
+        ----------
+        here : Stored
+            The frame.
+        others : sequence of Stored
+            Its neighbours.
+
+        Returns
+        -------
+        motions : list of ObjectMotion or None
+            One for each of `others`. None for a frame with the number of `here`: it
+            shows the same moment.
         """
         frames = {x.number: x for x in (*others, here) if x.vector is not None}
         chains: dict[int, VectorChain] = {}
@@ -116,11 +128,23 @@ class Movement:
         return known(x + flow_x, y + flow_y, consistent)
 
     def moving(self, frame: Stored, frames: Mapping[int, Stored]) -> Mask:
-        """Return (H W): where the Vector pass is not explained by camera motion alone.
+        """Find the pixels whose motion vectors camera motion alone does not explain.
 
-        That is the motion to the next camera, or to the previous one where `frames`
-        end; never anything found earlier, so that parts of a shot give the same result
-        as the whole. Without an adjacent camera everything is assumed to move.
+        The camera's motion is that to the next frame, or to the previous one where
+        `frames` end. What other calls have found plays no part, so that a part of a
+        shot gives the same result as the whole. Without an adjacent frame everything is
+        assumed to move.
+
+        Parameters
+        ----------
+        frame : Stored
+            The frame to look at.
+        frames : mapping of int to Stored
+            Frames of the shot with Vector passes, by number.
+
+        Returns
+        -------
+        moving : (H W,) bool array
         """
         masks = self._moving.setdefault(frame, {})
         for step in (1, -1):

@@ -1,10 +1,15 @@
 """Virtual images: where what mirrors and glass show was in other frames.
 
-A plane mirror shows things at the depth of their image behind it, a pane what is beyond
-it; a curved mirror shows them somewhere between its surface and the length of the path.
-And an image may move by itself: in curved mirrors and thick glass, or with what it
-shows. Each candidate is reprojected into all neighbours, and the one whose guides match
-best is taken (a plane sweep, Collins 1996), for a lattice of spots.
+A plane mirror shows things at the depth of their virtual image behind it, a pane what
+is beyond it; a curved mirror shows them somewhere between its surface and the length of
+the path. And a virtual image may move by itself: in curved mirrors and thick glass, or
+with what it shows. For a lattice of spots each candidate is reprojected into all
+neighbours, and the one whose guides match best is taken: a plane sweep.
+
+References
+----------
+.. [1] Collins, R. T. (1996). A space-sweep approach to true multi-image matching.
+   IEEE Conference on Computer Vision and Pattern Recognition.
 """
 
 from __future__ import annotations
@@ -49,11 +54,18 @@ _TINY = np.float32(1e-9)
 
 @dataclass(frozen=True)
 class Images:
-    """The images that the pixels of a frame show.
+    """The virtual images that the pixels of a frame show.
 
-    `lattice` (h, w, 3) holds for every `stride` pixels where the image is, from the
-    surface (0) to the end of the path (1), NaN for a surface, and its own motion, x and
-    y in pixels per frame.
+    Attributes
+    ----------
+    frame : Stored
+        The frame.
+    stride : int
+        Distance between the spots of the lattice, in pixels.
+    lattice : (h, w, 3) float32 array
+        For each spot where the virtual image lies, from the surface (0) to the end of
+        the path (1), NaN for a surface; then its own motion, x and y in pixels per
+        frame.
     """
 
     frame: Stored
@@ -82,17 +94,28 @@ class Images:
 
 
 def reach(shape: tuple[int, int]) -> int:
-    """Return the pixels on each side of a pixel that influence its image."""
+    """Return the pixels on each side of a pixel that influence its virtual image."""
     return spot_stride(shape) * (_AREA // 2 + 2)
 
 
 def find_images(
     target: Stored, pairs: Sequence[Pair], apply: Apply = map
 ) -> Images | None:
-    """Return the images that `target` shows; None where it shows none.
+    """Find the virtual images that a frame shows.
 
-    `pairs` are of the target and each neighbour; `each` is `map`, or one that runs in
-    threads.
+    Parameters
+    ----------
+    target : Stored
+        The frame.
+    pairs : sequence of Pair
+        The frame and each of its neighbours.
+    apply : callable
+        `map`, or a function like it that runs in threads.
+
+    Returns
+    -------
+    images : Images or None
+        None where the frame shows no virtual image.
     """
     if target.image is None or not pairs:
         return None

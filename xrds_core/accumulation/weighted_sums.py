@@ -66,7 +66,7 @@ def light_for_albedo(frame: Stored) -> float:
     """Return the squared error of light's square root per squared error of albedo.
 
     A relative error of albedo is the same relative error of light, and half as much of
-    its square root. The mean over a frame.
+    its square root. The result is the mean over a frame.
     """
     assert frame.noise is not None
     light = float(floats(frame.noise.brightness[::7]).mean(dtype=np.float64)) ** 2 / 4
@@ -126,8 +126,15 @@ class Aligned:
 class Reprojected:
     """A neighbour whose pixels are found by reprojection and weighted.
 
-    `tiles` are its weights by coarse rejection; `fall` times the squared distance is
-    the logarithm of a weight.
+    Attributes
+    ----------
+    pair : Pair
+        The frame and the neighbour.
+    tiles : (rows, columns) float32 array
+        Weights of the tiles, from coarse rejection.
+    fall : float
+        The logarithm of a weight by distance is `fall` times the squared distance in
+        pixels.
     """
 
     pair: Pair
@@ -147,10 +154,18 @@ class Reprojected:
 
 @dataclass(frozen=True)
 class Means:
-    """Means over a frame's own and the samples that it reuses.
+    """Means over a frame's own and the reused samples.
 
-    `passes` of the picture, each (H, W, C), `parts` that are lit (H, W, 3), `samples`
-    (H, W), and how many samples were `reused` in all.
+    Attributes
+    ----------
+    passes : list of (H, W, C) float32 array
+        Passes of the picture.
+    parts : list of (H, W, 3) float32 array
+        AOVs and light passes that have light in any frame.
+    samples : (H, W) float32 array
+        Samples per pixel that the means are taken over.
+    reused : float
+        How many samples of neighbours were reused in all.
     """
 
     passes: list[Array]
@@ -161,10 +176,20 @@ class Means:
 
 @dataclass(frozen=True)
 class Work:
-    """The means of one frame and any of its neighbours.
+    """Computes the means over the samples of one frame and of any of its neighbours.
 
-    `images` are those that it shows, `usual` is `light_for_albedo`, `lit` are the names
-    of the parts with light in any frame.
+    Attributes
+    ----------
+    target : Stored
+        The frame that samples are gathered for.
+    images : Images or None
+        Virtual images that the frame shows.
+    usual : float
+        `light_for_albedo` of the frame.
+    lit : tuple of str
+        Names of the AOVs and light passes that have light in any frame.
+    threads : int or None
+        Number of threads; None for one for each processor.
     """
 
     target: Stored
@@ -231,10 +256,18 @@ class Spots:
 class Compared:
     """What some pixels of two frames say of each other.
 
-    `tiles` (4, rows, columns): of those of each tile that match how many there are, the
-    sum of what their light differs by, of its square, and of their own light. Of all
-    pixels, and of those that show a surface and no sky, how many were `compared` and
-    matched. `surfaces`: how many show one, compared or not.
+    Attributes
+    ----------
+    tiles : (4, rows, columns) float64 array
+        Of the pixels of each tile that match: their number, the sum of the differences
+        of their light, the sum of the squared differences, and the sum of their own
+        light.
+    compared, matching : int
+        How many pixels were compared, and how many match.
+    compared_surfaces, matching_surfaces : int
+        The same of pixels that show a surface, not the sky.
+    surfaces : int
+        How many pixels show a surface, compared or not.
     """
 
     tiles: NDArray[np.float64]
@@ -256,7 +289,21 @@ def find_spots(pair: Pair, step: int) -> Spots:
 
 
 def compare_spots(pair: Pair, step: int) -> Compared:
-    """Compare every `step`th pixel that neither moves nor is invalid, tile by tile."""
+    """Compare every `step`th pixel of two frames, tile by tile.
+
+    Pixels that move by themselves or are invalid are left out.
+
+    Parameters
+    ----------
+    pair : Pair
+        The frame and its neighbour.
+    step : int
+        Distance between the pixels compared, along both axes.
+
+    Returns
+    -------
+    comparison : Compared
+    """
     call = _spot_call(pair)
     spots = _spots(call, pair, step)
     tiles = np.zeros((4, *tile_grid(pair.here.shape)))

@@ -49,9 +49,27 @@ class Pictures:
 def check(
     radiance: Any, albedo: Any, normal: Any, parts: Mapping[str, Any]
 ) -> Pictures:
-    """Return the arrays, cleaned; float32 ones without a fault are not copied.
+    """Check and clean the arrays given to a denoiser.
 
-    Raises PictureError, with the sizes and the remedy, for arrays that do not fit.
+    Parameters
+    ----------
+    radiance : array_like
+        (H, W, 3) or (H, W, 4) floats.
+    albedo, normal : array_like or None
+        (H, W, 3) floats.
+    parts : mapping of str to array_like
+        AOVs and light passes, (H, W, 3), by name.
+
+    Returns
+    -------
+    pictures : Pictures
+        Without NaN, infinities or negative radiance. Float32 arrays without a fault are
+        not copied.
+
+    Raises
+    ------
+    PictureError
+        If arrays do not fit each other; it states their sizes and the remedy.
     """
     whole = float_array("radiance", radiance, (3, 4))
     given = {"albedo": albedo, "normal": normal}

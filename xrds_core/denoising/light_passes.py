@@ -21,9 +21,15 @@ _SHIPPED = Path(__file__).with_name("renderers.toml")
 
 @dataclass(frozen=True)
 class Lobe:
-    """A pass of light under one of its `names`; light is the pass times `colour`.
+    """A light pass; its light is the pass times a colour pass.
 
-    That is the pass it was divided by, under one of its names; () where there is none.
+    Attributes
+    ----------
+    names : tuple of str
+        The names that the pass may have.
+    colour : tuple of str
+        The names that the colour pass may have; () where the pass is not divided by a
+        colour.
     """
 
     names: tuple[str, ...]
@@ -32,10 +38,19 @@ class Lobe:
 
 @dataclass(frozen=True)
 class Renderer:
-    """The passes of light of one renderer.
+    """The AOVs and light passes of one renderer.
 
-    `lobes` add up to the picture. So do `groups`, patterns in which * stands for
-    anything; what is `alone` adds up to nothing.
+    Attributes
+    ----------
+    name : str
+        The renderer.
+    lobes : tuple of Lobe
+        Light passes that add up to the picture.
+    groups : tuple of str
+        Patterns of light groups, which add up to the picture too; * stands for
+        anything.
+    alone : tuple of str
+        Names of AOVs that add up to nothing.
     """
 
     name: str
@@ -45,10 +60,22 @@ class Renderer:
 
 
 def read_renderers(path: Path | None = None) -> tuple[Renderer, ...]:
-    """Return the renderers of a TOML file, before the known ones.
+    """Read the renderers of a TOML file.
 
-    `renderers.toml` beside this module shows its form. Raises UsageError, with what is
-    wrong and where, for a file that has another.
+    Parameters
+    ----------
+    path : Path, optional
+        A file of the form that `renderers.toml` beside this module has.
+
+    Returns
+    -------
+    renderers : tuple of Renderer
+        Those of the file, then the known ones.
+
+    Raises
+    ------
+    UsageError
+        If the file has another form; it says what is wrong and where.
     """
     return (_read(path) if path is not None else ()) + _shipped()
 
@@ -109,10 +136,21 @@ NONE, GROUPS, ALL = "none", "groups", "all"
 
 @dataclass(frozen=True)
 class LightPart:
-    """A pass of light: its `channels` R, G, B, and those of the `colour` it is over.
+    """An AOV or light pass of a file.
 
-    `colour` is () where the pass is light as it is. Parts of one `sum` add up to the
-    picture; "" adds up to nothing. `names` are all that it is known by.
+    Attributes
+    ----------
+    name : str
+        The name of the pass.
+    channels : tuple of str
+        Its channels R, G, B.
+    colour : tuple of str
+        Channels R, G, B of the colour that it was divided by; () where the pass is
+        light as it is.
+    sum : str
+        Parts with the same `sum` add up to the picture; "" adds up to nothing.
+    names : tuple of str
+        All names that it is known by.
     """
 
     name: str
@@ -129,9 +167,16 @@ class LightPart:
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which parts are wanted: NONE, GROUPS, ALL, or names.
+    """Which AOVs and light passes are wanted.
 
-    `alone` are names of further passes of light, which add up to nothing.
+    Attributes
+    ----------
+    which : tuple of str
+        NONE, GROUPS, ALL, or names.
+    alone : tuple of str
+        Names of further passes, which add up to nothing.
+    renderers : tuple of Renderer
+        What renderers call their passes.
     """
 
     which: tuple[str, ...] = (NONE,)
@@ -143,9 +188,26 @@ class Wanted:
 
 
 def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPart, ...]:
-    """Return the wanted parts of one layer of a file, and of what has no layer.
+    """Find the wanted AOVs and light passes of a file.
 
-    Raises UsageError for names that the file does not have.
+    Parameters
+    ----------
+    channels : Channels
+        Names of the file's channels.
+    layer : str
+        The layer to search, beside what lies in no layer.
+    wanted : Wanted
+        Which passes are wanted.
+
+    Returns
+    -------
+    parts : tuple of LightPart
+        Each pass once.
+
+    Raises
+    ------
+    UsageError
+        If the file lacks a pass that is wanted by its name.
     """
     if not wanted:
         return ()
@@ -232,9 +294,20 @@ def _unknown(channels: Channels, name: str, known: Collection[str]) -> UsageErro
 def light_of(
     parts: Sequence[LightPart], read: Callable[[tuple[str, ...]], Array]
 ) -> dict[str, Array]:
-    """Return the light of each part (H, W, 3), by its name, and the colours by theirs.
+    """Read the light of AOVs and light passes.
 
-    `read` gives the pixels of three channels.
+    Parameters
+    ----------
+    parts : sequence of LightPart
+        The passes.
+    read : callable
+        Takes three channel names and returns their pixels, (H, W, 3).
+
+    Returns
+    -------
+    light : dict of str to (H, W, 3) float32 array
+        Scene-linear light by the part's name: a pass times its colour. The colours are
+        added under `LightPart.colour_name`.
     """
     light: dict[str, Array] = {}
     for part in parts:
@@ -251,9 +324,19 @@ def light_of(
 def passes_of(
     parts: Sequence[LightPart], light: Mapping[str, Array]
 ) -> dict[tuple[str, ...], Array]:
-    """Return the pixels of each part's channels, and of the colours'.
+    """Return the pixels to write for AOVs and light passes: the inverse of `light_of`.
 
-    `light` is as `light_of` returns it.
+    Parameters
+    ----------
+    parts : sequence of LightPart
+        The passes.
+    light : mapping of str to (H, W, 3) float32 array
+        Light of the parts, and the colours, by name.
+
+    Returns
+    -------
+    passes : dict of tuple of str to (H, W, 3) float32 array
+        Light divided by its colour, and the colours, by their three channel names.
     """
     passes: dict[tuple[str, ...], Array] = {}
     for part in parts:
@@ -269,6 +352,6 @@ def passes_of(
 def passes_by_name(
     parts: Sequence[LightPart], light: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Return as `passes_of`, by the names of the passes."""
+    """Return what `passes_of` returns, by the names of the passes."""
     passes = passes_of(parts, light)
     return {channels[0].rpartition(".")[0]: x for channels, x in passes.items()}

@@ -24,11 +24,25 @@ _ROWS = 128  # at a time, so that memory does not grow with the picture
 def add_up(
     picture: Array, parts: Mapping[str, Array], masks: Mapping[str, Array] | None = None
 ) -> dict[str, Array]:
-    """Return parts (H, W, 3) that add up to a picture (H, W, 3); none is negative.
+    """Make AOVs or light passes add up to a picture; none becomes negative.
 
-    The rest goes to each by the square of its light: a denoiser's errors grow with it.
-    `masks`, by name, are colours (H, W, 3): a part that is 0 times one cannot have
-    light there, others take it. A part that is dark everywhere stays so.
+    What they miss of the picture goes to each by the square of its light: a denoiser's
+    errors grow with it.
+
+    Parameters
+    ----------
+    picture : (H, W, 3) float32 array
+        Scene-linear radiance.
+    parts : mapping of str to (H, W, 3) float32 array
+        Light by name. A part that is dark everywhere stays so.
+    masks : mapping of str to (H, W, 3) float32 array, optional
+        Colours by the part's name: where one is 0 the part cannot have light, and
+        others take it.
+
+    Returns
+    -------
+    parts : dict of str to (H, W, 3) float32 array
+        Light that adds up to the picture.
     """
     lit = [name for name, part in parts.items() if part.any()] or list(parts)
     result = dict(parts) | {name: np.empty_like(parts[name]) for name in lit}
@@ -52,10 +66,20 @@ def add_up(
 
 
 def completed(colour: Array) -> Array:
-    """Return a colour pass (H, W, 3) that is 0 only where it is around a pixel, too.
+    """Fill the zeros of a colour pass from the pixels around them.
 
-    Where a pixel's few samples have missed a lobe, its colour is 0, but not the light
-    that is denoised there. It becomes the mean of the 3x3 pixels around.
+    Where a pixel's few samples have missed a lobe its colour is 0, but the denoised
+    light there is not.
+
+    Parameters
+    ----------
+    colour : (H, W, 3) float32 array
+        A colour pass.
+
+    Returns
+    -------
+    completed : (H, W, 3) float32 array
+        Zeros are the mean of the 3x3 pixels around; 0 only where all of these are 0.
     """
     known = np.maximum(np.nan_to_num(colour, posinf=0.0), np.float32(0.0))
     if known.all():
@@ -87,10 +111,27 @@ def light_in(
     parts: Sequence[LightPart],
     like: Collection[str] | None = None,
 ) -> dict[str, Array]:
-    """Return the parts of a frame's `light` (H, W, 3), by name, without colours.
+    """Return the AOVs and light passes of a frame, without the colours.
 
-    Where those of one sum do not make up the radiance, what they miss is one more; or
-    where it is among the names that the result is to be `like`.
+    Where the parts of one sum do not make up the radiance, what they miss is one part
+    more.
+
+    Parameters
+    ----------
+    radiance : (H, W, 3) float32 array or None
+        Scene-linear radiance; None adds no such part.
+    light : mapping of str to (H, W, 3) float32 array
+        Light of the parts, and the colours, by name: what `light_of` returns.
+    parts : sequence of LightPart
+        The parts to return.
+    like : collection of str, optional
+        Names of the parts that the result is to have: what is missing is then a part
+        exactly where its name is among them.
+
+    Returns
+    -------
+    parts : dict of str to (H, W, 3) float32 array
+        Light by name.
     """
     light_by_name = {part.name: light[part.name] for part in parts}
     if radiance is None or not light_by_name:
@@ -110,9 +151,23 @@ def added_up(
     parts: Sequence[LightPart],
     colours: Mapping[str, Array],
 ) -> dict[str, Array]:
-    """Return denoised parts that add up to the denoised picture (H, W, 3 or 4).
+    """Make denoised AOVs and light passes add up to the denoised picture.
 
-    `colours` (H, W, 3) are those that parts are divided by, by name.
+    Parameters
+    ----------
+    picture : (H, W, 3) or (H, W, 4) float32 array
+        The denoised picture.
+    denoised : mapping of str to (H, W, 3) float32 array
+        Denoised light by name.
+    parts : sequence of LightPart
+        The parts to return.
+    colours : mapping of str to (H, W, 3) float32 array
+        The colours that parts are divided by, by `LightPart.colour_name`.
+
+    Returns
+    -------
+    parts : dict of str to (H, W, 3) float32 array
+        Light by name; parts that belong to no sum stay as they are.
     """
     light_by_name = {part.name: denoised[part.name] for part in parts}
     for name, members in _sums(parts).items():

@@ -21,7 +21,15 @@ _COMPOSITED = "Composite."  # Blender's layer for the output of its compositor
 
 
 class Channels:
-    """Names of channels, and which of them make a pass; `path` stands in errors."""
+    """Names of a file's channels, and which of them make a pass.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, for error messages.
+    names : collection of str
+        Full names of its channels.
+    """
 
     def __init__(self, path: str | Path, names: Collection[str]) -> None:
         self.path = path
@@ -34,10 +42,27 @@ class Channels:
         *,
         any_case: bool = False,
     ) -> str | None:
-        """Return the full name of the one pass that is called so, or None.
+        """Find a pass by its name.
 
-        `letters`: of its channels, any of these; of a colour or a direction by default.
-        Raises PictureError where several layers have it.
+        Parameters
+        ----------
+        wanted : str
+            The name; layers before it may be left out.
+        letters : sequence of str
+            Letters that the pass's channels may have; those of a colour or a direction
+            by default.
+        any_case : bool
+            Whether upper and lower case are the same.
+
+        Returns
+        -------
+        name : str or None
+            The full name of the pass; None if there is none.
+
+        Raises
+        ------
+        PictureError
+            If several layers have it.
         """
         prefixes = {name.rpartition(".")[0] for name in self.names}
         ending = f".{wanted}"
@@ -81,7 +106,7 @@ _USUAL = ("left", "right")
 
 
 def with_view(name: str, part: Part) -> str:
-    """A channel's full name with the view of its part, if that has one."""
+    """Return a channel's full name with the view of its part, if that has one."""
     view = part.attributes.get("view")
     if not isinstance(view, str) or view in name.split("."):
         return name
@@ -91,9 +116,20 @@ def with_view(name: str, part: Part) -> str:
 def by_view(
     parts: Sequence[Part], places: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Return the places of channels by their names without that of their view.
+    """Sort the places of channels by the view that they belong to.
 
-    The first view comes first; a file without views has one that is called "".
+    Parameters
+    ----------
+    parts : sequence of Part
+        Parts of a file.
+    places : mapping of str to object
+        Where each channel lies, by its full name.
+
+    Returns
+    -------
+    places_by_view : dict of str to dict
+        The first view comes first; names are without that of the view. A file without
+        views has one that is called "".
     """
     views = _views(parts, places)
     if len(views) < 2:

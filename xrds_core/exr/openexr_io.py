@@ -40,7 +40,15 @@ LARGEST_HALF = 65504.0
 
 @dataclass(frozen=True)
 class Encoding:
-    """16 bits for each number or 32, compressed by one of CODECS."""
+    """How numbers are stored in a file.
+
+    Attributes
+    ----------
+    half : bool
+        16 bits for each number, or else 32.
+    codec : str
+        Compression, one of CODECS.
+    """
 
     half: bool = False
     codec: str = "zip"
@@ -59,9 +67,9 @@ FLOAT_ZIP = Encoding()
 
 
 def fitting(pixels: Pixels, dtype: Any) -> Pixels:
-    """Pixels in another number format; what half floats cannot hold is bounded.
+    """Convert pixels to another number format; what half floats cannot hold is clipped.
 
-    Infinity stays what it is.
+    Infinity stays infinite.
     """
     if dtype == np.float16:
         bounded = np.clip(pixels, -LARGEST_HALF, LARGEST_HALF)
@@ -98,8 +106,21 @@ class Part:
 def read(path: str | Path) -> list[Part]:
     """Read all parts of a file.
 
-    Raises PictureError if it is not whole, or its header claims more than
-    `limits.limit_of` allows: then before memory is allocated.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    parts : list of Part
+        Parts with their channels.
+
+    Raises
+    ------
+    PictureError
+        If the file is not whole; or if its header claims more than
+        `raw_header.limit_of` allows, before memory is allocated.
     """
     limit = limit_of(check_input(Path(path)))
     return _read(path, limit) if not _is_shadowed() else _read_apart(path, limit)
@@ -117,9 +138,23 @@ def write(
     codec: str = FLOAT_ZIP.codec,
     attributes: Attributes | None = None,
 ) -> None:
-    """Write planes of one size by channel name, in their own number formats.
+    """Write planes of one size as a file of one part.
 
-    Raises PictureError with the library's reason if they cannot be written.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    planes : mapping of str to (H, W) array
+        Pixels by channel name, in their own number formats.
+    codec : str
+        Compression, one of CODECS.
+    attributes : dict, optional
+        Further attributes of the header.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written, with the library's reason.
     """
     height, width = next(iter(planes.values())).shape
     window = ((0, 0), (width - 1, height - 1))
@@ -130,7 +165,21 @@ def write(
 def write_part(path: str | Path, part: Part, codec: str = FLOAT_ZIP.codec) -> None:
     """Write a file of one part, with its windows and attributes.
 
-    Matrices are written in single precision. Raises PictureError as `write`.
+    Matrices are written in single precision.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    part : Part
+        Its only part.
+    codec : str
+        Compression, one of CODECS.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written, with the library's reason.
     """
     if not _is_shadowed():
         _write(path, part, codec)
@@ -150,13 +199,31 @@ def copy(
     window: Window | None = None,
     metadata: Mapping[str, str] | None = None,
 ) -> None:
-    """Write `source` to `path` with some channels replaced or added, by part.
+    """Copy a file with some channels replaced or added.
 
-    All others, the windows and attributes stay as they are; a plane that replaces
-    another gets its number format. `alone`: only the `planes`, of one part, are
-    written, with its windows and attributes. With a `window` all parts are cropped to
-    it, and planes are of it. `metadata` is added to the headers of parts with planes.
-    Raises PictureError.
+    All other channels, the windows and the attributes stay as they are. A plane that
+    replaces another gets its number format.
+
+    Parameters
+    ----------
+    source : str or Path
+        The file to copy.
+    path : str or Path
+        The file to write.
+    planes : mapping of int to mapping of str to (H, W) array
+        New pixels by the number of the part and the name of the channel.
+    alone : bool
+        Whether to write only `planes`, which are then of one part, with its windows and
+        attributes.
+    window : Window, optional
+        What all parts are cropped to; `planes` are then of this window.
+    metadata : mapping of str to str, optional
+        Added to the headers of the parts that `planes` are of.
+
+    Raises
+    ------
+    PictureError
+        If the source cannot be read or cropped, or the file not written.
     """
     limit = limit_of(check_input(Path(source)))
     added = dict(metadata or {})

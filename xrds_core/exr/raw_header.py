@@ -38,15 +38,29 @@ def is_mostly_empty(pixels: int, whole: int) -> bool:
 
 
 def limit_of(size: int) -> int:
-    """The bytes of pixels that are read of a file of `size` bytes."""
+    """Return the bytes of pixels that may be read from a file of `size` bytes."""
     return _allowed or max(_ALWAYS_READ, size * _USUAL_RATIO)
 
 
 def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
-    """Raise PictureError for impossible windows, or ones with too many pixels.
+    """Check what headers claim before memory is allocated for it.
 
-    The data window is inside the display window, or both inside one around them. Deep
-    pixels have any number of samples, which no header states: they are rejected.
+    The data window may lie inside the display window, or both inside one around them.
+    Deep pixels have any number of samples, which no header states: they are rejected.
+
+    Parameters
+    ----------
+    path : object
+        The file, for error messages.
+    headers : sequence of mapping
+        Headers of its parts.
+    limit : float
+        Most bytes of pixels.
+
+    Raises
+    ------
+    PictureError
+        For impossible windows, more pixels than the limit, or deep pixels.
     """
     claimed = 0
     for header in headers:

@@ -56,11 +56,26 @@ def error_ratio(
 ) -> Ratio:
     """Return the squared error of a picture over that of a frame of all samples.
 
-    `parts` are a `share` of all samples each, of seeds of their own; `picture`
-    (H, W, 3) and `noisy`, the mean of samples that the parts do not have either, were
-    made without them. All are radiance. Errors count as they are seen: relative to the
-    local light of their channel, and less where it is beyond white, 1 / `exposure`. The
-    ratio is infinite where noise hides the error of all samples.
+    Errors count as they are seen: relative to the local light of their channel, and
+    less where it is beyond white.
+
+    Parameters
+    ----------
+    picture : (H, W, 3) float32 array
+        Radiance of a picture that was made without `parts`.
+    noisy : (H, W, 3) float32 array
+        Radiance, the mean of samples that the parts do not have either.
+    parts : tuple of Rendered
+        Two renders, each with a share of all samples and a seed of its own.
+    exposure : float
+        White is a radiance of 1 / `exposure`.
+    share : float
+        Share of all samples that each part has.
+
+    Returns
+    -------
+    ratio : Ratio
+        Infinite where noise hides the error of all samples.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
         errors, part_errors = _errors(picture, noisy, parts, exposure)
@@ -122,10 +137,16 @@ def _spread(errors: Array) -> float:
 
 @dataclass(frozen=True)
 class Gain:
-    """What neighbours bring to a frame, by blocks.
+    """What the samples of neighbours bring to a frame, by blocks.
 
-    `errors` are what is left of each block's error, 1 where they bring nothing;
-    `noise` is the noise of its own samples, and `seen` whether it is ever visible.
+    Attributes
+    ----------
+    errors : (rows, columns) array
+        What is left of each block's error, 1 where neighbours bring nothing.
+    noise : (rows, columns) array
+        Noise of the frame's own samples.
+    seen : (rows, columns) bool array
+        Whether that noise is visible.
     """
 
     errors: Array
@@ -134,11 +155,11 @@ class Gain:
 
     @property
     def blocks(self) -> Array:
-        """How many times its own samples a block is worth; infinite without noise."""
+        """How many times its own samples a block equals; infinite without noise."""
         return np.where(self.seen, self.errors ** (-1.0 / FALL), np.inf)
 
     def of(self, blocks: NDArray[np.bool_]) -> float:
-        """How many times their own samples some blocks are worth together."""
+        """How many times their own samples some blocks together equal."""
         error = float(np.average(self.errors[blocks], weights=self.noise[blocks]))
         return float(max(error, _TINY) ** (-1.0 / FALL))
 

@@ -1,6 +1,6 @@
 """Samples that a frame gets beside its own, after its neighbours' were accumulated.
 
-From then on they are the frame's own: it lends them as well.
+From then on they are the frame's own: other frames reuse them as well.
 """
 
 from __future__ import annotations
@@ -23,10 +23,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ExtraSamples:
-    """Means over `samples` (H, W) more samples per pixel, 0 where there are none.
+    """Means over further samples of a frame.
 
-    `radiance`, `albedo` and `normal` (H, W, 3), `alpha` (H, W) and `parts` are as in
-    `Frame`.
+    Attributes
+    ----------
+    radiance, albedo, normal : (H, W, 3) float32 array
+        Passes of `Frame`, 0 where there are no samples.
+    alpha : (H, W) float32 array
+        Alpha.
+    samples : (H, W) float32 array
+        Further samples of each pixel, 0 where there are none.
+    parts : dict of str to (H, W, 3) float32 array
+        AOVs and light passes, by name.
     """
 
     radiance: Array
@@ -56,11 +64,23 @@ def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
 
 
 def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
-    """Return a frame whose own samples are extra ones as well.
+    """Return a frame whose own samples include extra ones.
 
-    `alone` is the frame as accumulated without neighbours. `noise` stays that of the
-    samples which the frame had: the mean root of more samples is larger, and would be
-    other light beside frames that have fewer.
+    `noise` stays that of the samples which the frame had: the mean root of more samples
+    is larger, and would be other light beside frames that have fewer.
+
+    Parameters
+    ----------
+    frame : Stored
+        The frame as rendered.
+    alone : Accumulated
+        The frame as accumulated without neighbours.
+    extra : ExtraSamples
+        Its extra samples.
+
+    Returns
+    -------
+    enriched : Stored
     """
     combined = with_extra(alone, alone, extra)
     rows = _rows(extra.samples)
@@ -95,10 +115,22 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
 def with_extra(
     frame: Accumulated, alone: Accumulated, extra: ExtraSamples, worth: float = 1.0
 ) -> Accumulated:
-    """Return a frame with extra samples; itself where these are not finite.
+    """Return an accumulated frame with extra samples, where these are finite.
 
-    `alone` is the frame without its neighbours, whose samples count as `worth` of its
-    own.
+    Parameters
+    ----------
+    frame : Accumulated
+        The frame with the samples of its neighbours.
+    alone : Accumulated
+        The frame without them.
+    extra : ExtraSamples
+        Its extra samples.
+    worth : float
+        Value of a neighbour's sample relative to one of the frame's own.
+
+    Returns
+    -------
+    combined : Accumulated
     """
     rows = _rows(extra.samples)  # often few of many
     usable = np.isfinite(extra.alpha[rows]) & (extra.samples[rows] > 0.0)

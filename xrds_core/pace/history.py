@@ -1,9 +1,9 @@
 """The history of a shot whose camera stands still: frames that have left its window.
 
 There every pixel shows the same surface for as long as nothing moves in front of it, so
-frames older than the temporal radius are still worth something. They are stored as one
-frame, the mean of their samples. A frame joins it as it takes neighbours itself: where
-it shows something else, or in other light, the pixel's history begins anew.
+frames older than the temporal radius are still useful. They are stored as one frame,
+the mean of their samples. A frame joins it in the way it reuses neighbours itself:
+where it shows something else, or other light, the pixel's history begins anew.
 """
 
 from __future__ import annotations

@@ -52,9 +52,12 @@ _NO_FIT = (
 
 
 class DepthKind:
-    """Looks at the frames of a shot, as long as nothing is known.
+    """Looks at the frames of a shot, as long as nothing is known of their depth.
 
-    `say` takes one line about a depth that is of another kind.
+    Parameters
+    ----------
+    say : callable
+        Takes one line of text about a depth that is of another kind.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
@@ -78,7 +81,18 @@ class DepthKind:
 
 
 def kind_of(frame: Stored) -> str:
-    """Say how a depth differs from one along the axis by its normals; "" if it fits."""
+    """Say how a depth differs from one along the camera's axis, by its normals.
+
+    Parameters
+    ----------
+    frame : Stored
+        A frame with a perspective camera.
+
+    Returns
+    -------
+    mismatch : str
+        A phrase; "" if the depth fits or nothing can be said.
+    """
     pairs = _surface(frame)
     if pairs.shape[1] < _FEWEST:
         return ""
@@ -104,7 +118,18 @@ def kind_of(frame: Stored) -> str:
 
 
 def unit_of(frame: Stored, other: Stored) -> str:
-    """Say by which factor the depth of two frames fits their cameras; "" for 1."""
+    """Say by which factor depths have to be multiplied to fit the cameras.
+
+    Parameters
+    ----------
+    frame, other : Stored
+        Two frames of a shot.
+
+    Returns
+    -------
+    mismatch : str
+        A phrase; "" if the depth fits or nothing can be said.
+    """
     if frame.shape != other.shape:
         return ""
     spots = spread(np.flatnonzero(frame.inverse_depth > 0.0), _SPOTS)

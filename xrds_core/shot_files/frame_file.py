@@ -46,13 +46,27 @@ _CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # placeholder where none is need
 class Reading:
     """Options for reading files, for what they do not say themselves.
 
-    `cameras` are those of `cameras.read_cameras`; `samples` per pixel; `normal_space`
-    and `position_space` are `world` or `camera`, None for what the passes' names say;
-    `motion_scale` are the factors that convert a motion pass of two channels to pixels
-    to the next frame, x to the right and y upwards. `halves` is a pattern of files with
-    the second half buffers: as many other samples of each frame. `light` are the parts
-    of the light that are read as well; `also` are patterns of files with further
-    passes. The picture of one without passes is called as the file without the number.
+    Attributes
+    ----------
+    names : PassNames
+        What passes are called.
+    cameras : mapping or None
+        What `cameras.read_cameras` returns; None for the cameras of the headers.
+    samples : int or None
+        Samples per pixel.
+    normal_space, position_space : {'world', 'camera'} or None
+        None for what the passes' names say.
+    motion_scale : tuple of float
+        Factors that convert a motion pass of two channels to pixels to the next frame,
+        x to the right and y upwards.
+    halves : str or None
+        Pattern of files with the second half buffers: as many other samples of each
+        frame.
+    light : Wanted
+        AOVs and light passes to read as well.
+    also : tuple of str
+        Patterns of files with further passes. The picture of one without passes is
+        called by the file's name without the number.
     """
 
     names: PassNames = field(default_factory=PassNames)
@@ -68,18 +82,38 @@ class Reading:
 
 @dataclass(frozen=True)
 class FrameFile:
-    """A frame of a file.
+    """A frame read from a file.
 
-    `stored` covers the display window and all that the picture's data window has
-    beyond it, or, of a frame that is not to be reused, the data window alone; `inner`
-    crops its arrays to the latter, `data_window`. `part` is the file's part with the
-    picture and `channels` are those of the picture, R, G, B and, where the file has
-    alpha, A. Frames with the same `key` have the same render settings; "" if unknown.
-    `radius` is the one that the file recommends, or None, and `subset` that of
-    `Frame`. `reusable` is False where the frame cannot be reprojected. `light` are the
-    parts of its light that were read; `places` says in which part of the file a channel
-    lies, and what it is called there.
-    `others` are the other views of a stereo file, `unread` says why some are not read.
+    Attributes
+    ----------
+    stored : Stored
+        Covers the display window and all that the picture's data window has beyond it;
+        for a frame that is not to be reused, the data window alone.
+    inner : tuple of slice
+        Crops the arrays of `stored` to `data_window`.
+    data_window : Window
+        Data window of the picture.
+    part : int
+        The file's part with the picture.
+    channels : list of str
+        Channels of the picture: R, G, B and, where the file has alpha, A.
+    key : str
+        Frames with the same key have the same render settings; "" if unknown.
+    radius : int or None
+        The temporal radius that the file recommends.
+    reusable : bool
+        False where the frame cannot be reprojected.
+    subset : int or None
+        `Frame.subset`.
+    light : tuple of LightPart
+        AOVs and light passes that were read.
+    places : mapping of str to (int, str)
+        The part of the file that a channel of `light` lies in, and what it is called
+        there.
+    others : mapping of str to FrameFile
+        The other views of a stereo file.
+    unread : mapping of str to str
+        Why some views are not read.
     """
 
     stored: Stored
@@ -100,10 +134,31 @@ class FrameFile:
 def read_frame(
     path: Path, number: int, reading: Reading, *, reusable: bool = True
 ) -> FrameFile:
-    """Read a frame; one that need not be `reusable` needs no camera and no depth.
+    """Read a frame; of a stereo file the first view, with the others in `others`.
 
-    Of a stereo file it is the first view, with the `others`. Raises Unfit, also
-    NotReusable, with the path and the remedy, and PictureError for an incomplete file.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    number : int
+        Frame number.
+    reading : Reading
+        Options.
+    reusable : bool
+        False for a frame that needs no camera and no depth.
+
+    Returns
+    -------
+    frame : FrameFile
+
+    Raises
+    ------
+    NotReusable
+        If the frame can be denoised by itself, but not be reprojected.
+    Unfit
+        If the file lacks a pass, with the path and the remedy.
+    PictureError
+        If the file is incomplete.
     """
     first, *rest = File(path, _also(path, number, reading)).views()
     frame = _read_view(first, number, reading, reusable)

@@ -20,10 +20,26 @@ if TYPE_CHECKING:
 
 
 class Loader:
-    """Reads frames; `failed` holds the reasons for unreadable ones, by number.
+    """Reads the frames of a sequence.
 
     A frame that is damaged or lacks passes is left out, and the others go on without
     it. But what the first two lack is assumed to be missing in all: that is raised.
+
+    Parameters
+    ----------
+    pattern : str
+        Path of the files, with # for the digits of the frame number.
+    recipe : Recipe
+        The files of each frame, and how they are read.
+    reusable : bool
+        False for frames that need no camera and no depth.
+    say : callable
+        Takes one line of text about a frame.
+
+    Attributes
+    ----------
+    failed : dict of int to str
+        Why frames were not read, by number.
     """
 
     def __init__(
@@ -44,7 +60,15 @@ class Loader:
         self._seconds = 0.0
 
     def look(self, numbers: Sequence[int], existing: Container[int]) -> None:
-        """Report frames without a file, in one line; `there` are those with one."""
+        """Report frames without a file, in one line.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            The frames.
+        existing : container of int
+            Those with a file.
+        """
         missing = [n for n in numbers if n not in existing]
         paths = {n: frame_path(self._pattern, n) for n in missing}
         self.failed |= {n: f"no file {path}" for n, path in paths.items()}
@@ -127,10 +151,15 @@ class Loader:
 
 
 class NeighbourSelection:
-    """Leaves out neighbours of another size, with other passes, or of another render.
+    """Leaves out neighbours whose samples cannot be reused.
 
-    And those that have the same noise. `say` takes a line about each frame that does
-    not fit its neighbours, once, and about depths of another kind.
+    Those have another size, other passes, the same noise, or come from another render.
+
+    Parameters
+    ----------
+    say : callable
+        Takes one line of text about each frame that does not fit its neighbours, and
+        about depths of another kind.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
@@ -143,7 +172,22 @@ class NeighbourSelection:
     def select(
         self, number: int, own: FrameFile, beside: Mapping[int, FrameFile]
     ) -> list[Stored]:
-        """Return the neighbours whose samples frame `number` reuses, in their order."""
+        """Select the neighbours whose samples a frame reuses.
+
+        Parameters
+        ----------
+        number : int
+            Frame number.
+        own : FrameFile
+            The frame.
+        beside : mapping of int to FrameFile
+            Its neighbours.
+
+        Returns
+        -------
+        neighbours : list of Stored
+            In the order of `beside`.
+        """
         if not own.reusable:
             return []
         fitting = [

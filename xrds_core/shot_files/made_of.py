@@ -31,18 +31,40 @@ State = tuple[tuple[str, int, int, str] | None, ...]
 
 @dataclass(frozen=True)
 class Recipe:
-    """What all frames are made of: patterns of their files, options, and settings."""
+    """What all frames are made of.
+
+    Attributes
+    ----------
+    patterns : tuple of str
+        Patterns of the files of a frame.
+    reading : Reading
+        How they are read.
+    settings : tuple
+        Settings that change the picture.
+    """
 
     patterns: tuple[str, ...]
     reading: Reading
     settings: tuple[object, ...]
 
     def state(self, number: int) -> State:
-        """The files of a frame, as they are now."""
+        """Return the state of a frame's files, as they are now."""
         return tuple(_state(frame_path(x, number)) for x in self.patterns)
 
     def digest(self, states: Mapping[int, State], number: int) -> str:
-        """Of a frame, from the `states` of its files and of its neighbours'."""
+        """Return a digest of what a frame is made of.
+
+        Parameters
+        ----------
+        states : mapping of int to State
+            States of the files of the frame and of its neighbours.
+        number : int
+            Frame number.
+
+        Returns
+        -------
+        digest : str
+        """
         cameras = self.reading.cameras or {}
         seen = {n: cameras.get(n, cameras.get(None)) for n in states}
         # the states tell which files these are

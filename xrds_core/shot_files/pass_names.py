@@ -34,9 +34,9 @@ _MOTION = ("XYZW", "RGBA", "xyzw", "XY", "RG", "xy", "rg", "UV", "uv")
 
 @dataclass(frozen=True)
 class PassNames:
-    """The names of the passes; None for the usual ones.
+    """What the passes of a file are called; None for the usual names.
 
-    Their layer may be left out. `beauty` is the noisy radiance.
+    Layers before the names may be left out. `beauty` is the noisy radiance.
     """
 
     beauty: str | None = None
@@ -54,9 +54,26 @@ PASSES = tuple(field.name for field in fields(PassNames))
 class PassChannels:
     """The full names of the channels of the passes that a file has.
 
-    `picture` are the channels that the finished picture is written to, R, G, B, and
-    `alpha` is the one that holds alpha in the input. With `has_length` depth is a
-    length along the ray.
+    Lists are empty where the file lacks a pass.
+
+    Attributes
+    ----------
+    beauty : list of str
+        Noisy radiance.
+    albedo, normal : list of str
+        Guides.
+    position, depth, path_length, vector : list of str
+        Geometry and motion.
+    noise, counts : list of str
+        Noise and sample counts that XRDS has stored.
+    picture : list of str
+        Channels that the finished picture is written to: R, G, B.
+    alpha : str or None
+        The channel with the alpha of the input.
+    has_camera_normal : bool
+        Whether normals are in camera space.
+    has_length : bool
+        Whether depth is a length along the ray.
     """
 
     beauty: list[str]
@@ -77,8 +94,23 @@ class PassChannels:
 def find_passes(channels: Channels, names: PassNames) -> PassChannels:
     """Find the passes of a file.
 
-    Raises Unfit where beauty, albedo or normal is missing, or a pass requested by name;
-    PictureError where several layers hold one.
+    Parameters
+    ----------
+    channels : Channels
+        Names of the file's channels.
+    names : PassNames
+        What its passes are called.
+
+    Returns
+    -------
+    passes : PassChannels
+
+    Raises
+    ------
+    Unfit
+        If beauty, albedo or normal is missing, or a pass requested by its name.
+    PictureError
+        If several layers hold a pass.
     """
     beauty = _pass(channels, names, "beauty")
     prefix = "" if beauty is None else beauty

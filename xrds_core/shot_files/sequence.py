@@ -45,13 +45,24 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True)
 class Files:
-    """Inputs and outputs; # stands for digits of the frame number.
+    """Inputs and outputs of a sequence; # stands for digits of the frame number.
 
-    `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
-    the input as well, unchanged. `others` are files that are read besides the frames,
-    `halves` is the pattern of their second half buffers, `also` those of further files
-    of each frame. `crop` is the part of the picture that is denoised and written, first
-    and last pixel in the coordinates of the files.
+    Attributes
+    ----------
+    source, output : str
+        Patterns of the frames' files and of the finished ones.
+    picture_only : bool
+        Whether the output gets R, G, B and A alone; otherwise all other channels of the
+        input as well, unchanged.
+    others : tuple of Path
+        Files that are read besides the frames.
+    halves : str or None
+        Pattern of the second half buffers.
+    also : tuple of str
+        Patterns of further files of each frame.
+    crop : Window or None
+        The part of the picture to denoise and write: first and last pixel in the
+        coordinates of the files.
     """
 
     source: str
@@ -78,7 +89,29 @@ class Files:
         metadata: Mapping[str, str],
         check: Callable[[], None] = lambda: None,
     ) -> Path:
-        """Write the finished views of a frame, or none; PictureError, as of `check`."""
+        """Write the finished views of a frame, or none.
+
+        Parameters
+        ----------
+        number : int
+            Frame number.
+        views : mapping of str to (FrameFile, Finished)
+            The views as read and as finished, by name.
+        metadata : mapping of str to str
+            Attributes of the header.
+        check : callable
+            Raises PictureError if nothing is to be written.
+
+        Returns
+        -------
+        path : Path
+            The file.
+
+        Raises
+        ------
+        PictureError
+            If the file cannot be written.
+        """
         by_part: dict[int, dict[str, Array]] = {}
         first, _ = next(iter(views.values()))
         for view, (frame, finished) in views.items():
@@ -117,9 +150,21 @@ class Files:
         return is_complete(output)
 
     def check(self, numbers: Sequence[int], existing: Sequence[int]) -> None:
-        """Reject impossible outputs; make their folder.
+        """Reject impossible outputs, and make their folder.
 
-        `there` are all frames that have a file: none may be overwritten.
+        Parameters
+        ----------
+        numbers : sequence of int
+            The frames to denoise.
+        existing : sequence of int
+            All frames that have a file: none may be overwritten.
+
+        Raises
+        ------
+        UsageError
+            If the patterns fit no sequence.
+        PictureError
+            If an output cannot be written or is an input.
         """
         if Path(self.output).suffix.lower() != ".exr":
             raise UsageError(f"output {self.output!r} must end in .exr")
@@ -162,23 +207,38 @@ def denoise_sequence(
 ) -> dict[str, Any]:
     """Denoise the frames of a sequence, each with its neighbours' samples, in order.
 
-    Args:
-        files: inputs and outputs.
-        frames: their numbers; by default all that exist. Samples of other existing
-            frames, between these or next to them, are reused, too.
-        radius: how many frames before and after are neighbours; by default what the
-            files recommend, or 4.
-        resume: skip outputs that are complete and made of these settings and of the
-            inputs as they are now.
-        say: takes a line about a frame that is finished, left out, or not reusable.
+    Parameters
+    ----------
+    files : Files
+        Inputs and outputs.
+    denoiser : Denoiser
+        The denoiser.
+    frames : iterable of int, optional
+        Frame numbers; all that exist by default. Samples of other existing frames,
+        between these or next to them, are reused, too.
+    radius : int, optional
+        How many frames before and after are neighbours; by default what the files
+        recommend, or 4.
+    reading : Reading, optional
+        Options for reading.
+    resume : bool
+        Skip outputs that are complete and made of these settings and of the inputs as
+        they are now.
+    say : callable
+        Takes a line about a frame that is finished, left out, or not reusable.
 
-    Returns:
+    Returns
+    -------
+    result : dict
         What `xrds denoise --json` prints; `left_out` says why frames were not read.
 
-    Raises:
-        UsageError: no frames, or impossible outputs.
-        PictureError: no frame can be read, the first lacks passes, or an output cannot
-            be written; outputs before it are complete.
+    Raises
+    ------
+    UsageError
+        If there are no frames, or outputs are impossible.
+    PictureError
+        If no frame can be read, the first lacks passes, or an output cannot be written;
+        outputs before it are complete.
     """
     numbers = _numbers(files, frames, say)
     existing = _existing_frames(files.source, numbers)

@@ -16,9 +16,18 @@ _BAND = 64  # low-resolution rows at a time bound the memory of what is in betwe
 
 
 def finish(picture: Array, low: Array, guide_alpha: Array | None, scale: int) -> None:
-    """Fill in the alpha of `picture` (H, W, 4) and free its radiance of fringes.
+    """Fill in the alpha of a picture and free its radiance of fringes, in place.
 
-    `picture` was made from `low` (h, w, 4); `guide_alpha` is (H, W).
+    Parameters
+    ----------
+    picture : (H, W, 4) float32 array
+        The enlarged picture, premultiplied.
+    low : (h, w, 4) float32 array
+        The picture that it was made from.
+    guide_alpha : (H, W) float32 array or None
+        Alpha of the guides' render.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
     """
     height = low.shape[0]
     for top in range(0, height, _BAND):

@@ -41,9 +41,20 @@ LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
 
 
 def clean_radiance(x: Array) -> tuple[Array, int]:
-    """Return (x, bad pixels): NaN and infinities filled in, negative values 0.
+    """Replace pixels that hold no light.
 
-    `x` itself is returned where nothing is wrong with it; else a copy.
+    Parameters
+    ----------
+    x : (h, w, C) float32 array
+        Scene-linear radiance, with alpha or without.
+
+    Returns
+    -------
+    cleaned : (h, w, C) float32 array
+        NaN and infinities are filled in, negative values are 0. `x` itself where
+        nothing is wrong with it; else a copy.
+    bad_pixels : int
+        How many pixels were replaced.
     """
     if not x.size or (x.min() >= 0.0 and np.isfinite(x.max())):
         return x, 0
@@ -74,12 +85,26 @@ def clean_normal(x: Array) -> tuple[Array, int]:
 
 
 def auto_exposure(radiance: Array) -> float:
-    """Return e: the key over the geometric mean luminance of the picture's bins.
+    """Return the exposure e: the key over the geometric mean luminance of bins.
 
-    `radiance` (h, w, 3 or more) is clean and low-resolution. Its bins are at
-    most 16 x 16, whatever its size, so that a tiny render of a frame gives the
-    frame's own exposure. Bins far from the bright ones, in either direction, are left
-    out. After OIDN's auto-exposure (Afra, 2019).
+    The picture is divided into at most 16 x 16 bins, whatever its size, so that a tiny
+    render of a frame gives the frame's own exposure. Bins far from the bright ones, in
+    either direction, are left out. This follows the auto-exposure of OIDN [1]_.
+
+    Parameters
+    ----------
+    radiance : (h, w, 3 or more) float32 array
+        Clean, low-resolution radiance.
+
+    Returns
+    -------
+    exposure : float
+        1 for a black picture.
+
+    References
+    ----------
+    .. [1] Afra, A. T. (2019). Intel Open Image Denoise.
+       https://www.openimagedenoise.org
     """
     luminance = radiance[..., :3].astype(np.float64) @ np.asarray(LUMINANCE)
     for axis in (0, 1):
@@ -94,9 +119,23 @@ def auto_exposure(radiance: Array) -> float:
 
 
 def choose_exposure(exposure: float | None, radiance: Array) -> float:
-    """Return the requested exposure e, or else the one of `radiance`.
+    """Return the requested exposure e, or else the one of the picture.
 
-    Raises UsageError for an exposure beyond the range of float32 arithmetic.
+    Parameters
+    ----------
+    exposure : float or None
+        The requested one.
+    radiance : (h, w, 3 or more) float32 array
+        Clean, low-resolution radiance.
+
+    Returns
+    -------
+    exposure : float
+
+    Raises
+    ------
+    UsageError
+        If the exposure is beyond the range of float32 arithmetic.
     """
     if exposure is None:
         return auto_exposure(radiance)
@@ -120,7 +159,17 @@ def _bin_means(x: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
 def transfer(x: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
     """Return t(x) = log(1 + k e x) in float32, for radiance >= 0 of any range.
 
-    `exposure` may be a tensor that broadcasts against `x`, one e a picture.
+    Parameters
+    ----------
+    x : array or Tensor
+        Scene-linear radiance.
+    exposure : float or Tensor
+        e; a tensor that broadcasts against `x` gives each picture its own.
+
+    Returns
+    -------
+    t : array or Tensor
+        Radiance in the transfer domain.
     """
     if isinstance(x, Tensor):
         exposed = x.float() * (TRANSFER_GAIN * exposure)
@@ -160,11 +209,23 @@ def upsample_bilinear(x: Tensor, scale: int) -> Tensor:
 
 
 def demodulated_base(radiance: Array, albedo: Array, scale: int) -> Array:
-    """Return up(L / down(A')) A' with A' = albedo + epsilon, albedo in [0, 1].
+    """Return up(L / down(A')) A' with A' = albedo + epsilon.
 
-    `radiance` (h, w, 3) and `albedo` (s h, s w, 3) are clean; the result is
-    radiance (s h, s w, 3). Lighting is smoother than texture, so it is what is
-    interpolated.
+    Lighting is smoother than texture, so it is what is interpolated.
+
+    Parameters
+    ----------
+    radiance : (h, w, 3) float32 array
+        L: clean, scene-linear.
+    albedo : (s h, s w, 3) float32 array
+        Clean, in [0, 1].
+    scale : int
+        s
+
+    Returns
+    -------
+    base : (s h, s w, 3) float32 array
+        Radiance.
     """
     guide = to_planes(albedo) + ALBEDO_EPSILON
     return to_picture(_modulated(to_planes(radiance), guide, scale))
@@ -175,9 +236,25 @@ def regressed_base(
 ) -> Array:
     """Return up(L / down(E)) E with E what the guides explain of L around every pixel.
 
-    As `demodulated_base`, but the picture itself, with what it was before denoising,
+    Unlike in `demodulated_base` the picture itself, with what it was before denoising,
     decides how much of the albedo and of the normal's shading goes into E, and gets
     back into L what denoising took of these: see `regression.explain`.
+
+    Parameters
+    ----------
+    radiance : (h, w, 3) float32 array
+        L: clean, scene-linear.
+    noisy : (h, w, 3) float32 array
+        The same before denoising.
+    albedo, normal : (s h, s w, 3) float32 array
+        Guides, clean.
+    scale : int
+        s
+
+    Returns
+    -------
+    base : (s h, s w, 3) float32 array
+        Radiance.
     """
     gain = _exposure_gain(auto_exposure(radiance))
     guides = torch.cat((to_planes(albedo), to_planes(normal)), dim=1)
@@ -192,9 +269,20 @@ def _modulated(low: Tensor, modulator: Tensor, scale: int) -> Tensor:
 
 
 def pad_guide(guide: Array, low: Array, scale: int) -> Array:
-    """Return the guide (H, W, ...) as far as the pixels of `low` (h, w, ...) reach.
+    """Return a guide as far as the low-resolution pixels reach; its edge is repeated.
 
-    The edge is repeated at the bottom and right; H <= s h, W <= s w.
+    Parameters
+    ----------
+    guide : (H, W, ...) array
+        H <= s h, W <= s w.
+    low : (h, w, ...) array
+        The low-resolution picture.
+    scale : int
+        s
+
+    Returns
+    -------
+    padded : (s h, s w, ...) array
     """
     missing = [
         (0, scale * size - have)
@@ -204,10 +292,22 @@ def pad_guide(guide: Array, low: Array, scale: int) -> Array:
 
 
 def upsample_alpha(low_alpha: Array, guide_alpha: Array, scale: int) -> Array:
-    """Return alpha (H, W): the edges of `guide_alpha`, the cover of `low_alpha`.
+    """Return alpha with the edges of the guides and the cover of the picture.
 
-    `low_alpha` (h, w), `guide_alpha` (H, W) with H <= s h, W <= s w. Exactly 0
-    or 1 wherever the low-resolution pixel and the guide both are.
+    It is exactly 0 or 1 wherever the low-resolution pixel and the guide both are.
+
+    Parameters
+    ----------
+    low_alpha : (h, w) float32 array
+        Alpha of the low-resolution picture.
+    guide_alpha : (H, W) float32 array
+        Alpha of the guides' render; H <= s h, W <= s w.
+    scale : int
+        s
+
+    Returns
+    -------
+    alpha : (H, W) float32 array
     """
     height, width = guide_alpha.shape
     low = to_planes(np.clip(low_alpha, 0.0, 1.0)[..., None])

@@ -28,10 +28,23 @@ _BAND = 64  # low-resolution rows that the base is found for at once
 def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
     """Return the rectangle outside which the base is the picture.
 
-    Blocks of `block` low-resolution pixels are idle where nothing but background is
-    seen (normal 0, albedo that holds its radiance), or where every input is even. The
-    rectangle is aligned to blocks and has a margin of at least `margin` pixels around
-    what is busy. None if nothing is busy; the whole picture if too little is idle.
+    Blocks are idle where nothing but background is seen (normal 0, albedo that holds
+    its radiance), or where every input is even.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        The picture and its guides.
+    block : int
+        Side of a block, in low-resolution pixels; the rectangle is aligned to blocks.
+    margin : int
+        Least margin around what is busy, in low-resolution pixels.
+
+    Returns
+    -------
+    area : tuple of slice or None
+        Low-resolution rows and columns. None if nothing is busy; the whole picture if
+        too little is idle.
     """
     height, width = inputs.low.shape[:2]
     whole = slice(0, height), slice(0, width)

@@ -1,6 +1,7 @@
 """The base of the small presets: predicted kernels over demodulated radiance.
 
-Not from the paper. Shape letters as in `network`.
+Not from the paper. Shape letters: B batch, C channels, h w cells or low-resolution
+pixels, H W output pixels, s scale.
 """
 
 from __future__ import annotations
@@ -49,15 +50,28 @@ FACTS = FEATURES + 1
 def find_sources(
     radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int
 ) -> tuple[Sources, Tensor]:
-    """The radiance as it is and its demodulated variants, and facts (B, 5, h, w).
+    """Return the pictures that kernels gather from, and facts about them.
 
-    By albedo, and last by what albedo and normal explain of it around every pixel; see
-    `regression.explain`, which also restores what denoising took away. The facts are
-    the slopes found there, and the mean over the colours of the grain.
+    The pictures are the radiance as it is, divided by albedo, and divided by what
+    albedo and normal explain of it around every pixel: see `regression.explain`, which
+    also restores what denoising took away. The division is by the area mean of the
+    modulator, so that modulating again keeps the mean of the low-resolution pixel.
 
-    `radiance` and `noisy` (B, 3, h, w) are in the transfer domain. The division is by
-    the area mean of the modulator, so that modulating again keeps the mean of the
-    low-resolution pixel.
+    Parameters
+    ----------
+    radiance, noisy : (B, 3, h, w) Tensor
+        Radiance, denoised and before, in the transfer domain.
+    guides : (B, 6, H, W) Tensor
+        Albedo in [0, 1] and normal.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+
+    Returns
+    -------
+    sources : list of Source
+        Linear radiance, and what then multiplies it.
+    facts : (B, 5, h, w) Tensor
+        The slopes of the regression, and the mean of the grain over the colours.
     """
     guides = guides.float()
     low, grain, explained, slopes = explain(
