@@ -35,8 +35,23 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yield a path beside `path` to write to; it takes `path`'s place at the end.
 
     On an error nothing is left of it and `path` is as it was. Any number of threads,
-    processes and machines may replace one path at once: it is whole at any time. The
-    folder must exist. Of a symbolic link the file that it leads to is replaced.
+    processes and machines may replace one path at once: it is whole at any time.
+
+    Parameters
+    ----------
+    path : Path
+        The file, in an existing folder. Of a symbolic link the file that it leads to is
+        replaced.
+
+    Yields
+    ------
+    unfinished : Path
+        The path to write to.
+
+    Raises
+    ------
+    OSError
+        If the path is no regular file, or cannot be written.
     """
     path = Path(os.path.realpath(path))
     if path.exists() and not path.is_file():

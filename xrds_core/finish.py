@@ -53,10 +53,10 @@ def rectangles(
     rectangles : list of Rectangle
         Rows and columns of blocks; all marked blocks lie in one of them.
     """
-    areas = [x for x in (_bounds(blocks),) if x is not None]
+    areas = [bounds for bounds in (_bounds(blocks),) if bounds is not None]
     while areas and len(areas) < most:
         splits = [(_split(blocks, area), area) for area in areas]
-        (parts, gain), divided = max(splits, key=lambda x: x[0][1])
+        (parts, gain), divided = max(splits, key=lambda split: split[0][1])
         if not parts or gain < max(0.25 * _blocks_in(divided), call):
             break
         areas.remove(divided)
@@ -237,8 +237,10 @@ def finish_frame(
                 inner = part[area.within]
                 whole[area.place] = inner + (whole[area.place] - inner) * weight
         denoised = replace(denoised, radiance=mixed)
-    names = dict.fromkeys(x.colour_name for x in light if x.colour)
-    colours = {x: completed(accumulated.parts[x][region]) for x in names}
+    names = dict.fromkeys(
+        light_part.colour_name for light_part in light if light_part.colour
+    )
+    colours = {name: completed(accumulated.parts[name][region]) for name in names}
     finished_light = colours | added_up(
         denoised.radiance, denoised.parts, light, colours
     )

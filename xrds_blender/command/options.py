@@ -254,7 +254,7 @@ def choice_of(options: argparse.Namespace) -> SceneChoice:
 
 
 def request_of(options: argparse.Namespace) -> Request:
-    """What the options of `add_request` ask for; raises UsageError."""
+    """Build a request from the options of `add_request`; raises UsageError."""
     _check_pace(options)
     _check_light(options)
     given = _named(options, CHOICES)

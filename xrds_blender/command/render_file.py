@@ -46,22 +46,40 @@ def render_file(
 ) -> dict[str, Any]:
     """Render frames of a .blend file and return what `xrds render --json` prints.
 
-    Args:
-        path: the .blend file; whatever Blender has open is replaced by it.
-        output: .exr or .png; # stands for digits of the frame number. None keeps
-            samples alone.
-        request: scale, samples and the rest.
-        frames: numbers; by default the file's current one, of an `animation` its range.
-        choice: what comes in the place of what the file was saved with.
-        encoding: of .exr files.
-        resume: leave frames as they are that lie there whole and of their size.
-        sample_cache: a folder for the samples of every frame, at scale 1; those that
-            it has already are read, not rendered.
+    Parameters
+    ----------
+    path : Path
+        The .blend file; whatever Blender has open is replaced by it.
+    output : str or None
+        .exr or .png; # stands for digits of the frame number. None keeps samples alone.
+    request : Request
+        Scale, samples and the rest.
+    frames : sequence of int, optional
+        Frame numbers; by default the file's current one, of an `animation` its range.
+    animation : bool
+        Whether to render the file's range of frames.
+    choice : SceneChoice
+        What comes in the place of what the file was saved with.
+    encoding : Encoding
+        How numbers are stored in .exr files.
+    resume : bool
+        Whether to leave frames as they are that lie there whole and of their size.
+    sample_cache : Path, optional
+        A folder for the samples of every frame, at scale 1; those that it has already
+        are read, not rendered.
 
-    Raises:
-        UsageError, SceneError, PictureError, WeightsError: before anything is
-            rendered, if it could not succeed. Later: PictureError for a frame that
-            cannot be written, NetworkFailed; both name the file with what there is.
+    Returns
+    -------
+    result : dict
+        What `xrds render --json` prints.
+
+    Raises
+    ------
+    UsageError, SceneError, PictureError, WeightsError
+        Before anything is rendered, if it could not succeed.
+    PictureError, NetworkFailed
+        Later, for a frame that cannot be written, or a network that fails; both name
+        the file with what there is.
     """
     if sample_cache is not None:
         _check_cache(request)
@@ -285,7 +303,7 @@ def _write(
 
 
 def _suffix(scene: Any, view: str) -> str:
-    """What the file of a view has after its name, as in Blender's own output."""
+    """What the file of a view has after its name: that of Blender's own output."""
     return str(scene.render.views[view].file_suffix)
 
 

@@ -34,7 +34,7 @@ _Geometry = Sequence[tuple[str, str]]
 
 @dataclass(frozen=True)
 class Half:
-    """One view as `Samples`, and the halves that it is the mean of."""
+    """One view: its samples, and the halves that they are the mean of."""
 
     whole: Samples
     halves: Halves
@@ -47,11 +47,33 @@ def sample_halves(
     geometry: _Geometry,
     light: Sequence[LightPart] = (),
 ) -> tuple[dict[str, Half], dict[str, float]]:
-    """Render a part of a sequence, of two samples or more, in two halves.
+    """Render a part of a sequence in two halves.
 
-    Returns them by view, and the seconds: sync, beauty. `geometry` and `light` are as
-    in `sample_layer`; with COUNTS the file's noise threshold is kept, and counts
-    are in samples. Raises Cancelled when the user stops it.
+    Parameters
+    ----------
+    engine : bpy.types.RenderEngine
+        The engine that renders.
+    depsgraph : bpy.types.Depsgraph
+        The evaluated scene.
+    subset : SampleSubset
+        The part, of two samples or more.
+    geometry : sequence of (str, str)
+        Those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS. With COUNTS the
+        file's noise threshold is kept, and counts are in samples.
+    light : sequence of LightPart
+        AOVs and light passes that are wanted.
+
+    Returns
+    -------
+    halves : dict of str to Half
+        By view.
+    seconds : dict of str to float
+        By stage: sync, beauty.
+
+    Raises
+    ------
+    Cancelled
+        If the user stops it.
     """
     is_even = COUNTS not in geometry
     parts, passes, clocks = [], [], []
@@ -98,8 +120,8 @@ def sample_motion(
 ) -> tuple[dict[str, Samples], dict[str, float]]:
     """Render depth and motion at the middle of the shutter: one sample, no blur.
 
-    Cycles gives no vectors with motion blur. Returns as `sample_halves`; the result
-    then holds other passes than the frame's own.
+    Cycles gives no vectors with motion blur. Returns the samples by view, and the
+    seconds by stage; the result then holds other passes than the frame's own.
     """
     with LayerSession(engine, depsgraph) as layer:
         layer.hold_still()
@@ -164,7 +186,7 @@ def _mean_parts(first: Samples, second: Samples, share: Array) -> dict[str, Arra
 
 
 def _light(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Passes:
-    """The passes of light: those that are divided by a colour have no plain means."""
+    """The light passes: those that are divided by a colour have no plain means."""
     return {
         (view, name): pixels
         for view, half in by_view.items()
@@ -200,12 +222,35 @@ def more_samples(
     share: float | None = None,
     light: Sequence[LightPart] = (),
 ) -> tuple[list[dict[str, Samples]], dict[str, float]]:
-    """Render parts of sequences; samples of each by view, and the seconds.
+    """Render parts of sequences; the result keeps the passes that it had before.
 
-    `region` is a part of the picture, in its own pixels; None is all of it. `share`
-    keeps the file's noise threshold, as `set_share` has it, for each part.
-    All samples have counts, and the parts of the `light`. The result has the passes
-    afterwards that it had before. Raises Cancelled when the user stops it.
+    Parameters
+    ----------
+    engine : bpy.types.RenderEngine
+        The engine that renders.
+    depsgraph : bpy.types.Depsgraph
+        The evaluated scene.
+    parts : sequence of SampleSubset
+        Parts of sequences.
+    region : Region, optional
+        A part of the picture, in its own pixels; all of it by default.
+    share : float, optional
+        Keeps the file's noise threshold for each part: a pixel stops at this share of
+        what the threshold asks for.
+    light : sequence of LightPart
+        AOVs and light passes that are wanted.
+
+    Returns
+    -------
+    samples : list of dict of str to Samples
+        Samples of each part by view, with counts.
+    seconds : dict of str to float
+        By stage: sync, beauty.
+
+    Raises
+    ------
+    Cancelled
+        If the user stops it.
     """
     geometry = [] if share is None else [COUNTS]
     rendered_parts, clocks = [], []

@@ -93,7 +93,7 @@ class CyclesPasses(LayerSession):
         denoiser: Denoising | None = None,
         in_process: InProcess | None = None,
     ) -> dict[str, Beauty]:
-        """As `beauty`, for every view by name (one without stereo)."""
+        """Render what `beauty` does, for every view by name (one without stereo)."""
         if denoise and in_process is not None:
             low = self.low_samples(scale, samples, seed=seed)
             return {
@@ -121,7 +121,7 @@ class CyclesPasses(LayerSession):
         seed: int | None = None,
         subset: SampleSubset | None = None,
     ) -> dict[str, LowSamples]:
-        """Render as `beauties`, and leave the noise in.
+        """Render at 1/scale of the size and leave the noise in; samples by view.
 
         `subset` is of a longer sequence, in the place of samples and seed. Depth and
         vectors are there as far as `geometry` asked for them.
@@ -147,9 +147,11 @@ class CyclesPasses(LayerSession):
         is_even: bool = True,
         light: Sequence[LightPart] = (),
     ) -> tuple[dict[str, Samples], session.StageClock]:
-        """Render samples of a part of the frame, by view; `subset` and `is_even` as in
-        `set_samples`. Counts are there where `geometry` asked for them, and the parts
-        of the `light`.
+        """Render samples of a part of the frame, by view.
+
+        If not `is_even` the scene's noise threshold stays: pixels stop at it. Counts
+        are there where `geometry` asked for them, and so are the AOVs and light passes
+        of `light`.
         """
         with Borrowed() as borrowed:
             set_samples(borrowed, self._scene, None, None, subset, is_even)
@@ -209,7 +211,7 @@ class CyclesPasses(LayerSession):
         how: GuideRender | None = None,
         subset: SampleSubset | None = None,
     ) -> dict[str, Guides]:
-        """As `guides`, for every view by name; `how` names what may be left out.
+        """Render what `guides` does, for every view; `how` names what may be left out.
 
         `subset` is of a longer sequence, in the place of samples and seed.
         """

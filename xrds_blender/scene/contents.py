@@ -286,16 +286,16 @@ _IMAGES = ("OPEN_EXR_MULTILAYER", "MULTILAYER")
 
 
 def passes_looked_at(scene: Any) -> tuple[str, ...]:
-    """All where the file that is written holds them or the compositor reads one.
+    """The light passes that are looked at: ALL of them, or NONE.
 
-    As `Wanted` has them.
+    ALL where the file that is written holds them or the compositor reads one.
     """
     is_written = scene.render.image_settings.file_format in _IMAGES
     return (ALL,) if is_written or _is_composited(scene) else (NONE,)
 
 
 def has_light(layer: Any) -> bool:
-    """Whether a view layer has passes of light beside the picture."""
+    """Whether a view layer has light passes beside the picture."""
     return bool(len(layer.lightgroups)) or bool(_LIGHT & {*requested_passes(layer)})
 
 

@@ -154,7 +154,7 @@ def _inner(struct: Any, seen: set[tuple[type, int]]) -> Iterator[str]:
 
 
 def _is_in_flux(struct: Any) -> bool:
-    """Whether a path is one to write to, as of a simulation that was not baked."""
+    """Whether a path is one to write to, such as that of a simulation not baked yet."""
     if getattr(struct, "type", "") == "OCEAN" and not struct.is_cached:
         return True
     is_output = type(struct).__name__ == "DynamicPaintSurface"

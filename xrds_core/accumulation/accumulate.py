@@ -113,7 +113,12 @@ def accumulate(
     others = same_shot(target, others)
     groups = _neighbours(target, others, movement or Movement(), threads)
     usual = light_for_albedo(target) if others and target.has_light else 0.0
-    pairs = [x.pair for group in groups for x in group if x.pair and x.is_reused]
+    pairs = [
+        neighbour.pair
+        for group in groups
+        for neighbour in group
+        if neighbour.pair and neighbour.is_reused
+    ]
     images = find_images(target, pairs, partial(in_threads, threads=threads))
     lit = _lit(target, others)
     work = Work(target, images, usual, lit, threads)
@@ -122,9 +127,9 @@ def accumulate(
     guess = work.guess(groups[0]) if registers else None
     means = work.means(groups, guess)
     height, width = target.shape
-    requested = sum(x.samples for x in others) * height * width
+    requested = sum(frame.samples for frame in others) * height * width
     rejected = 1.0 - means.reused / requested if requested else 0.0
-    frames = tuple(sorted({target.number, *(x.number for x in others)}))
+    frames = tuple(sorted({target.number, *(frame.number for frame in others)}))
     return _unpacked(target, means, lit, rejected, frames)
 
 
@@ -145,7 +150,7 @@ def _neighbours(
     threads: int | None,
 ) -> tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]]:
     """Return the neighbours in two groups: the nearest ones, and those farther away."""
-    rest = [x for x in others if not target.shows_same(x)]
+    rest = [other for other in others if not target.shows_same(other)]
     motions = dict(
         zip(map(id, rest), movement.object_motions(target, rest), strict=True)
     )
@@ -167,7 +172,7 @@ def _neighbours(
 
 
 def _check(target: Stored, other: Stored) -> None:
-    kinds = [(x.picture.shape[1], x.parts.keys()) for x in (target, other)]
+    kinds = [(frame.picture.shape[1], frame.parts.keys()) for frame in (target, other)]
     if kinds[0] != kinds[1]:
         raise PictureError(
             f"frame {other.number} and frame {target.number} hold different passes:"
@@ -177,8 +182,8 @@ def _check(target: Stored, other: Stored) -> None:
 
 def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
     """Return the numbers of the frames just before and after, and the frame's own."""
-    before = [x.number for x in others if x.number < target.number]
-    after = [x.number for x in others if x.number > target.number]
+    before = [frame.number for frame in others if frame.number < target.number]
+    after = [frame.number for frame in others if frame.number > target.number]
     return {target.number, *sorted(before)[-1:], *sorted(after)[:1]}
 
 

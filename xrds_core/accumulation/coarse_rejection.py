@@ -3,7 +3,8 @@
 Two things need more pixels than the similarity weight of each pixel looks at. A frame
 beyond a shot cut matches almost nowhere, and must not contribute where its geometry
 matches by coincidence. And light that changes a little over a large part of the
-picture, as a flickering lamp or a fade, is hidden by the noise of a few pixels.
+picture, because a lamp flickers or the scene fades, is hidden by the noise of a few
+pixels.
 """
 
 from __future__ import annotations
@@ -91,12 +92,12 @@ def _weights(sums: NDArray[np.float64]) -> Array:
     return weights.astype(np.float32)
 
 
-def _around(x: NDArray[np.float64], reach: int | None) -> NDArray[np.float64]:
+def _around(sums: NDArray[np.float64], reach: int | None) -> NDArray[np.float64]:
     """Return the sums over tiles up to `reach` away; over all of them for None."""
     if reach is None:
-        return np.full(x.shape, x.sum())
-    wide = np.pad(x, reach)
-    height, width = x.shape
+        return np.full(sums.shape, sums.sum())
+    wide = np.pad(sums, reach)
+    height, width = sums.shape
     shifts = range(2 * reach + 1)
     return np.sum(
         [wide[i : i + height, j : j + width] for i in shifts for j in shifts], 0

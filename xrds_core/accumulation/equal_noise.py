@@ -63,10 +63,23 @@ class IndependentFrames:
         self._equal: dict[tuple[int, int], bool] = {}
 
     def of(self, own: Stored, others: Sequence[Stored]) -> list[Stored]:
-        """Return those of `others`, in their order, with noise of their own.
+        """Return the neighbours with noise of their own.
 
         Frames far apart agree less, since they show other things: what each has in
         common with one between them tells that both are of one seed.
+
+        Parameters
+        ----------
+        own : Stored
+            The frame.
+        others : sequence of Stored
+            Its neighbours.
+
+        Returns
+        -------
+        independent : list of Stored
+            Those of `others`, in their order, that have other noise than the frame and
+            than each other.
         """
         kinds: list[list[Stored]] = []
         for frame in (own, *others):

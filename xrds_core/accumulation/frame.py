@@ -259,8 +259,8 @@ def _pass(arrays: Arrays, picture: Array) -> structures.Pass:
     return structures.Pass(first, *strides, picture.shape[2])
 
 
-# Relative to the surface's depth: how far behind it an image lies at least. Less is
-# the slope of a surface, or the edge of something.
+# Relative to the surface's depth: how far behind it a virtual image lies at least. Less
+# is the slope of a surface, or the edge of something.
 _BEHIND = 0.04
 _PASSES = {"albedo": (3,), "normal": (3,), "depth": ()}
 _OPTIONAL = {"radiance": (3,), "alpha": (), "vector": (4,), "counts": ()}

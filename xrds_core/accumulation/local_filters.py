@@ -16,12 +16,12 @@ if TYPE_CHECKING:
     from ..arrays import Array
 
 
-def extreme(x: NDArray[Any], smaller: np.ufunc, step: int = 1) -> NDArray[Any]:
+def extreme(plane: NDArray[Any], smaller: np.ufunc, step: int = 1) -> NDArray[Any]:
     """Return the least or largest value of the 3x3 pixels around each pixel.
 
     Parameters
     ----------
-    x : (H, W) array
+    plane : (H, W) array
         Values; NaN is ignored.
     smaller : ufunc
         `np.fmin` or `np.fmax`; on masks `np.logical_or`, which makes a dilation.
@@ -32,23 +32,32 @@ def extreme(x: NDArray[Any], smaller: np.ufunc, step: int = 1) -> NDArray[Any]:
     -------
     (H, W) array
     """
-    wide = np.pad(x, step, "edge")
+    wide = np.pad(plane, step, "edge")
     end = slice(2 * step, None)
     rows = smaller(smaller(wide[: -2 * step], wide[step:-step]), wide[end])
     columns = smaller(rows[:, : -2 * step], rows[:, step:-step])
     return np.asarray(smaller(columns, rows[:, end]))
 
 
-def box(x: Array, size: int) -> Array:
-    """Return the mean over `size` x `size` pixels, as far as they are in the picture.
+def box(plane: Array, size: int) -> Array:
+    """Return the mean over a square around each pixel, within the picture.
 
-    `size` is odd. (H, W) -> (H, W).
+    Parameters
+    ----------
+    plane : (H, W) float32 array
+        Values.
+    size : int
+        Pixels along a side; odd.
+
+    Returns
+    -------
+    means : (H, W) float32 array
     """
-    wide = np.pad(x, size // 2)
-    rows = _sums(wide, x.shape[0], size)
-    sums = _sums(rows.T, x.shape[1], size).T
-    sums *= _shares(x.shape[0], size)[:, None]
-    sums *= _shares(x.shape[1], size)
+    wide = np.pad(plane, size // 2)
+    rows = _sums(wide, plane.shape[0], size)
+    sums = _sums(rows.T, plane.shape[1], size).T
+    sums *= _shares(plane.shape[0], size)[:, None]
+    sums *= _shares(plane.shape[1], size)
     return np.asarray(sums)
 
 
@@ -59,17 +68,17 @@ def _shares(side: int, size: int) -> Array:
     return (1.0 / (np.minimum(last, side - 1) - first + 1)).astype(np.float32)
 
 
-def _sums(x: Array, count: int, size: int) -> Array:
+def _sums(plane: Array, count: int, size: int) -> Array:
     """Return the sums of `size` consecutive rows, in thirds where possible."""
     if size > 3 and size % 3 == 0:
         third = size // 3
-        part = _sums(x, count + 2 * third, third)
+        part = _sums(plane, count + 2 * third, third)
         return np.asarray(
             part[:count] + part[third : third + count] + part[2 * third :]
         )
-    total = x[:count].copy()
+    total = plane[:count].copy()
     for i in range(1, size):
-        total += x[i : i + count]
+        total += plane[i : i + count]
     return total
 
 

@@ -116,9 +116,16 @@ def luminance(radiance: Array) -> Array:
 
 
 def guides_of(passes: Array) -> Array:
-    """Return albedo, normal and alpha, scaled for comparison.
+    """Scale guides for comparison.
 
-    `passes` (..., 6 or 7) are these; alpha may be missing.
+    Parameters
+    ----------
+    passes : (..., 6 or 7) float32 array
+        Albedo, normal and, if there is one, alpha.
+
+    Returns
+    -------
+    guides : (..., 6 or 7) float32 array
     """
     scale = np.ones(passes.shape[-1], np.float32)
     scale[3:6] = _NORMAL_SHARE**0.5
@@ -133,13 +140,14 @@ def guide_factor(samples: float) -> float:
 
 
 def light_factor(samples: float) -> float:
-    """Return how much more the halves of a frame differ than its pixels from those
-    around, which make up eight ninths of what they are compared with.
+    """Return how much more the halves of a frame differ than its pixels from others.
+
+    The surrounding pixels make up eight ninths of what a pixel is compared with.
     """
     return (9 / 8 * (1.0 + _HALVES_EXCESS / samples)) ** 0.5
 
 
-def _packed(x: Array) -> NDArray[np.float16]:
+def _packed(values: Array) -> NDArray[np.float16]:
     """Return half floats (n,), the largest ones for infinities, 0 for NaN."""
-    finite = np.nan_to_num(x.ravel(), nan=0.0)
+    finite = np.nan_to_num(values.ravel(), nan=0.0)
     return np.clip(finite, -LARGEST_HALF, LARGEST_HALF).astype(np.float16)

@@ -71,16 +71,18 @@ class Movement:
             One for each of `others`. None for a frame with the number of `here`: it
             shows the same moment.
         """
-        frames = {x.number: x for x in (*others, here) if x.vector is not None}
+        frames = {
+            frame.number: frame for frame in (*others, here) if frame.vector is not None
+        }
         chains: dict[int, VectorChain] = {}
         if here.vector is not None:
             for step in (-1, 1):
                 chains |= self._chain(here, frames, step)
         return [
             None
-            if x.number == here.number
-            else self._object_motion(here, x, frames, chains)
-            for x in others
+            if other.number == here.number
+            else self._object_motion(here, other, frames, chains)
+            for other in others
         ]
 
     def _object_motion(

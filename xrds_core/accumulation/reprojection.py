@@ -34,7 +34,12 @@ if TYPE_CHECKING:
 class PanoramaReprojection:
     """The reprojection of pixels from one panorama to another.
 
-    `turn` (4, 4) is the transform from the camera space of `here` to that of `there`.
+    Attributes
+    ----------
+    here, there : Camera
+        The panorama of the pixels, and the one that they are reprojected to.
+    turn : (4, 4) float64 array
+        Transform from the camera space of `here` to that of `there`.
     """
 
     here: Camera
@@ -44,7 +49,20 @@ class PanoramaReprojection:
     def reproject(
         self, x: Array, y: Array, inverse_depth: Array
     ) -> tuple[Array, Array, Array]:
-        """Return (x, y, inverse depth) there of pixels (n,) here."""
+        """Reproject pixels from one panorama to the other.
+
+        Parameters
+        ----------
+        x, y : (n,) float32 array
+            Positions here, in pixels.
+        inverse_depth : (n,) float32 array
+            Inverse depth here.
+
+        Returns
+        -------
+        x, y, inverse_depth : (n,) float32 array
+            The same there.
+        """
         ray = _directions(self.here, x, y)
         turn = self.turn.astype(np.float32)
         seen = turn[:3, :3] @ ray + turn[:3, 3:] * inverse_depth
@@ -54,8 +72,19 @@ class PanoramaReprojection:
             return across, down, inverse_depth / length
 
     def directions(self, shape: tuple[int, int]) -> tuple[Array, Array]:
-        """Return sine and cosine of the longitude of each column (W, 2) of `here`, and
-        of the latitude of each row (H, 2).
+        """Return the directions that the columns and rows of a picture show.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Height and width of a picture of `here`.
+
+        Returns
+        -------
+        columns : (W, 2) float32 array
+            Sine and cosine of the longitude of each column.
+        rows : (H, 2) float32 array
+            Sine and cosine of the latitude of each row.
         """
         half = np.float32(0.5)
         x, y = (np.arange(n, dtype=np.float32) + half for n in shape[::-1])
@@ -143,9 +172,14 @@ class Grid:
 
 @dataclass(frozen=True)
 class Places:
-    """The pixels of another frame that positions fall into, in their order (n,).
+    """The pixels of another frame that positions fall into, in their order.
 
-    `pixel`: flat index, 0 where not `seen`, outside of the frame.
+    Attributes
+    ----------
+    pixel : (n,) int32 array
+        Flat index; 0 where not `seen`.
+    seen : (n,) bool array
+        False for positions outside the frame.
     """
 
     pixel: NDArray[np.int32]

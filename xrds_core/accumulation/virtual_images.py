@@ -41,11 +41,11 @@ if TYPE_CHECKING:
 # Depths, from the surface (0) to the length of the path (1), which is a little too
 # short or too long, as its parts are weighted by what the mirror reflects.
 _SHARES = (0.06, 0.12, 0.25, 0.5, 0.75, 0.9, 1.0, 1.1)
-# Pixels per frame of an image's own motion, from coarse to fine.
+# Pixels per frame of a virtual image's own motion, from coarse to fine.
 _STEPS = (1.0, 0.5, 0.25)
 _AREA = 5  # spots across, over which guides are compared
-# An image is believed where it matches better than the surface by this factor, and by
-# so many standard errors of the difference, over the spots: one on the path, and one
+# A virtual image is used where it matches better than the surface by this factor, and
+# by so many standard errors of the difference, over the spots: one on the path, and one
 # that moves by itself, of which there are so many that one always matches by chance.
 _BETTER, _SURE, _SURE_IF_MOVED = 0.85, 2.0, 3.0
 _SEEN = 0.5  # of a candidate's spots, in neighbours
@@ -74,7 +74,7 @@ class Images:
 
     @cached_property
     def _shown(self) -> tuple[Grid, Array, Array]:
-        """The pixels that show an image, its inverse depth (n,) and motion (n, 2)."""
+        """Pixels with a virtual image, its inverse depth (n,) and motion (n, 2)."""
         assert self.frame.image is not None
         pixels = np.flatnonzero(~np.isnan(self.frame.image))
         row, column = np.divmod(pixels, self.frame.shape[1])
@@ -85,8 +85,19 @@ class Images:
         return spots, _depth_of(self.frame, spots, images[:, 0]), images[:, 1:]
 
     def positions(self, pair: Pair) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return pixels (n,), flat and ascending, and where their images were in the
-        other frame: x and y (n,).
+        """Return where the virtual images were in another frame.
+
+        Parameters
+        ----------
+        pair : Pair
+            The frame and the other one.
+
+        Returns
+        -------
+        pixels : (n,) int array
+            Pixels that show a virtual image, flat and ascending.
+        x, y : (n,) float32 array
+            Where it was in the other frame, in pixels.
         """
         spots, depth, motion = self._shown
         assert not isinstance(spots.pixels, slice)
@@ -203,10 +214,10 @@ class _Sweep:
         around[known < self._enough] = np.inf
         return around, error / np.maximum(seen, np.float32(1.0))
 
-    def _mean(self, x: Array) -> Array:
+    def _mean(self, values: Array) -> Array:
         """Return the mean over the spots around each (n,), 0 outside."""
         plane = np.zeros(self._shape[0] * self._shape[1], np.float32)
-        plane[self._at] = x
+        plane[self._at] = values
         return box(plane.reshape(self._shape), _AREA).ravel()[self._at]
 
 

@@ -76,7 +76,7 @@ def light_for_albedo(frame: Stored) -> float:
 
 
 def penalties(samples: float) -> tuple[np.float32, np.float32]:
-    """Return those of errors seen in guides, and of light that changes."""
+    """Return the penalties of errors seen in guides, and of light that changes."""
     guides = max(_GUIDES / samples, _LEAST_GUIDES)
     changes = max(_CHANGES / samples, _LEAST_CHANGES)
     return np.float32(guides), np.float32(changes)
@@ -90,7 +90,21 @@ def guide_area(samples: float) -> int:
 def for_library(
     transform: Reprojection, shape: tuple[int, int], arrays: Arrays
 ) -> structures.Reprojection:
-    """Return the structure of a reprojection of pixels of a frame of a `shape`."""
+    """Convert a reprojection to the structure that the library reads.
+
+    Parameters
+    ----------
+    transform : (4, 4) float32 array or PanoramaReprojection
+        The reprojection.
+    shape : tuple of int
+        Height and width of the frame whose pixels are reprojected.
+    arrays : Arrays
+        Keeps what the structure points to.
+
+    Returns
+    -------
+    structure : structures.Reprojection
+    """
     result = structures.Reprojection()
     if not isinstance(transform, PanoramaReprojection):
         result.matrix[:] = transform.ravel().tolist()
@@ -199,12 +213,21 @@ class Work:
     threads: int | None
 
     def guess(self, neighbours: Sequence[Aligned | Reprojected]) -> Guess:
-        """Return what the means of some neighbours guess of the picture: planes
-        (n, H, W) of its passes and parts, and of brightness.
+        """Guess the picture from the samples of some neighbours.
+
+        Parameters
+        ----------
+        neighbours : sequence of Aligned or Reprojected
+            The neighbours.
+
+        Returns
+        -------
+        guess : (n, H, W) float16 array
+            Planes of the picture's passes and parts, and of brightness.
         """
         planes = self.target.picture.shape[1] + 3 * len(self.lit) + 1
         guess = np.empty((planes, *self.target.shape), np.float16)
-        call = _Call(self, [(x, 0) for x in neighbours])
+        call = _Call(self, [(neighbour, 0) for neighbour in neighbours])
         call.target.guess_out = guess.ctypes.data
         call.run()
         return guess
@@ -214,15 +237,27 @@ class Work:
         groups: Sequence[Sequence[Aligned | Reprojected]],
         guess: Guess | None = None,
     ) -> Means:
-        """Return the means over two groups of neighbours, which are judged apart.
+        """Compute the means over the samples of a frame and its neighbours.
 
-        With a `guess` the offsets of the pixels taken are taken out.
+        Parameters
+        ----------
+        groups : sequence of sequences of Aligned or Reprojected
+            Two groups of neighbours, which are judged apart.
+        guess : (n, H, W) float16 array, optional
+            From `guess`. With it the offsets of the pixels taken are taken out.
+
+        Returns
+        -------
+        means : Means
         """
         (height, width), channels = self.target.shape, self.target.picture.shape[1]
         means = np.empty((channels, height * width), np.float32)
         parts = np.empty((3 * len(self.lit), height * width), np.float32)
         samples = np.empty((height, width), np.float32)
-        call = _Call(self, [(x, n) for n, group in enumerate(groups) for x in group])
+        call = _Call(
+            self,
+            [(neighbour, n) for n, group in enumerate(groups) for neighbour in group],
+        )
         if guess is not None:
             call.target.guess = guess.ctypes.data
         call.target.means, call.target.part_means = means.ctypes.data, parts.ctypes.data
@@ -242,9 +277,16 @@ class Work:
 class Spots:
     """Where every `step`th pixel of a frame was, as if only the camera moved.
 
-    `pixel` (n,) is the flat pixel of the neighbour, `seen` (n,) whether it shows the
-    same, `in_frame` (n,) whether it is in the neighbour at all. In both directions the
-    first one is pixel `step` // 2.
+    In both directions the first one is pixel `step` // 2.
+
+    Attributes
+    ----------
+    pixel : (n,) int32 array
+        Flat index in the neighbour.
+    seen : (n,) bool array
+        Whether the neighbour shows the same there.
+    in_frame : (n,) bool array
+        Whether it is in the neighbour at all.
     """
 
     pixel: NDArray[np.int32]
@@ -284,7 +326,19 @@ def tile_grid(shape: tuple[int, int]) -> tuple[int, int]:
 
 
 def find_spots(pair: Pair, step: int) -> Spots:
-    """Return where every `step`th pixel was."""
+    """Reproject every `step`th pixel of a frame, as if only the camera moved.
+
+    Parameters
+    ----------
+    pair : Pair
+        The frame and its neighbour.
+    step : int
+        Distance between the pixels, along both axes.
+
+    Returns
+    -------
+    spots : Spots
+    """
     return _spots(_spot_call(pair), pair, step)
 
 

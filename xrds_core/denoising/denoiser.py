@@ -61,8 +61,10 @@ _SECONDS = {_SMALL: 0.4, _LARGE: 0.8, "picture": 1.0, "second picture": 1.0}
 
 
 class _ForParts(NamedTuple):
-    """A network for parts, its seconds as above, and for how many parts it may be used:
-    all together take at most twice the seconds of the picture and its guides.
+    """A network for AOVs and light passes, used for up to `most` of them.
+
+    `seconds` are relative to those of the picture. All parts together take at most
+    twice the seconds of the picture and its guides.
     """
 
     network: str
@@ -320,7 +322,7 @@ class Denoiser:
         pictures_made = ("picture", "second picture")[: 1 + (self.quality == "best")]
         networks = {name: self._network(name) for name in prefiltered}
         for_part = self._for_parts(len(pictures.lit))
-        total = sum(_SECONDS[x] for x in (*networks.values(), *pictures_made))
+        total = sum(_SECONDS[stage] for stage in (*networks.values(), *pictures_made))
         total += for_part.seconds * len(pictures.lit)
         for name, guide in pictures.guides.items():
             images[name] = _rows(guide, turn)
@@ -374,8 +376,8 @@ class Denoiser:
 
     def _for_parts(self, count: int) -> _ForParts:
         """Return the network for so many parts, none better than the picture's."""
-        own = [x.network for x in _FOR_PARTS].index(QUALITIES[self.quality])
-        return next(x for x in _FOR_PARTS[own:] if count <= x.most)
+        own = [choice.network for choice in _FOR_PARTS].index(QUALITIES[self.quality])
+        return next(choice for choice in _FOR_PARTS[own:] if count <= choice.most)
 
     def _light_filters(self, parts: int) -> list[Any]:
         """Return the filters of the picture and of so many parts."""

@@ -93,10 +93,20 @@ def check(
 
 
 def sample(guide: Array) -> Array | None:
-    """Return blocks of a guide, side by side, that show whether it is noisy.
+    """Return blocks of a guide that show whether it is noisy.
 
-    Half of them are the busiest, the others represent the rest of the picture. None
-    where the picture is so small that a sample would save no time.
+    Half of them are the busiest, the others represent the rest of the picture.
+
+    Parameters
+    ----------
+    guide : (H, W, 3) float32 array
+        Albedo or normal.
+
+    Returns
+    -------
+    blocks : (h, w, 3) float32 array or None
+        The blocks side by side. None where the picture is so small that a sample would
+        save no time.
     """
     rows, columns = (size // _BLOCK for size in guide.shape[:2])
     count = _SIDE**2
@@ -110,9 +120,9 @@ def sample(guide: Array) -> Array | None:
     return grid.reshape(_SIDE * _BLOCK, _SIDE * _BLOCK, 3)
 
 
-def _split(x: Array, rows: int, columns: int) -> Array:
+def _split(picture: Array, rows: int, columns: int) -> Array:
     """(rows block, columns block, 3) -> (rows columns, block, block, 3)."""
-    blocks = x.reshape(rows, _BLOCK, columns, _BLOCK, 3).swapaxes(1, 2)
+    blocks = picture.reshape(rows, _BLOCK, columns, _BLOCK, 3).swapaxes(1, 2)
     return blocks.reshape(-1, _BLOCK, _BLOCK, 3)
 
 
@@ -121,5 +131,5 @@ def _busy(blocks: Array) -> Array:
     return np.abs(np.diff(blocks[..., 1], axis=2)).mean(axis=(1, 2))
 
 
-def _size(x: Array) -> str:
-    return f"{x.shape[1]}x{x.shape[0]}"
+def _size(picture: Array) -> str:
+    return f"{picture.shape[1]}x{picture.shape[0]}"

@@ -212,7 +212,9 @@ def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPar
     if not wanted:
         return ()
     passes = _passes(channels, layer)
-    known = max((_parts_written_by(x, passes) for x in wanted.renderers), key=len)
+    known = max(
+        (_parts_written_by(renderer, passes) for renderer in wanted.renderers), key=len
+    )
     named = {name: part for part in known for name in part.names}
     parts: list[LightPart] = []
     for which in wanted.which:
@@ -256,8 +258,11 @@ def _parts_written_by(
             parts.append(LightPart(name, passes[name], over, "lobes", lobe.names))
     taken = {part.name for part in parts}
     for name, channels in passes.items():
-        if any(fnmatchcase(name, x) for x in renderer.groups) and name not in taken:
-            group = (name, *(_short(name, x) for x in renderer.groups))
+        if (
+            any(fnmatchcase(name, pattern) for pattern in renderer.groups)
+            and name not in taken
+        ):
+            group = (name, *(_short(name, pattern) for pattern in renderer.groups))
             parts.append(LightPart(name, channels, (), GROUPS, group))
         elif name in renderer.alone:
             parts.append(LightPart(name, channels, names=(name,)))
@@ -282,7 +287,7 @@ def _find_part(
     exact = next((part for part in known if part.name == name), None)
     part = exact or named.get(name)
     if part is None:
-        raise _unknown(channels, name, [x.name for x in known])
+        raise _unknown(channels, name, [known_part.name for known_part in known])
     return part
 
 

@@ -73,7 +73,9 @@ class Channels:
         ]
         if wanted in matches:
             return wanted
-        matches = [x for x in matches if not x.startswith(_COMPOSITED)] or matches
+        matches = [
+            match for match in matches if not match.startswith(_COMPOSITED)
+        ] or matches
         if len(matches) > 1:
             raise PictureError(
                 f"{self.path} holds {wanted!r} in several layers: "
@@ -137,7 +139,7 @@ def by_view(
     by_name: dict[str, dict[str, Any]] = {view: {} for view in views}
     for name, place in places.items():
         *layers, letter = name.split(".")
-        named = [x for x in layers if x in by_name]
+        named = [layer for layer in layers if layer in by_name]
         if named:
             del layers[len(layers) - 1 - layers[::-1].index(named[-1])]
             by_name[named[-1]][".".join((*layers, letter))] = place

@@ -611,8 +611,8 @@ def _main(task: str, path: str, archive: str, how: str) -> int:
             options = parts[0].attributes
             planes = {part.attributes["part"]: part.channels for part in parts}
             window = options["window"] and _window(options["window"])
-            told = options["alone"], window, options["metadata"]
-            _copy(options["source"], path, planes, *told, int(how))
+            chosen = options["alone"], window, options["metadata"]
+            _copy(options["source"], path, planes, *chosen, int(how))
     except PictureError as error:
         print(error, file=sys.stderr)
         return 1

@@ -68,7 +68,9 @@ def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
             raise PictureError(
                 f"{path} is deep; save it with flat channels of full resolution"
             )
-        windows = [_window(path, header, x) for x in ("dataWindow", "displayWindow")]
+        windows = [
+            _window(path, header, window) for window in ("dataWindow", "displayWindow")
+        ]
         claimed += _area_around(windows) * len(header["channels"]) * _BYTES
     if claimed > limit:
         raise PictureError(
@@ -183,7 +185,7 @@ def readable(path: str | Path) -> Iterator[Path]:
     with scratch_folder() as folder:
         copy = folder / "readable.exr"
         shutil.copyfile(path, copy)
-        _patch(copy, {x.place: x.veiled for x in refused})
+        _patch(copy, {attribute.place: attribute.veiled for attribute in refused})
         yield copy
 
 
@@ -204,7 +206,11 @@ def restore(source: str | Path, path: str | Path) -> None:
 
 def _refused(path: str | Path) -> list[Attribute]:
     try:
-        return [x for x in attributes_in(_beginning(path)) if x.is_refused]
+        return [
+            attribute
+            for attribute in attributes_in(_beginning(path))
+            if attribute.is_refused
+        ]
     except ValueError:  # damaged: the library says how
         return []
 

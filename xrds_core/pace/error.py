@@ -164,15 +164,27 @@ class Gain:
         return float(max(error, _TINY) ** (-1.0 / FALL))
 
 
-def gain(accumulated: Accumulated, own: Stored, lent: float = 1.0) -> Gain:
-    """Return what a frame of its own samples has gained by accumulation.
+def gain(accumulated: Accumulated, own: Stored, factor: float = 1.0) -> Gain:
+    """Return what a frame has gained by the samples of its neighbours.
 
-    It is what it would have gained if neighbours had lent `lent` times their samples.
     Errors fall with `FALL`; the noise of a pixel is its weight.
+
+    Parameters
+    ----------
+    accumulated : Accumulated
+        The frame with its neighbours' samples.
+    own : Stored
+        The frame as rendered.
+    factor : float
+        The gain is that of `factor` times the reused samples.
+
+    Returns
+    -------
+    gain : Gain
     """
     noise = root_noise(own)
     alone = sample_counts(own).reshape(own.shape)
-    reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(lent)
+    reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(factor)
     share = alone / np.maximum(alone + reused, _TINY)
     weights, weighted = block_means(noise), block_means(noise * share**FALL)
     assert own.noise is not None

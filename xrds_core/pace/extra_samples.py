@@ -46,7 +46,7 @@ class ExtraSamples:
 
 
 def mean_of(parts: Sequence[ExtraSamples]) -> ExtraSamples:
-    """Return the mean of several, weighted by their samples, which add up."""
+    """Return the mean of several extra samples, weighted by their numbers."""
     total = np.sum([part.samples for part in parts], axis=0)
     weights = [part.samples / np.maximum(total, np.float32(1e-9)) for part in parts]
 

@@ -42,9 +42,12 @@ class History:
         return next(iter(self.views.values())).number
 
     def advance(self, window: Mapping[int, Mapping[str, Stored]]) -> None:
-        """Take in what was in the window before, and lies before all of it now.
+        """Add the frames that have left the window to the history.
 
-        `window` are frames by number, their views by name.
+        Parameters
+        ----------
+        window : mapping of int to mapping of str to Stored
+            Frames of the new window by number, their views by name.
         """
         first = min(window)
         for number in sorted(n for n in self._window if n < first):
@@ -55,7 +58,22 @@ class History:
 
 
 def extended(history: Stored | None, frame: Stored, movement: Movement) -> Stored:
-    """Return a history with the samples of a frame that comes after it."""
+    """Add the samples of a frame to the history before it.
+
+    Parameters
+    ----------
+    history : Stored or None
+        The history of a view; None where it begins.
+    frame : Stored
+        A later frame.
+    movement : Movement
+        Cache of the shot's object motion.
+
+    Returns
+    -------
+    history : Stored
+        The mean of the samples of both, with the frame's number.
+    """
     if history is None:
         return frame
     accumulated = accumulate(frame, [history], movement)

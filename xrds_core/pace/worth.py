@@ -23,7 +23,7 @@ _USUAL, _SPREAD = 0.45, 0.25
 # No ratio is better known than this, relative to it: errors do not fall quite with
 # `FALL`, nor does every measure of them see the same.
 _EXACT = 0.06
-_CAUTION = 0.16  # probability that it is worth less: the mean less its standard error
+_CAUTION = 0.16  # probability of a lower value: the mean less its standard error
 FALL = 0.7
 """The error of a denoised picture falls with about this power of its samples."""
 _STEPS = np.linspace(0.0, 1.0, 201)

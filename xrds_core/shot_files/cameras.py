@@ -228,7 +228,7 @@ def _project(seen: Matrix, perspective: bool) -> Matrix:
 
 
 def to_json(camera: Camera) -> dict[str, Any]:
-    """Return a camera as `read_cameras` reads it; not of a panorama."""
+    """Return a camera in the form of a JSON file of cameras; not of a panorama."""
     return {
         "to_world": np.linalg.inv(camera.view).tolist(),
         "project": camera.project.tolist(),

@@ -409,7 +409,7 @@ def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
 def _normal(
     file: File, passes: PassChannels, camera: Camera | None, reading: Reading
 ) -> Array:
-    """Normals in the camera's axes, Z away from the viewer, as Cycles' guides."""
+    """Return normals in the camera's axes, Z away from the viewer."""
     normal = _stack(file, passes.normal)
     space = reading.normal_space
     if space is None:

@@ -78,9 +78,22 @@ class Loader:
             self._say(f"left out for lack of a file, such as {first}: frames {which}")
 
     def first(self, numbers: Iterable[int]) -> FrameFile | None:
-        """Return the first frame of `numbers` that can be read; None if none can.
+        """Load the first frame that can be read.
 
-        Raises Unfit if the first two are unfit, or the only one is.
+        Parameters
+        ----------
+        numbers : iterable of int
+            Frame numbers.
+
+        Returns
+        -------
+        frame : FrameFile or None
+            None if no frame can be read.
+
+        Raises
+        ------
+        Unfit
+            If the first two are unfit, or the only one is.
         """
         unfit: Unfit | None = None
         for number in numbers:

@@ -49,7 +49,7 @@ class Recipe:
 
     def state(self, number: int) -> State:
         """Return the state of a frame's files, as they are now."""
-        return tuple(_state(frame_path(x, number)) for x in self.patterns)
+        return tuple(_state(frame_path(pattern, number)) for pattern in self.patterns)
 
     def digest(self, states: Mapping[int, State], number: int) -> str:
         """Return a digest of what a frame is made of.

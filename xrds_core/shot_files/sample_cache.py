@@ -124,7 +124,7 @@ def _noise(frame: Frame) -> Array:
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 
 
-def _half(x: Array) -> NDArray[np.float16]:
+def _half(values: Array) -> NDArray[np.float16]:
     """Clip to the largest half float; infinities stay."""
-    cut = np.clip(x, -LARGEST_HALF, LARGEST_HALF)
-    return np.where(np.isfinite(x), cut, x).astype(np.float16)
+    cut = np.clip(values, -LARGEST_HALF, LARGEST_HALF)
+    return np.where(np.isfinite(values), cut, values).astype(np.float16)

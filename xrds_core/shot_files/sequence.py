@@ -118,7 +118,7 @@ class Files:
             names, part = frame.channels, frame.part
             if self.picture_only:
                 ahead = f"{view}." if view else ""
-                names, part = [f"{ahead}{x}" for x in "RGBA"], first.part
+                names, part = [f"{ahead}{letter}" for letter in "RGBA"], first.part
             planes = np.moveaxis(finished.picture, 2, 0)
             by_part.setdefault(part, {}).update(zip(names, planes, strict=False))
             if not self.picture_only:
@@ -403,7 +403,7 @@ def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Recta
 
 
 def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
-    """The planes of the parts of a frame's light, by full channel name."""
+    """The planes of a frame's AOVs and light passes, by full channel name."""
     passes = passes_of(frame.light, finished.parts)
     return {
         name: plane

@@ -56,7 +56,7 @@ def _bounded(radiance: Array, alpha: Array, low: Array, scale: int) -> Array:
     """Clamp the colour behind `alpha` to the range of the 3x3 pixels of `low`.
 
     Only near edges: where all nine are opaque, radiance may be anything. Light that
-    covers nothing (alpha 0), as of fire, sets no upper bound.
+    covers nothing (alpha 0), such as a fire's, sets no upper bound.
     """
     height, width = alpha.shape
     limits = (_expand(x, scale)[:height, :width] for x in _colour_range(low))
@@ -79,10 +79,12 @@ def _colour_range(low: Array) -> tuple[Array, Array]:
     return darkest, brightest
 
 
-def _largest_around(x: Array) -> Array:
-    pooled = functional.max_pool2d(to_planes(x), kernel_size=3, stride=1, padding=1)
+def _largest_around(picture: Array) -> Array:
+    pooled = functional.max_pool2d(
+        to_planes(picture), kernel_size=3, stride=1, padding=1
+    )
     return to_picture(pooled)
 
 
-def _expand(x: Array, scale: int) -> Array:
-    return x.repeat(scale, axis=0).repeat(scale, axis=1)
+def _expand(picture: Array, scale: int) -> Array:
+    return picture.repeat(scale, axis=0).repeat(scale, axis=1)

@@ -40,48 +40,74 @@ _LARGEST_EXPOSED = 1e18
 LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
 
 
-def clean_radiance(x: Array) -> tuple[Array, int]:
+def clean_radiance(radiance: Array) -> tuple[Array, int]:
     """Replace pixels that hold no light.
 
     Parameters
     ----------
-    x : (h, w, C) float32 array
+    radiance : (h, w, C) float32 array
         Scene-linear radiance, with alpha or without.
 
     Returns
     -------
     cleaned : (h, w, C) float32 array
-        NaN and infinities are filled in, negative values are 0. `x` itself where
+        NaN and infinities are filled in, negative values are 0. `radiance` itself where
         nothing is wrong with it; else a copy.
     bad_pixels : int
         How many pixels were replaced.
     """
-    if not x.size or (x.min() >= 0.0 and np.isfinite(x.max())):
-        return x, 0
-    finite = np.isfinite(x)
-    bad = int((~finite | (x < 0.0)).any(axis=-1).sum())
+    if not radiance.size or (radiance.min() >= 0.0 and np.isfinite(radiance.max())):
+        return radiance, 0
+    finite = np.isfinite(radiance)
+    bad = int((~finite | (radiance < 0.0)).any(axis=-1).sum())
     # before the holes are filled, so that none is filled with darkness below black
-    return fill_holes(np.where(finite & (x < 0.0), np.float32(0.0), x))[0], bad
+    return fill_holes(np.where(finite & (radiance < 0.0), np.float32(0.0), radiance))[
+        0
+    ], bad
 
 
-def clean_albedo(x: Array) -> tuple[Array, int]:
-    """Return (x in [0, 1], pixels that held NaN or infinities).
+def clean_albedo(albedo: Array) -> tuple[Array, int]:
+    """Clean an albedo.
 
-    Values above 1 are no fault: Cycles adds emission and background to its
-    denoising albedo.
+    Values above 1 are no fault: Cycles adds emission and background to its denoising
+    albedo.
+
+    Parameters
+    ----------
+    albedo : (H, W, 3) float32 array
+        Albedo.
+
+    Returns
+    -------
+    cleaned : (H, W, 3) float32 array
+        In [0, 1].
+    holes : int
+        How many pixels held NaN or infinities.
     """
-    x, holes = fill_holes(x)
-    return np.clip(x, 0.0, 1.0), holes
+    albedo, holes = fill_holes(albedo)
+    return np.clip(albedo, 0.0, 1.0), holes
 
 
-def clean_normal(x: Array) -> tuple[Array, int]:
-    """Return (x in [-1, 1], pixels that held NaN or infinities); zero stays zero.
+def clean_normal(normal: Array) -> tuple[Array, int]:
+    """Clean a normal; zero stays zero.
 
-    Cycles' denoising normals are means of unit vectors, so shorter than 1 at
-    edges: their length is information and is not normalised away.
+    Cycles' denoising normals are means of unit vectors, so shorter than 1 at edges:
+    their length is information and is not normalised away.
+
+    Parameters
+    ----------
+    normal : (H, W, 3) float32 array
+        Normal.
+
+    Returns
+    -------
+    cleaned : (H, W, 3) float32 array
+        In [-1, 1].
+    holes : int
+        How many pixels held NaN or infinities.
     """
-    x, holes = fill_holes(x)
-    return np.clip(x, -1.0, 1.0), holes
+    normal, holes = fill_holes(normal)
+    return np.clip(normal, -1.0, 1.0), holes
 
 
 def auto_exposure(radiance: Array) -> float:
@@ -145,15 +171,15 @@ def choose_exposure(exposure: float | None, radiance: Array) -> float:
     return float(exposure)
 
 
-def _bin_means(x: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    size = x.shape[axis]
+def _bin_means(luminance: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    size = luminance.shape[axis]
     bins = min(size, _MOST_BINS)
     edges = [i * size // bins for i in range(bins + 1)]
     means = [
-        np.take(x, range(low, high), axis=axis).mean(axis=axis)
+        np.take(luminance, range(low, high), axis=axis).mean(axis=axis)
         for low, high in pairwise(edges)
     ]
-    return np.stack(means, axis=axis) if means else x
+    return np.stack(means, axis=axis) if means else luminance
 
 
 def transfer(x: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
@@ -194,17 +220,17 @@ def _exposure_gain(exposure: float | Tensor) -> np.float32:
     return np.float32(TRANSFER_GAIN * float(exposure))
 
 
-def area_mean(x: Tensor, scale: int) -> Tensor:
+def area_mean(planes: Tensor, scale: int) -> Tensor:
     """Return the means of scale x scale blocks: (B, C, s h, s w) -> (B, C, h, w)."""
-    return functional.avg_pool2d(x, scale)
+    return functional.avg_pool2d(planes, scale)
 
 
-def upsample_bilinear(x: Tensor, scale: int) -> Tensor:
+def upsample_bilinear(planes: Tensor, scale: int) -> Tensor:
     """Interpolate (B, C, h, w) -> (B, C, s h, s w): half-pixel centres, edges held."""
     if scale == 1:
-        return x
+        return planes
     return functional.interpolate(
-        x, scale_factor=float(scale), mode="bilinear", align_corners=False
+        planes, scale_factor=float(scale), mode="bilinear", align_corners=False
     )
 
 

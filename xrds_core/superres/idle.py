@@ -87,7 +87,7 @@ def _idle(inputs: Inputs, block: int) -> NDArray[np.bool_]:
 
 
 def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
-    """Return the blocks whose radiance is their albedo, as of a background."""
+    """Return the blocks whose radiance is their albedo: so a background's is."""
     low, scale = inputs.low[..., :3], inputs.scale
     albedo = np.minimum(inputs.albedo, 2.0)  # above 1 is no background anyway
     for axis in (0, 1):
@@ -101,13 +101,13 @@ def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
     return shines
 
 
-def _sums(x: NDArray[Any], block: int) -> NDArray[np.float64]:
+def _sums(picture: NDArray[Any], block: int) -> NDArray[np.float64]:
     """Return the sum over each block and its channels."""
     for axis in (0, 1):
         # float64: sums of the brightest light would leave float32
-        starts = range(0, x.shape[axis], block)
-        x = np.add.reduceat(x, starts, axis=axis, dtype=np.float64)
-    return np.asarray(x.sum(-1))
+        starts = range(0, picture.shape[axis], block)
+        picture = np.add.reduceat(picture, starts, axis=axis, dtype=np.float64)
+    return np.asarray(picture.sum(-1))
 
 
 def _is_even(extremes: tuple[Array, Array]) -> NDArray[np.bool_]:
@@ -117,11 +117,11 @@ def _is_even(extremes: tuple[Array, Array]) -> NDArray[np.bool_]:
     return spread
 
 
-def _extremes(x: Array, block: int) -> tuple[Array, Array]:
+def _extremes(picture: Array, block: int) -> tuple[Array, Array]:
     """Return the least and the largest value of each block, (rows, columns, C)."""
-    starts = [range(0, size, block) for size in x.shape[:2]]
-    least = np.minimum.reduceat(x, starts[0], axis=0)
-    most = np.maximum.reduceat(x, starts[0], axis=0)
+    starts = [range(0, size, block) for size in picture.shape[:2]]
+    least = np.minimum.reduceat(picture, starts[0], axis=0)
+    most = np.maximum.reduceat(picture, starts[0], axis=0)
     return (
         np.minimum.reduceat(least, starts[1], axis=1),
         np.maximum.reduceat(most, starts[1], axis=1),

@@ -216,5 +216,5 @@ def _fits(scale: int, low: Array, guide: Array) -> bool:
     return low.shape[:2] == tuple(-(-size // scale) for size in guide.shape[:2])
 
 
-def _size(x: Array, scale: int = 1) -> str:
-    return f"{x.shape[1] * scale}x{x.shape[0] * scale}"
+def _size(picture: Array, scale: int = 1) -> str:
+    return f"{picture.shape[1] * scale}x{picture.shape[0] * scale}"

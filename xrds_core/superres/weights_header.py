@@ -27,9 +27,17 @@ _LARGEST_HEADER = 1 << 20  # far above any real one; bounds hostile files
 
 @dataclass(frozen=True)
 class WeightsHeader:
-    """A network's preset, enlargement and the Blender series of its training.
+    """What the header of a weights file says.
 
-    `blender_series` as 4.5; empty where the file does not say.
+    Attributes
+    ----------
+    preset : str
+        Name of the preset.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+    blender_series : str
+        Blender's series of the training, such as 4.5; empty where the file does not
+        say.
     """
 
     preset: str
@@ -38,9 +46,22 @@ class WeightsHeader:
 
 
 def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
-    """Return records {preset, scale, file, sha256, blender_series} of a folder.
+    """List the weights files of a folder.
 
-    Raises WeightsError if a file named as a preset's is damaged.
+    Parameters
+    ----------
+    directory : str or Path, optional
+        The folder; the shipped files by default.
+
+    Returns
+    -------
+    records : list of dict
+        With the keys preset, scale, file, sha256 and blender_series.
+
+    Raises
+    ------
+    WeightsError
+        If a file named as a preset's is damaged.
     """
     return [_record(path) for path in network_files(Path(directory or DIRECTORY))]
 

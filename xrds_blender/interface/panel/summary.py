@@ -228,7 +228,7 @@ def expected(
     here: Capabilities,
     estimated: Sequence[Estimate],
 ) -> Expected:
-    """What to expect of the scene's range, in modes as `estimated` for a shot."""
+    """What to expect of the scene's range, from the modes `estimated` for a shot."""
     frames = len(frame_range(scene))
     is_shot = has_neighbours(scene, request)
     known = history.scene_settings(scene)
