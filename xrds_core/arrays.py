@@ -17,9 +17,25 @@ Array = NDArray[np.float32]
 
 
 def float_array(name: str, value: Any, channels: tuple[int, ...]) -> Array:
-    """Return `value` as float32 (height, width, channels); PictureError if it is not.
+    """Return a picture as float32.
 
-    `channels` are the numbers of them that are taken; `name` stands in the error.
+    Parameters
+    ----------
+    name : str
+        Its name, for error messages.
+    value : array_like
+        The picture.
+    channels : tuple of int
+        The numbers of channels that it may have.
+
+    Returns
+    -------
+    picture : (H, W, C) float32 array
+
+    Raises
+    ------
+    PictureError
+        If it has another shape, or holds no floats.
     """
     array = np.asarray(value)
     if array.ndim != 3 or array.shape[-1] not in channels or not array.size:
@@ -40,8 +56,8 @@ LARGEST_HALF = 65504.0
 _HALVES = np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(np.float32)
 
 
-def floats(x: NDArray[Any]) -> Array:
-    """Return `x` in float32; half floats from a table, in half of NumPy's time."""
-    if x.dtype == np.float16:
-        return np.asarray(_HALVES.take(np.ascontiguousarray(x).view(np.uint16)))
-    return x.astype(np.float32, copy=False)
+def floats(values: NDArray[Any]) -> Array:
+    """Return values in float32; half floats from a table, in half of NumPy's time."""
+    if values.dtype == np.float16:
+        return np.asarray(_HALVES.take(np.ascontiguousarray(values).view(np.uint16)))
+    return values.astype(np.float32, copy=False)

@@ -17,14 +17,25 @@ _running: set[subprocess.Popen[str]] = set()
 def run_python(
     *arguments: str, path: Iterable[str] = ()
 ) -> subprocess.CompletedProcess[str]:
-    """Run `python ARGUMENTS`; returns its status and what it printed.
+    """Run `python ARGUMENTS`.
 
-    It looks for modules in the folders of `path` first; not in all of `sys.path`
-    unasked, in which Blender puts another module `bpy`. It is killed where this process
-    is interrupted, also by `kill_all`.
+    It is killed where this process is interrupted, also by `kill_all`.
+
+    Parameters
+    ----------
+    *arguments : str
+        Arguments of the command line.
+    path : iterable of str
+        Folders in which it looks for modules first. Not all of `sys.path` unasked:
+        Blender puts another module `bpy` in it.
+
+    Returns
+    -------
+    process : subprocess.CompletedProcess
+        Its status and what it printed.
     """
     environment = dict(os.environ)
-    if folders := [each for each in path if each]:  # "" is the working folder
+    if folders := [folder for folder in path if folder]:  # "" is the working folder
         environment["PYTHONPATH"] = os.pathsep.join(folders)
     command = [sys.executable, "-P", *arguments]
     with subprocess.Popen(

@@ -35,8 +35,23 @@ def replacing(path: Path) -> Iterator[Path]:
     """Yield a path beside `path` to write to; it takes `path`'s place at the end.
 
     On an error nothing is left of it and `path` is as it was. Any number of threads,
-    processes and machines may replace one path at once: it is whole at any time. The
-    folder must exist. Of a symbolic link the file that it leads to is replaced.
+    processes and machines may replace one path at once: it is whole at any time.
+
+    Parameters
+    ----------
+    path : Path
+        The file, in an existing folder. Of a symbolic link the file that it leads to is
+        replaced.
+
+    Yields
+    ------
+    unfinished : Path
+        The path to write to.
+
+    Raises
+    ------
+    OSError
+        If the path is no regular file, or cannot be written.
     """
     path = Path(os.path.realpath(path))
     if path.exists() and not path.is_file():
@@ -120,10 +135,10 @@ def _registered(folder: Path) -> Iterator[Path]:
     try:
         yield path
     finally:
-        for each in (path, link):  # the link last: it leads to what is left
-            if each in _unfinished:
-                _remove(each)
-                _unfinished.discard(each)
+        for leftover in (path, link):  # the link last: it leads to what is left
+            if leftover in _unfinished:
+                _remove(leftover)
+                _unfinished.discard(leftover)
 
 
 def _is_left(path: Path) -> bool:
@@ -186,10 +201,23 @@ _WAIT = 10.0  # seconds for somebody to write into a pipe
 
 
 def read_stream(path: Path, most: int) -> bytes:
-    """Return what a file or a pipe holds, up to `most` bytes.
+    """Return what a file or a pipe holds.
 
-    Raises UsageError where it cannot be read, holds more, or is a pipe into which
-    nobody writes.
+    Parameters
+    ----------
+    path : Path
+        The file or pipe.
+    most : int
+        Most bytes.
+
+    Returns
+    -------
+    data : bytes
+
+    Raises
+    ------
+    UsageError
+        If it cannot be read, holds more, or is a pipe into which nobody writes.
     """
     try:
         # else a pipe waits for ever for somebody who opens its other end
@@ -230,16 +258,40 @@ def _read_up_to(file: int, most: int) -> bytes:
 def check_output(path: Path, inputs: Iterable[str | Path] = ()) -> None:
     """Refuse a file that cannot be written, and an input of the work as its output.
 
-    Makes the folder, and sweeps up what killed processes left in it. Raises
-    PictureError.
+    The folder is made, and what killed processes left in it is removed.
+
+    Parameters
+    ----------
+    path : Path
+        The file to write.
+    inputs : iterable of str or Path
+        Files that the work reads.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written, or is an input.
     """
     check_places([path], inputs)
     check_folder(Path(os.path.realpath(path)).parent)
 
 
 def check_places(paths: Iterable[Path], inputs: Iterable[str | Path]) -> None:
-    """As `check_place` of many; none may be an input, nor two the same file."""
-    read = {_identity(each) for each in inputs} - {None}
+    """Refuse files that cannot be written, inputs, and two names of one file.
+
+    Parameters
+    ----------
+    paths : iterable of Path
+        Files to write.
+    inputs : iterable of str or Path
+        Files that the work reads.
+
+    Raises
+    ------
+    PictureError
+        If one of them must not be written.
+    """
+    read = {_identity(file) for file in inputs} - {None}
     written: dict[str, Path] = {}
     for path in paths:
         check_place(path)

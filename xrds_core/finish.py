@@ -34,20 +34,34 @@ Rectangle = tuple[slice, slice]
 def rectangles(
     blocks: NDArray[np.bool_], call: float = 0.0, most: int = 4
 ) -> list[Rectangle]:
-    """Return up to `most` rectangles of blocks that cover all that are marked.
+    """Cover marked blocks with a few rectangles.
 
-    The rectangle that gains most by it is divided in two, as long as that leaves out
-    a quarter of it, and more blocks than a `call` costs as much as.
+    The rectangle that gains most by it is divided in two, as long as that leaves out a
+    quarter of it.
+
+    Parameters
+    ----------
+    blocks : (rows, columns) bool array
+        The marked blocks.
+    call : float
+        Cost of one more rectangle, in blocks; a division has to leave out as many.
+    most : int
+        Most rectangles to return.
+
+    Returns
+    -------
+    rectangles : list of Rectangle
+        Rows and columns of blocks; all marked blocks lie in one of them.
     """
-    found = [x for x in (_bounds(blocks),) if x is not None]
-    while found and len(found) < most:
-        splits = [(_split(blocks, each), each) for each in found]
-        (parts, gain), divided = max(splits, key=lambda x: x[0][1])
+    areas = [bounds for bounds in (_bounds(blocks),) if bounds is not None]
+    while areas and len(areas) < most:
+        splits = [(_split(blocks, area), area) for area in areas]
+        (parts, gain), divided = max(splits, key=lambda split: split[0][1])
         if not parts or gain < max(0.25 * _blocks_in(divided), call):
             break
-        found.remove(divided)
-        found += parts
-    return found
+        areas.remove(divided)
+        areas += parts
+    return areas
 
 
 def _bounds(blocks: NDArray[np.bool_]) -> Rectangle | None:
@@ -119,10 +133,18 @@ AROUND = 96
 class Finished:
     """A finished frame.
 
-    `denoised` holds its picture (H, W, 3), or (H, W, 4) with the alpha of
-    `accumulated`, or the requested region of it; `seconds`: accumulate, denoise.
-    `parts` (H, W, 3) are those of its light, which add up to the picture, and the
-    colours, by name, as in `light_of`.
+    Attributes
+    ----------
+    denoised : Denoised
+        The picture, or the requested region of it, with the alpha of `accumulated` if
+        it has one.
+    accumulated : Accumulated
+        The samples that were denoised.
+    seconds : dict of str to float
+        Wall-clock time by stage: accumulate, denoise.
+    parts : mapping of str to (H, W, 3) float32 array
+        AOVs and light passes, which add up to the picture, by name; the colours that
+        some are divided by, under `LightPart.colour_name`.
     """
 
     denoised: Denoised
@@ -136,7 +158,7 @@ class Finished:
         return self.denoised.radiance
 
     def within(self, region: Rectangle) -> Finished:
-        """The same of a part of what was denoised."""
+        """Return the same of a part of what was denoised."""
         picture = replace(self.denoised, radiance=self.picture[region])
         return replace(self, denoised=picture, parts=_cropped(self.parts, region))
 
@@ -152,16 +174,42 @@ def finish_frame(
     accumulated: Accumulated | None = None,
     light: Sequence[LightPart] = (),
 ) -> Finished:
-    """Accumulate the samples of `neighbours` on a frame and denoise it.
+    """Accumulate the samples of neighbour frames on a frame and denoise it.
 
     Where a frame has few samples, and few are reused, the picture is that of the frame
     alone, also denoised: next to pixels of many samples a denoiser mistakes the noise
     of few for detail. Where that is a small part of the picture, that part alone is
     denoised again.
-    `region`, rows and columns, is the part to denoise: black around a crop would give
-    the denoiser a wrong exposure. `movement` is that of the shot; `accumulated` is the
-    frame with its neighbours if it is known already; `light` are the parts that are
-    denoised as well. Raises Cancelled if `progress` requests it.
+
+    Parameters
+    ----------
+    own : Stored
+        The frame.
+    neighbours : sequence of Stored
+        Frames whose samples it may reuse; none for a still.
+    denoiser : Denoiser
+        The denoiser.
+    movement : Movement
+        Cache of the shot's object motion.
+    progress : callable, optional
+        Takes the fraction done, in [0, 1]; False as its result cancels.
+    region : tuple of slice, optional
+        Rows and columns to denoise; all by default. Black around a crop would give the
+        denoiser a wrong exposure.
+    accumulated : Accumulated, optional
+        The frame with its neighbours' samples, if it is known already.
+    light : sequence of LightPart
+        AOVs and light passes to denoise as well.
+
+    Returns
+    -------
+    finished : Finished
+        The denoised picture and its parts.
+
+    Raises
+    ------
+    Cancelled
+        If `progress` requests it.
     """
     started = time.perf_counter()
     if accumulated is None:
@@ -174,13 +222,13 @@ def finish_frame(
     denoise_started = time.perf_counter()
     parts = 1 + len(areas)
     passes = _Passes.of(accumulated, light, region)
-    told = [_part(progress, number, parts) for number in range(parts)]
-    denoised = passes.denoised(denoiser, told[0])
+    callbacks = [_part(progress, number, parts) for number in range(parts)]
+    denoised = passes.denoised(denoiser, callbacks[0])
     if areas:
         alone = _filled(accumulate(own, []), accumulated)
         lacking = _Passes.of(alone, light, region, like=denoised.parts)
         mixed = denoised.radiance.copy()
-        for area, done in zip(areas, told[1:], strict=True):
+        for area, done in zip(areas, callbacks[1:], strict=True):
             single = lacking.within(area.around).denoised(denoiser, done)
             weight = share[area.place][..., None]
             pairs = [(mixed, single.radiance)]
@@ -189,14 +237,18 @@ def finish_frame(
                 inner = part[area.within]
                 whole[area.place] = inner + (whole[area.place] - inner) * weight
         denoised = replace(denoised, radiance=mixed)
-    names = dict.fromkeys(x.colour_name for x in light if x.colour)
-    colours = {x: completed(accumulated.parts[x][region]) for x in names}
-    found = colours | added_up(denoised.radiance, denoised.parts, light, colours)
+    names = dict.fromkeys(
+        light_part.colour_name for light_part in light if light_part.colour
+    )
+    colours = {name: completed(accumulated.parts[name][region]) for name in names}
+    finished_light = colours | added_up(
+        denoised.radiance, denoised.parts, light, colours
+    )
     seconds = {
         "accumulate": denoise_started - started,
         "denoise": time.perf_counter() - denoise_started,
     }
-    return Finished(denoised, accumulated, seconds, found)
+    return Finished(denoised, accumulated, seconds, finished_light)
 
 
 def _share(accumulated: Accumulated, own: Stored) -> Array:
@@ -259,8 +311,8 @@ def _lacking(share: Array) -> list[_Area]:
     if (share == share.flat[0]).all() and float(share.flat[0]) in (0.0, 1.0):
         return []
     blocks = rectangles(block_means(np.less(share, 1.0)) > 0.0)
-    areas = [_area(each, share.shape) for each in blocks]
-    if sum(share[x.around].size for x in areas) < _PART * share.size:
+    areas = [_area(rectangle, share.shape) for rectangle in blocks]
+    if sum(share[area.around].size for area in areas) < _PART * share.size:
         return areas
     whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
     return [_Area(whole, whole, whole)]
@@ -283,10 +335,10 @@ def _filled(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
     if not holes.any():
         return alone
 
-    def fill(one: Array | None, two: Array | None) -> Array | None:
-        if one is None or two is None:
+    def fill(own: Array | None, reused: Array | None) -> Array | None:
+        if own is None or reused is None:
             return None
-        return np.where(holes if one.ndim == 2 else holes[..., None], two, one)
+        return np.where(holes if own.ndim == 2 else holes[..., None], reused, own)
 
     albedo = fill(alone.albedo, accumulated.albedo)
     normal = fill(alone.normal, accumulated.normal)
@@ -321,7 +373,7 @@ class _Passes(NamedTuple):
         region: tuple[slice, slice],
         like: Collection[str] | None = None,
     ) -> _Passes:
-        """Those of a region of a frame; `like` as in `light_in`."""
+        """Those of a region of a frame, with the parts that `like` names, if given."""
         noisy = frame.radiance
         assert noisy is not None
         parts = light_in(noisy, frame.parts, light, like)

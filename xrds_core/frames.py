@@ -21,10 +21,20 @@ _MOST_RUNS = 50  # of frame numbers that a line has room for
 
 
 def frame_path(pattern: str, frame: int) -> Path:
-    """Put the frame number in place of the last run of #, as Blender does.
+    """Put the frame number in place of the last run of #: so Blender names its files.
 
-    Three # are three digits at least; without # the pattern is the path. A file of a
-    frame below zero may also be called as C does, whose digits count the sign.
+    Parameters
+    ----------
+    pattern : str
+        Path in which three # stand for three digits at least; without # it is the path.
+    frame : int
+        Frame number.
+
+    Returns
+    -------
+    path : Path
+        For a frame below zero, a file named C's way, where the sign counts as a digit,
+        if only that exists.
     """
     parts = _split(pattern)
     if parts is None:
@@ -54,10 +64,10 @@ def frame_numbers(pattern: str) -> list[int]:
     [] where there are none, also of a pattern without #. Such a name may belong to a
     folder: reading it reports that.
     """
-    found = _numbered(pattern)
-    names = {name for name, _ in found}
+    numbered = _numbered(pattern)
+    names = {name for name, _ in numbered}
     return sorted(
-        n for n in {n for _, n in found} if frame_path(pattern, n).name in names
+        n for n in {n for _, n in numbered} if frame_path(pattern, n).name in names
     )
 
 

@@ -25,52 +25,87 @@ def describe_bad_pixels(bad_pixels: int) -> str:
     return f"replaced {bad_pixels} bad pixels: NaN, infinities or negative light"
 
 
-def clean_radiance(x: Array) -> tuple[Array, int]:
-    """Return (x, bad pixels): NaN, infinities and overflows filled in, negative 0.
+def clean_radiance(radiance: Array) -> tuple[Array, int]:
+    """Replace pixels that hold no light.
 
-    `x` itself is returned where nothing is wrong with it; else a copy.
+    Parameters
+    ----------
+    radiance : (..., C) float32 array
+        Scene-linear radiance.
+
+    Returns
+    -------
+    cleaned : (..., C) float32 array
+        NaN, infinities and overflows are filled in, negative values are 0. `radiance`
+        itself where nothing is wrong with it; else a copy.
+    bad_pixels : int
+        How many pixels were replaced.
     """
     # min and max propagate NaN and need no array of the size of the picture
-    if not x.size or (x.min() >= 0.0 and x.max() <= BRIGHTEST):
-        return x, 0
-    known = np.abs(x) <= BRIGHTEST
-    bad = int((~known | (x < 0.0)).any(axis=-1).sum())
+    if not radiance.size or (radiance.min() >= 0.0 and radiance.max() <= BRIGHTEST):
+        return radiance, 0
+    known = np.abs(radiance) <= BRIGHTEST
+    bad = int((~known | (radiance < 0.0)).any(axis=-1).sum())
     # negative light first, so that no hole is filled with it
-    lit = np.where(known & (x < 0.0), np.float32(0.0), x)
+    lit = np.where(known & (radiance < 0.0), np.float32(0.0), radiance)
     return _pull_push(lit, known.all(axis=-1)), bad
 
 
-def clean_alpha(x: Array) -> tuple[Array, int]:
-    """Return (x, holes) as `fill_holes`, but 1 where no pixel has an alpha.
+def clean_alpha(alpha: Array) -> tuple[Array, int]:
+    """Fill in NaN and infinities of an alpha; 1 where no pixel has a valid alpha.
 
     So a picture without a valid alpha keeps its colour.
+
+    Parameters
+    ----------
+    alpha : (H, W, 1) float32 array
+        Alpha.
+
+    Returns
+    -------
+    cleaned : (H, W, 1) float32 array
+    holes : int
+        How many pixels were filled in.
     """
-    filled, holes = fill_holes(x)
-    return (np.ones_like(x), holes) if holes and holes == x.size else (filled, holes)
+    filled, holes = fill_holes(alpha)
+    return (
+        (np.ones_like(alpha), holes)
+        if holes and holes == alpha.size
+        else (filled, holes)
+    )
 
 
-def fill_holes(x: Array) -> tuple[Array, int]:
-    """Return (x, holes): NaN and infinities get the mean of finite pixels near them.
+def fill_holes(picture: Array) -> tuple[Array, int]:
+    """Fill in NaN and infinities with the mean of finite pixels near them.
 
-    `x` itself is returned where there are none. A picture without a single finite
-    pixel becomes 0.
+    Parameters
+    ----------
+    picture : (H, W, C) float32 array
+        A picture.
+
+    Returns
+    -------
+    filled : (H, W, C) float32 array
+        `picture` itself where it has no holes; 0 where it has no finite pixel.
+    holes : int
+        How many pixels were filled in.
     """
-    if not x.size or (np.isfinite(x.min()) and np.isfinite(x.max())):
-        return x, 0
-    known = np.isfinite(x).all(axis=-1)
-    return _pull_push(x, known), int(known.size - known.sum())
+    if not picture.size or (np.isfinite(picture.min()) and np.isfinite(picture.max())):
+        return picture, 0
+    known = np.isfinite(picture).all(axis=-1)
+    return _pull_push(picture, known), int(known.size - known.sum())
 
 
-def _pull_push(x: Array, known: NDArray[np.bool_]) -> Array:
+def _pull_push(picture: Array, known: NDArray[np.bool_]) -> Array:
     """Fill unknown pixels from the means of 2x2 blocks, coarser where need be."""
     if known.all():
-        return x
-    x = np.where(known[..., None], x, np.float32(0.0))
+        return picture
+    picture = np.where(known[..., None], picture, np.float32(0.0))
     if not known.any():
-        return x
+        return picture
     height, width = known.shape
     even = ((0, height % 2), (0, width % 2))
-    blocks = np.pad(x, (*even, (0, 0))) * np.float32(0.25)  # sums stay in range
+    blocks = np.pad(picture, (*even, (0, 0))) * np.float32(0.25)  # sums stay in range
     counts = np.pad(known, even).astype(np.float32) * np.float32(0.25)
     for axis in (0, 1):
         blocks = _pair_sums(blocks, axis)
@@ -78,9 +113,11 @@ def _pull_push(x: Array, known: NDArray[np.bool_]) -> Array:
     means = blocks / np.maximum(counts, np.float32(0.25))[..., None]
     coarse = _pull_push(np.clip(means, -_LARGEST, _LARGEST), counts > 0.0)
     fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
-    return np.where(known[..., None], x, fine)
+    return np.where(known[..., None], picture, fine)
 
 
-def _pair_sums(x: Array, axis: int) -> Array:
-    even, odd = (np.take(x, range(i, x.shape[axis], 2), axis=axis) for i in (0, 1))
+def _pair_sums(blocks: Array, axis: int) -> Array:
+    even, odd = (
+        np.take(blocks, range(i, blocks.shape[axis], 2), axis=axis) for i in (0, 1)
+    )
     return np.asarray(even + odd)

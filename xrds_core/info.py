@@ -25,10 +25,10 @@ def network_devices() -> list[str]:
 
     from .superres.devices import device_name
 
-    found = [torch.device("cuda", i) for i in range(torch.cuda.device_count())]
+    devices = [torch.device("cuda", i) for i in range(torch.cuda.device_count())]
     if torch.backends.mps.is_available():
-        found.append(torch.device("mps"))
-    return ["cpu", *map(device_name, found)]
+        devices.append(torch.device("mps"))
+    return ["cpu", *map(device_name, devices)]
 
 
 def denoiser_devices() -> list[str]:
@@ -59,14 +59,23 @@ def shipped_costs() -> dict[str, Any]:
 def info(
     blender: str | None = None, weights: str | Path | None = None
 ) -> dict[str, Any]:
-    """Everything `xrds info --json` prints.
+    """Collect what `xrds info --json` prints.
 
-    Args:
-        blender: Blender's version, which this package cannot find out.
-        weights: the folder of weights files; the shipped ones by default.
+    Parameters
+    ----------
+    blender : str, optional
+        Blender's version, which this package cannot find out.
+    weights : str or Path, optional
+        Folder of weights files; the shipped ones by default.
 
-    Raises:
-        WeightsError: there is no such folder, or a weights file is damaged.
+    Returns
+    -------
+    info : dict
+
+    Raises
+    ------
+    WeightsError
+        If there is no such folder, or a weights file is damaged.
     """
     if weights is not None and not Path(weights).is_dir():
         raise WeightsError(f"{weights} is no folder of weights files")

@@ -18,8 +18,17 @@ class Progress:
     """Reports the fraction done of all work to a callback; it never falls.
 
     Work is counted by `begin` and `add`, or consists of stages that tell their own
-    fractions, by `begin_stage` and `monitor`. Raises Cancelled where the callback says
-    so.
+    fractions, by `begin_stage` and `monitor`.
+
+    Parameters
+    ----------
+    callback : callable or None
+        Takes a fraction in [0, 1]; False as its result cancels.
+
+    Raises
+    ------
+    Cancelled
+        By any method that reports, if the callback says so.
     """
 
     def __init__(self, callback: Callback | None) -> None:

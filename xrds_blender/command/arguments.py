@@ -56,9 +56,9 @@ def seconds(text: str) -> float:
     number = r"(\d+(?:\.\d+)?)"
     parts = re.fullmatch(f"(?:{number}h)?(?:{number}m)?(?:{number}s?)?", text.lower())
     units = (3600.0, 60.0, 1.0)
-    found = parts.groups() if parts else ()
+    amounts = parts.groups() if parts else ()
     value = sum(
-        float(part or 0) * unit for part, unit in zip(found, units, strict=False)
+        float(part or 0) * unit for part, unit in zip(amounts, units, strict=False)
     )
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is not a time such as 8h or 1h30m")

@@ -256,10 +256,10 @@ def write_at_once(text: str, result: str) -> None:
 
     For a process that is about to end on the spot.
     """
-    for number, each in ((2, text), (_aside, result)):
+    for number, content in ((2, text), (_aside, result)):
         if number is not None:
             with suppress(OSError):  # the terminal may have gone
-                os.write(number, each.encode())
+                os.write(number, content.encode())
 
 
 @contextmanager

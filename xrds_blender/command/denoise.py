@@ -201,8 +201,8 @@ def _lines(result: dict[str, Any]) -> list[str]:
     done = [entry["frame"] for entry in result["frames"]]
     outcomes = {"denoised": done, "skipped, complete": result["kept"]}
     lines = [
-        f"{result['output']}: frames {in_words(numbers)} {what}"
-        for what, numbers in outcomes.items()
+        f"{result['output']}: frames {in_words(numbers)} {outcome}"
+        for outcome, numbers in outcomes.items()
         if numbers
     ]
     return lines + [
@@ -214,7 +214,7 @@ def _lines(result: dict[str, Any]) -> list[str]:
 
 def _check(result: dict[str, Any]) -> None:
     """Fail, after all that could be done, where a requested frame is missing."""
-    missing = [each["frame"] for each in result["left_out"]]
+    missing = [entry["frame"] for entry in result["left_out"]]
     if missing:
         raise XRDSError(
             f"frames {in_words(missing)} could not be finished and were left out; "

@@ -243,12 +243,12 @@ def resolve_paths(options: argparse.Namespace) -> None:
 def choice_of(options: argparse.Namespace) -> SceneChoice:
     """What of the file is rendered."""
     # `scene` is the file there
-    given = _named(options, {each.name for each in fields(SceneChoice)} - {"scene"})
+    given = _named(options, {field.name for field in fields(SceneChoice)} - {"scene"})
     return SceneChoice(options.scene_name, **given)
 
 
 def request_of(options: argparse.Namespace) -> Request:
-    """What the options of `add_request` ask for; raises UsageError."""
+    """Build a request from the options of `add_request`; raises UsageError."""
     _check_pace(options)
     _check_light(options)
     given = _named(options, CHOICES)

@@ -27,9 +27,25 @@ def check_output(
 ) -> None:
     """Refuse, before anything is rendered, an output that could not be written.
 
-    Makes the folder. Raises UsageError for a suffix that is neither .exr nor .png, for
-    one that holds no passes where there are some, for several frames of one name, and
-    for other programs' frame numbers, PictureError as `xrds_core.files.check_output`.
+    The folder is made.
+
+    Parameters
+    ----------
+    pattern : str
+        Path of the pictures, with # for the digits of the frame number.
+    frames : sequence of int
+        Frame numbers.
+    has_passes : bool
+        Whether the files are to hold passes beside the picture.
+
+    Raises
+    ------
+    UsageError
+        For a suffix that is neither .exr nor .png, for one that holds no passes where
+        there are some, for several frames of one name, and for other programs' frame
+        numbers.
+    PictureError
+        If a file cannot be written.
     """
     path = Path(pattern)
     check_pattern(pattern)
@@ -56,17 +72,30 @@ def save(
     metadata: Mapping[str, str] | None = None,
     parts: Mapping[str, Array] | None = None,
 ) -> None:
-    """Write one frame, all at once or not at all; raises PictureError if it cannot.
+    """Write one frame, all at once or not at all.
 
-    Args:
-        path: ends in .exr or .png.
-        radiance: (H, W, 3) scene-linear, premultiplied.
-        alpha: (H, W) in [0, 1].
-        scene: its view settings shape the PNG, and its output settings where they are
-            for PNG; else with a transparent film both formats hold alpha.
-        encoding: of an .exr.
-        metadata: texts by name that the file is to hold.
-        parts: further passes (H, W, 3) by name, of an .exr.
+    Parameters
+    ----------
+    path : Path
+        Ends in .exr or .png.
+    radiance : (H, W, 3) float32 array
+        Scene-linear, premultiplied.
+    alpha : (H, W) float32 array
+        In [0, 1].
+    scene : bpy.types.Scene
+        Its view settings shape the PNG, and its output settings where they are for PNG;
+        else with a transparent film both formats hold alpha.
+    encoding : Encoding
+        How numbers are stored in an .exr.
+    metadata : mapping of str to str, optional
+        Texts by name that the file is to hold.
+    parts : mapping of str to (H, W, 3) float32 array, optional
+        AOVs and light passes of an .exr, by name.
+
+    Raises
+    ------
+    PictureError
+        If it cannot be written.
     """
     if path.suffix.lower() == ".png":
         _write_png(path, radiance, alpha, scene, metadata or {})

@@ -107,7 +107,10 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:
-    lines = [f"{_decision(each)}: {each['reason']}" for each in result["decisions"]]
+    lines = [
+        f"{_decision(decision)}: {decision['reason']}"
+        for decision in result["decisions"]
+    ]
     return [_expected(result), *lines, *(f"note: {x}" for x in result["remarks"])]
 
 
@@ -140,11 +143,11 @@ def _lines(result: dict[str, Any]) -> list[str]:
         f"{frame['output']}: {frame['seconds']['total']:.1f} s"
         for frame in result["frames"]
     ]
-    return lines + [f"  {_outcome(each)}" for each in result["plan"]]
+    return lines + [f"  {_outcome(decision)}" for decision in result["plan"]]
 
 
 def _outcome(decision: dict[str, Any]) -> str:
     """A decision after a render: with its reason where this says what was found."""
     line = _decision(decision)
-    found = decision["decision"] in (GUIDE_CACHE, SAME_PICTURE, DEADLINE)
-    return f"{line}: {decision['reason']}" if found else line
+    explains = decision["decision"] in (GUIDE_CACHE, SAME_PICTURE, DEADLINE)
+    return f"{line}: {decision['reason']}" if explains else line

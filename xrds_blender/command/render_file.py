@@ -46,22 +46,40 @@ def render_file(
 ) -> dict[str, Any]:
     """Render frames of a .blend file and return what `xrds render --json` prints.
 
-    Args:
-        path: the .blend file; whatever Blender has open is replaced by it.
-        output: .exr or .png; # stands for digits of the frame number. None keeps
-            samples alone.
-        request: scale, samples and the rest.
-        frames: numbers; by default the file's current one, of an `animation` its range.
-        choice: what comes in the place of what the file was saved with.
-        encoding: of .exr files.
-        resume: leave frames as they are that lie there whole and of their size.
-        sample_cache: a folder for the samples of every frame, at scale 1; those that
-            it has already are read, not rendered.
+    Parameters
+    ----------
+    path : Path
+        The .blend file; whatever Blender has open is replaced by it.
+    output : str or None
+        .exr or .png; # stands for digits of the frame number. None keeps samples alone.
+    request : Request
+        Scale, samples and the rest.
+    frames : sequence of int, optional
+        Frame numbers; by default the file's current one, of an `animation` its range.
+    animation : bool
+        Whether to render the file's range of frames.
+    choice : SceneChoice
+        What comes in the place of what the file was saved with.
+    encoding : Encoding
+        How numbers are stored in .exr files.
+    resume : bool
+        Whether to leave frames as they are that lie there whole and of their size.
+    sample_cache : Path, optional
+        A folder for the samples of every frame, at scale 1; those that it has already
+        are read, not rendered.
 
-    Raises:
-        UsageError, SceneError, PictureError, WeightsError: before anything is
-            rendered, if it could not succeed. Later: PictureError for a frame that
-            cannot be written, NetworkFailed; both name the file with what there is.
+    Returns
+    -------
+    result : dict
+        What `xrds render --json` prints.
+
+    Raises
+    ------
+    UsageError, SceneError, PictureError, WeightsError
+        Before anything is rendered, if it could not succeed.
+    PictureError, NetworkFailed
+        Later, for a frame that cannot be written, or a network that fails; both name
+        the file with what there is.
     """
     if sample_cache is not None:
         _check_cache(request)
@@ -114,16 +132,16 @@ def _numbers(
     scene: Any, frames: Sequence[int] | None, animation: bool, output: str | None
 ) -> list[int]:
     """Numbers of the frames to render; says so where the file holds more."""
-    there = frame_range(scene)
+    whole_range = frame_range(scene)
     if chosen := frames_of(scene, frames, animation):
         if animation and output is not None:
-            picture_file.check_output(output, there)
+            picture_file.check_output(output, whole_range)
         return chosen
     current = scene.frame_current
-    if len(there) > 1 and moves_in_time(scene):
+    if len(whole_range) > 1 and moves_in_time(scene):
         warn(
-            f"frame {current} alone: the file has {in_words(there)}; -a renders them, "
-            "--frames some of them"
+            f"frame {current} alone: the file has {in_words(whole_range)}; -a renders "
+            "them, --frames some of them"
         )
     return [current]
 
@@ -135,7 +153,9 @@ def _described(last: Picture | None, request: Request) -> dict[str, Any]:
         "scale": settings.scale,
         "preset": settings.preset if settings.is_enlarged else None,
         "device": last.device if last else "",
-        "plan": [dataclasses.asdict(each) for each in (last.plan if last else ())],
+        "plan": [
+            dataclasses.asdict(decision) for decision in (last.plan if last else ())
+        ],
     }
 
 
@@ -280,7 +300,7 @@ def _write(
 
 
 def _suffix(scene: Any, view: str) -> str:
-    """What the file of a view has after its name, as in Blender's own output."""
+    """What the file of a view has after its name: that of Blender's own output."""
     return str(scene.render.views[view].file_suffix)
 
 

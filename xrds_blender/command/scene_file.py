@@ -71,11 +71,11 @@ def _check_cameras(scene: Any, path: Path) -> None:
     if scene.camera is None:
         raise SceneError(f"{path} has no camera in scene {scene.name!r}; add one")
     bound = [marker.camera for marker in scene.timeline_markers if marker.camera]
-    for each in (scene.camera, *bound):
-        if each.type != "CAMERA":
+    for camera in (scene.camera, *bound):
+        if camera.type != "CAMERA":
             raise SceneError(
-                f"{path} has {each.name!r}, which is no camera, as the camera of scene "
-                f"{scene.name!r}; choose one, or give --camera"
+                f"{path} has {camera.name!r}, which is no camera, as the camera of "
+                f"scene {scene.name!r}; choose one, or give --camera"
             )
 
 
@@ -86,13 +86,13 @@ def frames_of(
 
     Raises UsageError where `animation`, the file's range, are others than `frames`.
     """
-    there = frame_range(scene)
-    if animation and frames and list(frames) != there:
+    whole_range = frame_range(scene)
+    if animation and frames and list(frames) != whole_range:
         raise UsageError(
-            f"-a are frames {in_words(there)} of the file, but other frames are asked "
-            "for as well; give one of them"
+            f"-a are frames {in_words(whole_range)} of the file, but other frames are "
+            "asked for as well; give one of them"
         )
-    return there if animation else list(frames or ()) or None
+    return whole_range if animation else list(frames or ()) or None
 
 
 def _apply(choice: SceneChoice, scene: Any, path: Path) -> None:
@@ -101,7 +101,7 @@ def _apply(choice: SceneChoice, scene: Any, path: Path) -> None:
         for layer in scene.view_layers:
             layer.use = layer == wanted
     if choice.camera is not None:
-        cameras = {each.name: each for each in scene.objects if each.type == "CAMERA"}
+        cameras = {item.name: item for item in scene.objects if item.type == "CAMERA"}
         scene.camera = _named("camera", choice.camera, cameras, path)
         for marker in scene.timeline_markers:  # they would switch back
             marker.camera = None

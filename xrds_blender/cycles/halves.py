@@ -48,11 +48,33 @@ def sample_halves(
     geometry: _Geometry,
     light: Sequence[LightPart] = (),
 ) -> tuple[dict[str, Half], dict[str, float]]:
-    """Render a part of a sequence, of two samples or more, in two halves.
+    """Render a part of a sequence in two halves.
 
-    Returns them by view, and the seconds: sync, beauty. `geometry` and `light` are as
-    in `sample_layer`; with COUNTS the file's noise threshold is kept, and counts
-    are in samples. Raises Cancelled when the user stops it.
+    Parameters
+    ----------
+    engine : bpy.types.RenderEngine
+        The engine that renders.
+    depsgraph : bpy.types.Depsgraph
+        The evaluated scene.
+    subset : SampleSubset
+        The part, of two samples or more.
+    geometry : sequence of (str, str)
+        Those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS. With COUNTS the
+        file's noise threshold is kept, and counts are in samples.
+    light : sequence of LightPart
+        AOVs and light passes that are wanted.
+
+    Returns
+    -------
+    halves : dict of str to Half
+        By view.
+    seconds : dict of str to float
+        By stage: sync, beauty.
+
+    Raises
+    ------
+    Cancelled
+        If the user stops it.
     """
     is_even = COUNTS not in geometry
     parts, passes, clocks = [], [], []
@@ -76,13 +98,13 @@ def sample_halves(
             passes.append(layer.all_passes())
             clocks.append(clock)
         shares = subset.shares()
-        found = {
+        by_view = {
             view: _joined(first, parts[1][view], shares)
             for view, first in parts[0].items()
         }
         first, second = passes
-        layer.put_back(_merged(first, second, shares, found) | _light(light, found))
-    return found, seconds_of(clocks)
+        layer.put_back(_merged(first, second, shares, by_view) | _light(light, by_view))
+    return by_view, seconds_of(clocks)
 
 
 def counted(samples: Passes, part: SampleSubset, clock: StageClock) -> Passes:
@@ -99,8 +121,8 @@ def sample_motion(
 ) -> tuple[dict[str, Passes], dict[str, float]]:
     """Render depth and motion at the middle of the shutter: one sample, no blur.
 
-    Cycles gives no vectors with motion blur. Returns as `sample_halves`; the result
-    then holds other passes than the frame's own.
+    Cycles gives no vectors with motion blur. Returns the samples by view, and the
+    seconds by stage; the result then holds other passes than the frame's own.
     """
     with LayerSession(engine, depsgraph) as layer:
         layer.hold_still()
@@ -128,15 +150,15 @@ def _joined(first: Passes, second: Passes, shares: tuple[float, float]) -> Half:
     return Half(first.joined(second, halves.share()), halves)
 
 
-def _mean(one: Array, two: Array, share: Array) -> Array:
-    return np.asarray(one * share + two * (np.float32(1.0) - share))
+def _mean(first: Array, second: Array, share: Array) -> Array:
+    return np.asarray(first * share + second * (np.float32(1.0) - share))
 
 
-def _light(parts: Sequence[LightPart], found: Mapping[str, Half]) -> _Named:
-    """The passes of light: those that are divided by a colour have no plain means."""
+def _light(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Named:
+    """The light passes: those that are divided by a colour have no plain means."""
     return {
         (view, name): pixels
-        for view, half in found.items()
+        for view, half in by_view.items()
         for name, pixels in passes_by_name(parts, half.whole.parts).items()
     }
 
@@ -145,7 +167,7 @@ def _merged(
     first: _Named,
     second: _Named,
     shares: tuple[float, float],
-    found: Mapping[str, Half],
+    by_view: Mapping[str, Half],
 ) -> _Named:
     """Passes of all samples: means, but for what only a first sample writes."""
     merged = {}
@@ -153,7 +175,7 @@ def _merged(
         if is_of_first_sample(name) or (view, name) not in second:
             merged[view, name] = pixels
             continue
-        share = found[view].halves.share()[..., None]
+        share = by_view[view].halves.share()[..., None]
         if name == SAMPLE_COUNT:  # itself a share, of the most samples
             share = np.asarray(shares[0], np.float32)
         merged[view, name] = _mean(pixels, second[view, name], share)
@@ -169,15 +191,38 @@ def more_samples(
     share: float | None = None,
     light: Sequence[LightPart] = (),
 ) -> tuple[list[dict[str, Passes]], dict[str, float]]:
-    """Render parts of sequences; samples of each by view, and the seconds.
+    """Render parts of sequences; the result keeps the passes that it had before.
 
-    `region` is a part of the picture, in its own pixels; None is all of it. `share`
-    keeps the file's noise threshold, as `set_share` has it, for each part.
-    All samples have counts, and the parts of the `light`. The result has the passes
-    afterwards that it had before. Raises Cancelled when the user stops it.
+    Parameters
+    ----------
+    engine : bpy.types.RenderEngine
+        The engine that renders.
+    depsgraph : bpy.types.Depsgraph
+        The evaluated scene.
+    parts : sequence of SampleSubset
+        Parts of sequences.
+    region : Region, optional
+        A part of the picture, in its own pixels; all of it by default.
+    share : float, optional
+        Keeps the file's noise threshold for each part: a pixel stops at this share of
+        what the threshold asks for.
+    light : sequence of LightPart
+        AOVs and light passes that are wanted.
+
+    Returns
+    -------
+    samples : list of dict of str to Passes
+        Samples of each part by view, with counts.
+    seconds : dict of str to float
+        By stage: sync, beauty.
+
+    Raises
+    ------
+    Cancelled
+        If the user stops it.
     """
     geometry = [] if share is None else [COUNTS]
-    found, clocks = [], []
+    rendered_parts, clocks = [], []
     with CyclesPasses(engine, depsgraph, geometry=geometry) as passes:
         whole, before = passes.region, passes.all_passes()
         region = region or Region(0, 0, whole.width, whole.height)
@@ -193,15 +238,17 @@ def more_samples(
                     place, part, is_even=share is None, light=light
                 )
                 clocks.append(clock)
-                found.append({v: _counted(x, part, clock) for v, x in rendered.items()})
+                rendered_parts.append(
+                    {v: _counted(x, part, clock) for v, x in rendered.items()}
+                )
         passes.put_back(before)
-    return found, seconds_of(clocks)
+    return rendered_parts, seconds_of(clocks)
 
 
 def _counted(samples: Passes, part: SampleSubset, clock: session.StageClock) -> Passes:
     """With the number of each pixel's samples, even ones as well."""
-    found = counted(samples, part, clock)
-    if found.counts is not None:
-        return found
+    with_counts = counted(samples, part, clock)
+    if with_counts.counts is not None:
+        return with_counts
     counts = np.full(samples.shape, part.length, np.float32)
     return replace(samples, counts=counts)

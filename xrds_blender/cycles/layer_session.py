@@ -116,8 +116,8 @@ class LayerSession:
         return self._passes(self.pass_names())
 
     def _passes(self, names: Iterable[str]) -> dict[tuple[str, str], Array]:
-        found = {(view, n): self._read(n, view) for n in names for view in self.views}
-        return {key: pixels for key, pixels in found.items() if pixels is not None}
+        passes = {(view, n): self._read(n, view) for n in names for view in self.views}
+        return {key: pixels for key, pixels in passes.items() if pixels is not None}
 
     def put_back(self, passes: dict[tuple[str, str], Array]) -> None:
         """Write passes that were read before into the result again."""

@@ -94,10 +94,12 @@ class CyclesPasses(LayerSession):
         denoiser: Denoising | None = None,
         in_process: InProcess | None = None,
     ) -> dict[str, Beauty]:
-        """As `beauty`, for every view by name (one without stereo)."""
+        """Render what `beauty` does, for every view by name (one without stereo)."""
         if denoise and in_process is not None:
             low = self.low_samples(scale, samples, seed=seed)
-            return {view: each.denoised(in_process) for view, each in low.items()}
+            return {
+                view: low_view.denoised(in_process) for view, low_view in low.items()
+            }
         denoise = denoise and session.has_denoiser()
         grid = self._grid(scale)
         with Borrowed() as borrowed:
@@ -120,7 +122,7 @@ class CyclesPasses(LayerSession):
         seed: int | None = None,
         subset: SampleSubset | None = None,
     ) -> dict[str, LowSamples]:
-        """Render as `beauties`, and leave the noise in.
+        """Render at 1/scale of the size and leave the noise in; samples by view.
 
         `subset` is of a longer sequence, in the place of samples and seed. Depth and
         vectors are there as far as `geometry` asked for them.
@@ -146,9 +148,11 @@ class CyclesPasses(LayerSession):
         is_even: bool = True,
         light: Sequence[LightPart] = (),
     ) -> tuple[dict[str, Passes], session.StageClock]:
-        """Render samples of a part of the frame, by view; `subset` and `is_even` as in
-        `set_samples`. Counts are there where `geometry` asked for them, and the parts
-        of the `light`.
+        """Render samples of a part of the frame, by view.
+
+        If not `is_even` the scene's noise threshold stays: pixels stop at it. Counts
+        are there where `geometry` asked for them, and so are the AOVs and light passes
+        of `light`.
         """
         with Borrowed() as borrowed:
             set_samples(borrowed, self._scene, None, None, subset, is_even)
@@ -158,11 +162,11 @@ class CyclesPasses(LayerSession):
             size = self.width, self.height
             is_part = region != self.region
             clock = self._run(size, region, exact=True, is_part=is_part)
-        found = {
+        samples = {
             view: read_samples(self._corner_reader(view, region), self._geometry, light)
             for view in self.views
         }
-        return found, clock
+        return samples, clock
 
     def stopped_samples(self, scale: int) -> dict[str, LowSamples]:
         """What `low_samples` has left in the result when the user stopped it."""
@@ -208,7 +212,7 @@ class CyclesPasses(LayerSession):
         how: GuideRender | None = None,
         subset: SampleSubset | None = None,
     ) -> dict[str, Guides]:
-        """As `guides`, for every view by name; `how` names what may be left out.
+        """Render what `guides` does, for every view; `how` names what may be left out.
 
         `subset` is of a longer sequence, in the place of samples and seed.
         """
@@ -245,9 +249,9 @@ class CyclesPasses(LayerSession):
             set_denoising(borrowed, self._scene, self._layer_eval, False)
             self._run_low(borrowed, grid, exact=False)
         window = grid.rendered(self._size)
-        found = [self._radiance(view, False)[..., 3:] for view in self.views]
-        found += [pixels for _, pixels in sorted(self.data_passes().items())]
-        values = [self._read_corner(pixels, window).ravel() for pixels in found]
+        pictures = [self._radiance(view, False)[..., 3:] for view in self.views]
+        pictures += [pixels for _, pixels in sorted(self.data_passes().items())]
+        values = [self._read_corner(pixels, window).ravel() for pixels in pictures]
         seconds = time.perf_counter() - started
         return Probe(np.concatenate(values), window.width, window.height, seconds)
 

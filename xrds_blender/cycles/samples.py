@@ -56,12 +56,37 @@ def sample_layer(
     geometry: Sequence[tuple[str, str]] = (),
     light: Sequence[LightPart] = (),
 ) -> tuple[dict[str, Passes], session.StageClock]:
-    """Render without Cycles' denoiser; samples by view, and what it took.
+    """Render without Cycles' denoiser; the result holds Cycles' own passes.
 
-    `geometry` names those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS.
-    `subset` is of a longer sequence, in the place of samples and seed; `is_even` as in
-    `set_samples`; `light` are the parts of it that are wanted. The result holds Cycles'
-    own passes. Raises Cancelled when the user stops it.
+    Parameters
+    ----------
+    engine : bpy.types.RenderEngine
+        The engine that renders.
+    depsgraph : bpy.types.Depsgraph
+        The evaluated scene.
+    samples, seed : int, optional
+        None leaves the scene's own.
+    subset : SampleSubset, optional
+        A part of a longer sequence, in the place of samples and seed.
+    is_even : bool
+        Whether all pixels of a subset take as many samples; if not, the scene's noise
+        threshold stays.
+    geometry : sequence of (str, str)
+        Those of GEOMETRY that are wanted, or LATE_DEPTH, and COUNTS.
+    light : sequence of LightPart
+        AOVs and light passes that are wanted.
+
+    Returns
+    -------
+    samples : dict of str to Passes
+        By view.
+    clock : StageClock
+        What it took.
+
+    Raises
+    ------
+    Cancelled
+        If the user stops it.
     """
     layer_name = depsgraph.view_layer_eval.name
     for name, letters in geometry:
@@ -75,9 +100,9 @@ def sample_layer(
         subset=subset,
         is_even=is_even,
     )
-    found = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
-    live.show(next(iter(found.values())).picture)
-    return found, clock
+    by_view = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
+    live.show(next(iter(by_view.values())).picture)
+    return by_view, clock
 
 
 def samples_in(
@@ -86,7 +111,7 @@ def samples_in(
     wanted: Collection[str] = (),
     light: Sequence[LightPart] = (),
 ) -> dict[str, Passes]:
-    """The samples that the result holds, by view; the rest as `read_samples` has it."""
+    """Read the samples in the result by view; `wanted` are names of `geometry`."""
     result = engine.get_result()
     views = [view.name for view in result.views] or [""]
     layer, size = result.layers[layer_name], (result.resolution_x, result.resolution_y)
@@ -130,12 +155,12 @@ def read_samples(
 
 
 def _read_light(read: Reader, parts: Sequence[LightPart]) -> dict[str, Array]:
-    """As `light_of`."""
+    """Return the light of passes (H, W, 3), by the part's name, and their colours."""
 
     def pixels(channels: tuple[str, ...]) -> Array:
-        found = read(channels[0].rpartition(".")[0])
-        assert found is not None
-        return found[..., :3]
+        colour = read(channels[0].rpartition(".")[0])
+        assert colour is not None
+        return colour[..., :3]
 
     return light_of(parts, pixels)
 
@@ -165,11 +190,34 @@ def render_once(
 ) -> StageClock:
     """Render into the engine's result, exactly as Cycles' own engine would.
 
-    `samples`, `seed` and `denoiser` None leave the scene's own. `noisy` switches
-    Cycles' denoiser off, adds the passes that guide another one, and takes samples by
-    the pattern that suits it. `subset` is of a
-    longer sequence, in the place of samples and seed; it `is_even` as in `set_samples`.
-    Raises Cancelled when the user stops it.
+    Parameters
+    ----------
+    engine : bpy.types.RenderEngine
+        The engine that renders.
+    depsgraph : bpy.types.Depsgraph
+        The evaluated scene.
+    samples, seed : int, optional
+        None leaves the scene's own.
+    denoiser : Denoising, optional
+        None leaves the scene's own.
+    noisy : bool
+        Whether to switch Cycles' denoiser off, add the passes that guide another one,
+        and take samples by the pattern that suits it.
+    subset : SampleSubset, optional
+        A part of a longer sequence, in the place of samples and seed.
+    is_even : bool
+        Whether all pixels of a subset take as many samples; if not, the scene's noise
+        threshold stays.
+
+    Returns
+    -------
+    clock : StageClock
+        What it took.
+
+    Raises
+    ------
+    Cancelled
+        If the user stops it.
     """
     keeps_session = engine.path_resolve("render").use_persistent_data
     scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval

@@ -56,7 +56,7 @@ def set_samples(
     subset: SampleSubset | None,
     is_even: bool = True,
 ) -> None:
-    """Take samples as `set_sampling`, or in their place a part of a sequence.
+    """Set samples and seed, None leaving the scene's own, or a part of a sequence.
 
     If not `is_even` the scene's noise threshold stays: pixels stop at it.
     """
@@ -78,8 +78,8 @@ def set_samples(
 def stops_at(cycles: Any, samples: int) -> tuple[float, int]:
     """The noise threshold and the least samples of a pixel, also if Cycles finds them.
 
-    `samples` are the most of one. As Cycles' `intern/cycles/scene/integrator.cpp` has
-    it.
+    `samples` are the most of one. The formulas are those of Cycles'
+    `intern/cycles/scene/integrator.cpp`.
     """
     threshold = cycles.adaptive_threshold or max(0.001, 1.0 / samples)
     least = cycles.adaptive_min_samples or math.ceil(16.0 / threshold**0.3)

@@ -43,7 +43,7 @@ def can_track(scene: Any) -> bool:
     from pixel to pixel. Cameras that markers bind count, too.
     """
     bound = [m.camera for m in scene.timeline_markers if m.camera]
-    cameras = [each.data for each in (scene.camera, *bound)]
+    cameras = [camera.data for camera in (scene.camera, *bound)]
     return all(_is_tracked(data, scene.render.use_multiview) for data in cameras)
 
 
@@ -95,11 +95,11 @@ def _camera(depsgraph: Any, render: Any, place: Any) -> Camera:
 
 
 def low_view(camera: Camera, scale: int, window: tuple[int, int]) -> Camera:
-    """The camera of pixels `scale` times as large, as `low_camera.widen` makes it.
+    """The camera of pixels `scale` times as large.
 
-    Its frame covers whole pixels and keeps the top left corner; that of a panorama,
-    which cannot be widened, stays. `window` is the (x, y) of the arrays' top-left pixel
-    in it.
+    Its frame covers whole pixels and keeps the top left corner, which
+    `low_camera.widen` does for Blender's camera; that of a panorama, which cannot be
+    widened, stays. `window` is the (x, y) of the arrays' top-left pixel in it.
     """
     width, height = camera.size
     size = low_size(width, height, scale)

@@ -57,10 +57,10 @@ def remembered() -> str:
     """
     note = _home() / "pytorch_folder.txt"
     chosen = note.read_text("utf-8") if note.is_file() else ""
-    for found in (chosen, str(folder())):
-        path = machine.folder(found)
+    for candidate in (chosen, str(folder())):
+        path = machine.folder(candidate)
         if path is not None and _fits(path):
-            return found
+            return candidate
     return ""
 
 

@@ -53,7 +53,7 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
     for closures in by_material.values():
         surface |= closures
     if solid and by_material and not _bare(solid):
-        surface = _together(by_material.values())
+        surface = _unite_closures(by_material.values())
     kind, air = _world(scene.world)
     lamps = [item for item in objects if item.type == "LIGHT"]
     return SceneFacts(
@@ -63,7 +63,7 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
         transparent=surface.transparent,
         volumes=surface.volume or air.volume or any(o.type == "VOLUME" for o in solid),
         emitters=tuple(
-            sorted(name for name, each in by_material.items() if each.emits)
+            sorted(name for name, closures in by_material.items() if closures.emits)
         ),
         lamps=len(lamps),
         seen_lamps=sum(_is_seen(lamp, surface.smooth) for lamp in lamps),
@@ -111,7 +111,7 @@ def requested_passes(layer: Any) -> tuple[str, ...]:
     return tuple(n for n in names if n not in {"combined", "cryptomatte_accurate"})
 
 
-def _together(all_closures: Iterable[Closures]) -> Closures:
+def _unite_closures(all_closures: Iterable[Closures]) -> Closures:
     merged = Closures()
     for closures in all_closures:
         merged |= closures
@@ -121,7 +121,7 @@ def _together(all_closures: Iterable[Closures]) -> Closures:
 def _bare(objects: list[Any]) -> bool:
     """Whether an object has a slot without a material, or no slot."""
     slots = [[slot.material for slot in item.material_slots] for item in objects]
-    return any(not each or None in each for each in slots)
+    return any(not materials or None in materials for materials in slots)
 
 
 def _world(world: Any) -> tuple[str, Closures]:
@@ -157,7 +157,7 @@ def _is_diced(item: Any) -> bool:
 
 
 def _has_hair(item: Any) -> bool:
-    return any(each.settings.type == "HAIR" for each in item.particle_systems)
+    return any(system.settings.type == "HAIR" for system in item.particle_systems)
 
 
 def _has_blur(camera: Any) -> bool:
@@ -252,8 +252,8 @@ def _is_timed(tree: Any) -> bool:
 
 
 def _is_simulated(item: Any) -> bool:
-    modifiers = [each.type for each in item.modifiers]
-    emitting = any(each.settings.type != "HAIR" for each in item.particle_systems)
+    modifiers = [modifier.type for modifier in item.modifiers]
+    emitting = any(system.settings.type != "HAIR" for system in item.particle_systems)
     # A particle system left is hair: what is emitted was asked for.
     still = {*_STILL_MODIFIERS.split(), "PARTICLE_SYSTEM"}
     return emitting or any(m not in still for m in modifiers)
@@ -286,16 +286,16 @@ _IMAGES = ("OPEN_EXR_MULTILAYER", "MULTILAYER")
 
 
 def passes_looked_at(scene: Any) -> tuple[str, ...]:
-    """All where the file that is written holds them or the compositor reads one.
+    """The light passes that are looked at: ALL of them, or NONE.
 
-    As `Wanted` has them.
+    ALL where the file that is written holds them or the compositor reads one.
     """
     is_written = scene.render.image_settings.file_format in _IMAGES
     return (ALL,) if is_written or _is_composited(scene) else (NONE,)
 
 
 def has_light(layer: Any) -> bool:
-    """Whether a view layer has passes of light beside the picture."""
+    """Whether a view layer has light passes beside the picture."""
     return bool(len(layer.lightgroups)) or bool(_LIGHT & {*requested_passes(layer)})
 
 

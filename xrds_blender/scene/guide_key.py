@@ -92,7 +92,7 @@ def refuse(depsgraph: Any, facts: SceneFacts) -> None:
     if getattr(depsgraph.scene_eval.cycles, "shading_system", False):
         raise NotFollowed("Open Shading Language, whose scripts may read anything")
     for item in depsgraph.scene_eval.objects:
-        if any(each.settings.type == "HAIR" for each in item.particle_systems):
+        if any(system.settings.type == "HAIR" for system in item.particle_systems):
             raise NotFollowed(f"particle hair on {item.name}")
 
 
@@ -130,7 +130,7 @@ class _SceneHash:
 
     def _ordered(self, ids: Iterable[Any]) -> list[Any]:
         named = [(type(item).__name__, item.name_full, item) for item in ids]
-        return [item for *_, item in sorted(named, key=lambda each: each[:2])]
+        return [item for *_, item in sorted(named, key=lambda entry: entry[:2])]
 
     def _add(self, *values: Any) -> None:
         for value in values:
@@ -270,7 +270,9 @@ class _SceneHash:
         for kind, name in sorted(self._structs.attributes):
             owners: list[Any] = [layer, scene, scene.world]
             if kind in {"OBJECT", "INSTANCER"}:
-                owners = [each for item in self._objects for each in (item, item.data)]
+                owners = [
+                    owner for item in self._objects for owner in (item, item.data)
+                ]
             if kind != "GEOMETRY":
                 self._add(kind, name, [_resolved(owner, name) for owner in owners])
                 continue

@@ -179,7 +179,7 @@ def _left_out(kind: type) -> tuple[set[str], tuple[str, ...]]:
 
     bases = [base for base in _LEFT_OUT if _is_a(kind, base)]
     names = {name for base in bases for name in _LEFT_OUT[base].split()}
-    prefixes = [each for base in bases for each in _INTERFACE.get(base, ())]
+    prefixes = [prefix for base in bases for prefix in _INTERFACE.get(base, ())]
     always_on = {"use_nodes"} if bpy.app.version >= (5,) else set()
     return names | always_on | {"rna_type", "bl_rna"}, ("bl_", *prefixes)
 
@@ -188,7 +188,7 @@ def _is_a(kind: type, names: str) -> bool:
     import bpy
 
     types = [getattr(bpy.types, name, None) for name in names.split()]
-    return any(each is not None and issubclass(kind, each) for each in types)
+    return any(base is not None and issubclass(kind, base) for base in types)
 
 
 def _kind(item: Any) -> str:
@@ -257,7 +257,7 @@ def mesh(item: Any) -> Iterator[tuple[str, np.ndarray]]:
     """
     import bpy
 
-    kinds = {each.type for each in item.modifiers}
+    kinds = {modifier.type for modifier in item.modifiers}
     stable = not kinds & _UNSTABLE or "NODES" in kinds
     left_out = "" if stable else "FLOAT2"
     yield from geometry(item.data, "MESH", left_out=left_out)
@@ -311,9 +311,9 @@ def vertex_group(item: Any, name: str) -> np.ndarray:
     index = item.vertex_groups[name].index
     weights = np.zeros(len(item.data.vertices), np.float32)
     for number, vertex in enumerate(item.data.vertices):
-        for each in vertex.groups:
-            if each.group == index:
-                weights[number] = each.weight
+        for membership in vertex.groups:
+            if membership.group == index:
+                weights[number] = membership.weight
     return weights
 
 

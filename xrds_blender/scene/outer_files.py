@@ -53,22 +53,22 @@ def outer_files() -> list[OuterFile]:
     """All that the open file reads, by their paths; packed data lies in the file."""
     import bpy
 
-    found = [
-        each
+    files = [
+        file
         for kind in _KINDS.split()
         for item in getattr(bpy.data, kind)
         if not _is_inside(item)
-        for each in _of(item)
+        for file in _of(item)
     ]
-    known = {each.path for each in found}
-    found += [
+    known = {file.path for file in files}
+    files += [
         OuterFile("", "the file", path, _files(path))
         for path in map(Path, bpy.utils.blend_paths(absolute=True))
         if path not in known and path.exists()
     ]
     # Blender's own assets, of its version
-    found = [each for each in found if _SHIPPED not in each.path.as_posix()]
-    return sorted(found, key=lambda each: (str(each.path), each.owner))
+    files = [file for file in files if _SHIPPED not in file.path.as_posix()]
+    return sorted(files, key=lambda file: (str(file.path), file.owner))
 
 
 def _is_inside(item: Any) -> bool:
@@ -96,11 +96,11 @@ def _files(path: Path, item: Any = None) -> tuple[Path, ...]:
         return tuple(sorted(file for file in path.rglob("*") if file.is_file()))
     is_sequence = getattr(item, "is_sequence", False)
     is_sequence |= getattr(item, "source", "") in _SEQUENCES
-    found = files_of(path, is_sequence)
-    tiles = [str(each.number) for each in getattr(item, "tiles", ())]
+    files = files_of(path, is_sequence)
+    tiles = [str(tile.number) for tile in getattr(item, "tiles", ())]
     if "<UDIM>" in path.name:
-        found += [path.with_name(path.name.replace("<UDIM>", x)) for x in tiles]
-    return tuple(sorted({x for x in found if "<UDIM>" not in x.name}) or found)
+        files += [path.with_name(path.name.replace("<UDIM>", tile)) for tile in tiles]
+    return tuple(sorted({tile for tile in files if "<UDIM>" not in tile.name}) or files)
 
 
 def _is_around(path: Path) -> bool:
@@ -119,8 +119,8 @@ def _paths_in(item: Any) -> Iterator[str]:
         for name in _SETTINGS:
             value = getattr(item, name, None)
             values: Any = value if hasattr(value, "keys") else [value]
-            for each in values:
-                yield from _inner(each, set())
+            for setting in values:
+                yield from _inner(setting, set())
     if isinstance(item, bpy.types.CacheFile):
         for layer in item.layers:
             yield from _texts(layer)
@@ -143,18 +143,18 @@ def _inner(struct: Any, seen: set[tuple[type, int]]) -> Iterator[str]:
         return
     seen.add(place)
     yield from _texts(struct)
-    for each in struct.bl_rna.properties:
-        if each.identifier in _LEFT_OUT:
+    for member in struct.bl_rna.properties:
+        if member.identifier in _LEFT_OUT:
             continue
-        if each.type == "POINTER" and each.identifier != "rna_type":
-            yield from _inner(getattr(struct, each.identifier), seen)
-        if each.type == "COLLECTION":
-            for inner in getattr(struct, each.identifier):
+        if member.type == "POINTER" and member.identifier != "rna_type":
+            yield from _inner(getattr(struct, member.identifier), seen)
+        if member.type == "COLLECTION":
+            for inner in getattr(struct, member.identifier):
                 yield from _inner(inner, seen)
 
 
 def _is_in_flux(struct: Any) -> bool:
-    """Whether a path is one to write to, as of a simulation that was not baked."""
+    """Whether a path is one to write to, such as that of a simulation not baked yet."""
     if getattr(struct, "type", "") == "OCEAN" and not struct.is_cached:
         return True
     is_output = type(struct).__name__ == "DynamicPaintSurface"
@@ -165,11 +165,11 @@ def _texts(struct: Any) -> Iterator[str]:
     """The paths among the values of a struct, not of those inside."""
     import bpy
 
-    for each in struct.bl_rna.properties:
-        if each.type == "STRING" and each.subtype in _PATHS:
-            text = getattr(struct, each.identifier)
+    for member in struct.bl_rna.properties:
+        if member.type == "STRING" and member.subtype in _PATHS:
+            text = getattr(struct, member.identifier)
             # one that is not there was not baked
-            is_folder = each.subtype == "DIR_PATH"
+            is_folder = member.subtype == "DIR_PATH"
             if text and not (is_folder and not _place(struct, text).is_dir()):
                 yield text
     if _is_disk_cache(struct):
@@ -205,8 +205,10 @@ def image_digest(image: Any) -> tuple[Any, ...]:
     if image.is_dirty or image.source == "VIEWER":
         return "painted", _pixels(image)
     if image.packed_files:
-        packed = [each.packed_file for each in image.packed_files]
-        return "packed", *(_hash(each.data) for each in packed if each)
+        packed = [file.packed_file for file in image.packed_files]
+        return "packed", *(
+            _hash(packed_file.data) for packed_file in packed if packed_file
+        )
     if image.source == "GENERATED":
         return ("generated",)  # its settings, hashed elsewhere, decide
     return file_digest(image.filepath, image.library, image.source == "SEQUENCE")

@@ -60,16 +60,18 @@ def _without_light(scene: Any, request: Request) -> Iterator[str]:
 
 def missing() -> Iterator[str]:
     """A line for each kind of files that are not there."""
-    gone = [each for each in outer_files() if each.missing]
+    gone = [file for file in outer_files() if file.missing]
     kinds = {"image": "textures, which render pink", "library": "libraries"}
     for kind in (*kinds, ""):
-        files = [x for x in gone if (x.kind if x.kind in kinds else "") == kind]
+        files = [
+            file for file in gone if (file.kind if file.kind in kinds else "") == kind
+        ]
         if files:
             yield f"missing {kinds.get(kind, 'files')}: {_named(files)}"
 
 
 def _named(files: list[OuterFile]) -> str:
-    return _listed([f"{each.missing} ({each.owner})" for each in files])
+    return _listed([f"{file.missing} ({file.owner})" for file in files])
 
 
 def _listed(names: list[str]) -> str:

@@ -42,15 +42,29 @@ _SOFTNESS = 0.7
 
 @dataclass(frozen=True)
 class Accumulated:
-    """A frame with the samples of its neighbour frames; float32, (H, W, 3) or (H, W).
+    """A frame with the accumulated samples of its neighbour frames.
 
-    `radiance` (None of guides alone), `albedo`, `normal` (in this frame's axes) and
-    `alpha` (or None) are means over `samples` (H, W) samples per pixel, NaN where no
-    frame has any. So are `parts` of the radiance, by name.
-    `rejected` is the share of the neighbours' samples that were left out: of pixels
-    that a neighbour does not show, or shows in other light. `frames` are the numbers of
-    the frames that were considered, the frame itself included: those of its shot,
-    between two shot cuts.
+    Attributes
+    ----------
+    radiance : (H, W, 3) float32 array or None
+        Scene-linear radiance, the mean over `samples`; NaN where no frame has any
+        sample. None for a frame of guides alone.
+    albedo : (H, W, 3) float32 array
+        Mean albedo, NaN where no frame has any sample.
+    normal : (H, W, 3) float32 array
+        Mean normal in this frame's axes, NaN where no frame has any sample.
+    alpha : (H, W) float32 array or None
+        Mean alpha, NaN where no frame has any sample.
+    samples : (H, W) float32 array
+        Samples per pixel that the means are taken over.
+    rejected : float
+        Share of the neighbours' samples that were left out: those of pixels that a
+        neighbour does not show, or shows in other light.
+    frames : tuple of int
+        Numbers of the frames that were considered: those between two shot cuts, the
+        frame itself included.
+    parts : mapping of str to (H, W, 3) float32 array
+        AOVs and light passes, by name; means over `samples` as well.
     """
 
     radiance: Array | None
@@ -69,17 +83,42 @@ def accumulate(
     movement: Movement | None = None,
     threads: int | None = None,
 ) -> Accumulated:
-    """Return `target` with the samples of `others`.
+    """Accumulate the samples of neighbour frames on the pixels of a frame.
 
-    `movement` caches the object motion of this shot; without it each call computes it
-    again. No samples are reused across a shot cut. Without others the result is the
-    target as it is stored. `threads`: all processors by default; the result does not
-    depend on it. Raises PictureError where the frames hold different passes.
+    No samples are reused across a shot cut. Without neighbours the result is the target
+    as it is stored.
+
+    Parameters
+    ----------
+    target : Stored
+        The frame that samples are gathered for.
+    others : sequence of Stored
+        Neighbour frames, in any order.
+    movement : Movement, optional
+        Caches the object motion of this shot. Without it each call computes it again.
+    threads : int, optional
+        Number of threads, one for each processor by default. The result does not depend
+        on it.
+
+    Returns
+    -------
+    accumulated : Accumulated
+        Means over the target's own and the reused samples.
+
+    Raises
+    ------
+    PictureError
+        If the frames hold different passes.
     """
     others = same_shot(target, others)
     groups = _neighbours(target, others, movement or Movement(), threads)
     usual = light_for_albedo(target) if others and target.has_light else 0.0
-    pairs = [x.pair for group in groups for x in group if x.pair and x.is_reused]
+    pairs = [
+        neighbour.pair
+        for group in groups
+        for neighbour in group
+        if neighbour.pair and neighbour.is_reused
+    ]
     images = find_images(target, pairs, partial(in_threads, threads=threads))
     lit = _lit(target, others)
     work = Work(target, images, usual, lit, threads)
@@ -88,9 +127,9 @@ def accumulate(
     guess = work.guess(groups[0]) if registers else None
     means = work.means(groups, guess)
     height, width = target.shape
-    requested = sum(x.samples for x in others) * height * width
+    requested = sum(frame.samples for frame in others) * height * width
     rejected = 1.0 - means.reused / requested if requested else 0.0
-    frames = tuple(sorted({target.number, *(x.number for x in others)}))
+    frames = tuple(sorted({target.number, *(frame.number for frame in others)}))
     return _unpacked(target, means, lit, rejected, frames)
 
 
@@ -111,7 +150,7 @@ def _neighbours(
     threads: int | None,
 ) -> tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]]:
     """Return the neighbours in two groups: the nearest ones, and those farther away."""
-    rest = [x for x in others if not target.shows_same(x)]
+    rest = [other for other in others if not target.shows_same(other)]
     motions = dict(
         zip(map(id, rest), movement.object_motions(target, rest), strict=True)
     )
@@ -119,7 +158,7 @@ def _neighbours(
     fall = -0.5 * target.samples ** (2 / 3) / _SOFTNESS**2
     near = _nearest(target, others)
 
-    def neighbour(other: Stored) -> Aligned | Reprojected:
+    def prepare(other: Stored) -> Aligned | Reprojected:
         _check(target, other)
         if id(other) not in motions:
             return Aligned(other)
@@ -127,13 +166,13 @@ def _neighbours(
         return Reprojected(both, tile_weights(both), fall)
 
     groups: tuple[list[Aligned | Reprojected], list[Aligned | Reprojected]] = ([], [])
-    for found in in_threads(neighbour, others, threads):
-        groups[found.other.number not in near].append(found)
+    for neighbour in in_threads(prepare, others, threads):
+        groups[neighbour.other.number not in near].append(neighbour)
     return groups
 
 
 def _check(target: Stored, other: Stored) -> None:
-    kinds = [(x.picture.shape[1], x.parts.keys()) for x in (target, other)]
+    kinds = [(frame.picture.shape[1], frame.parts.keys()) for frame in (target, other)]
     if kinds[0] != kinds[1]:
         raise PictureError(
             f"frame {other.number} and frame {target.number} hold different passes:"
@@ -143,13 +182,13 @@ def _check(target: Stored, other: Stored) -> None:
 
 def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
     """Return the numbers of the frames just before and after, and the frame's own."""
-    before = [x.number for x in others if x.number < target.number]
-    after = [x.number for x in others if x.number > target.number]
+    before = [frame.number for frame in others if frame.number < target.number]
+    after = [frame.number for frame in others if frame.number > target.number]
     return {target.number, *sorted(before)[-1:], *sorted(after)[:1]}
 
 
 def sample_counts(frame: Stored) -> Array:
-    """Return the sample counts of a frame's pixels (H W), invalid ones as well."""
+    """Return the sample counts of a frame's pixels (H W,), invalid ones included."""
     if frame.counts is None:
         return np.full(len(frame.picture), frame.samples, np.float32)
     return floats(frame.counts)
@@ -180,9 +219,21 @@ def _unpacked(
 
 
 def same_shot(target: Stored, others: Sequence[Stored]) -> list[Stored]:
-    """Return those of `others`, in their order, with no cut between them and `target`.
+    """Return the frames that no shot cut separates from the target.
 
-    The views of one moment, as of a stereo pair, belong to the same shot.
+    Views of one moment, such as a stereo pair, belong to the same shot.
+
+    Parameters
+    ----------
+    target : Stored
+        The frame that the others are compared with.
+    others : sequence of Stored
+        Frames of any numbers.
+
+    Returns
+    -------
+    frames : list of Stored
+        Those of `others` in the target's shot, in their order.
     """
     cameras = {frame.number: frame.camera for frame in (*others, target)}
     numbers = {target.number}

@@ -52,10 +52,16 @@ SKY_DEPTH = 1e9
 
 @dataclass(frozen=True)
 class Sphere:
-    """The part of the sphere of directions that a panorama's frame covers, in radians.
+    """The part of the sphere of directions that a panorama's frame covers.
 
-    Longitude grows to the right and is 0 straight ahead (-Z), latitude grows upwards.
-    Cycles: the camera's `longitude_min` and so on.
+    Cycles' camera calls these angles `longitude_min` and so on.
+
+    Attributes
+    ----------
+    longitude : tuple of float
+        Left and right edge in radians; 0 is straight ahead (-Z), growing to the right.
+    latitude : tuple of float
+        Lower and upper edge in radians, growing upwards.
     """
 
     longitude: tuple[float, float] = (-np.pi, np.pi)
@@ -66,13 +72,25 @@ class Sphere:
 class Camera:
     """A camera and the part of its frame that arrays hold.
 
-    Perspective, orthographic, or with a `sphere` an equirectangular panorama, whose
-    `project` is not used; other panoramas cannot be reprojected. `view` (4, 4) is the
-    transform from world to camera space, `project` (4, 4) the one from there to OpenGL
-    clip space (in Blender: `Object.calc_matrix_camera`). `size` is (width, height) of
-    the whole frame in pixels, `window` the (x, y) of the arrays' top-left pixel in it:
-    (0, 0) where no border crops the frame. No samples are reused between cameras of
-    different names.
+    It is perspective, orthographic or, with a `sphere`, an equirectangular panorama.
+    Other panoramas cannot be reprojected.
+
+    Attributes
+    ----------
+    view : (4, 4) float64 array
+        Transform from world to camera space.
+    project : (4, 4) float64 array
+        Transform from camera space to OpenGL clip space (`Object.calc_matrix_camera` in
+        Blender). Not used for a panorama.
+    size : tuple of int
+        Width and height of the whole frame in pixels.
+    window : tuple of int
+        (x, y) of the arrays' top-left pixel in the whole frame; (0, 0) where no border
+        crops the frame.
+    name : str
+        No samples are reused between cameras of different names.
+    sphere : Sphere or None
+        What a panorama covers, None for other cameras.
     """
 
     view: Matrix
@@ -85,7 +103,8 @@ class Camera:
     def same(self, other: Camera) -> bool:
         """Whether both see the same scene point in every pixel."""
         kind, others = (
-            (each.size, each.window, each.name, each.sphere) for each in (self, other)
+            (camera.size, camera.window, camera.name, camera.sphere)
+            for camera in (self, other)
         )
         return (
             kind == others
@@ -109,9 +128,19 @@ class Camera:
         return np.asarray(1.0 / np.sqrt(square), np.float32)
 
     def depth(self, position: Array) -> Array:
-        """Return the depth (H, W) of points in world space (H, W, 3).
+        """Return the depth of points in world space.
 
-        Points of exactly 0 are no hits, as in Cycles' Position pass: depth is infinite.
+        Parameters
+        ----------
+        position : (H, W, 3) float32 array
+            World positions. Points of exactly 0 are no hits: so Cycles writes its
+            Position pass.
+
+        Returns
+        -------
+        depth : (H, W) float32 array
+            Distance along the camera's axis, of a panorama along the ray; infinite
+            where nothing is hit.
         """
         origin = np.linalg.inv(self.view)[:3, 3]
         away = position - origin.astype(np.float32)

@@ -3,7 +3,8 @@
 Two things need more pixels than the similarity weight of each pixel looks at. A frame
 beyond a shot cut matches almost nowhere, and must not contribute where its geometry
 matches by coincidence. And light that changes a little over a large part of the
-picture, as a flickering lamp or a fade, is hidden by the noise of a few pixels.
+picture, because a lamp flickers or the scene fades, is hidden by the noise of a few
+pixels.
 """
 
 from __future__ import annotations
@@ -33,27 +34,38 @@ _HARMLESS = 0.01
 
 
 def tile_weights(pair: Pair) -> Array:
-    """Return the weights (rows, columns) of `pair.here`'s tiles, 0 across a cut."""
+    """Return a weight for each tile of a neighbour frame.
+
+    Parameters
+    ----------
+    pair : Pair
+        The frame (`here`) and its neighbour (`there`).
+
+    Returns
+    -------
+    weights : (rows, columns) float32 array
+        From 0 to 1 for each tile of `pair.here`; 0 everywhere across a shot cut.
+    """
     tiles = tile_grid(pair.here.shape)
     if pair.here.is_empty:  # there is nothing to compare
         return np.ones(tiles, np.float32)
     step = spot_stride(pair.here.shape)
-    found = compare_spots(pair, step)
-    if _is_shot_cut(pair, step, found):
+    comparison = compare_spots(pair, step)
+    if _is_shot_cut(pair, step, comparison):
         return np.zeros(tiles, np.float32)
-    return _weights(found.tiles)
+    return _weights(comparison.tiles)
 
 
-def _is_shot_cut(pair: Pair, step: int, found: Compared) -> bool:
+def _is_shot_cut(pair: Pair, step: int, comparison: Compared) -> bool:
     """Whether too few of the pixels that are in both frames match.
 
     The sky is left out if there is anything else: it looks the same in every view.
     """
     moved, followed = _moving(pair, step)
-    if found.surfaces:
-        compared, matching = found.compared_surfaces, found.matching_surfaces
+    if comparison.surfaces:
+        compared, matching = comparison.compared_surfaces, comparison.matching_surfaces
     else:
-        compared, matching = found.compared, found.matching
+        compared, matching = comparison.compared, comparison.matching
     most = compared + moved
     return most == 0 or matching + followed < _LEAST_SHARE * most
 
@@ -80,12 +92,12 @@ def _weights(sums: NDArray[np.float64]) -> Array:
     return weights.astype(np.float32)
 
 
-def _around(x: NDArray[np.float64], reach: int | None) -> NDArray[np.float64]:
+def _around(sums: NDArray[np.float64], reach: int | None) -> NDArray[np.float64]:
     """Return the sums over tiles up to `reach` away; over all of them for None."""
     if reach is None:
-        return np.full(x.shape, x.sum())
-    wide = np.pad(x, reach)
-    height, width = x.shape
+        return np.full(sums.shape, sums.sum())
+    wide = np.pad(sums, reach)
+    height, width = sums.shape
     shifts = range(2 * reach + 1)
     return np.sum(
         [wide[i : i + height, j : j + width] for i in shifts for j in shifts], 0

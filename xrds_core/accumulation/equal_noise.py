@@ -50,8 +50,12 @@ _SEEN: WeakKeyDictionary[Stored, _Spots] = WeakKeyDictionary()
 class IndependentFrames:
     """Leaves out neighbours whose noise a frame, or a nearer neighbour, has as well.
 
-    `say` takes one line about the first such pair of a shot. One instance serves a
-    whole shot, since each pair of frames is looked at once.
+    One instance serves a whole shot, so that each pair of frames is compared once.
+
+    Parameters
+    ----------
+    say : callable
+        Takes one line of text, about the first such pair of the shot.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
@@ -59,22 +63,39 @@ class IndependentFrames:
         self._equal: dict[tuple[int, int], bool] = {}
 
     def of(self, own: Stored, others: Sequence[Stored]) -> list[Stored]:
-        """Return those of `others`, in their order, with noise of their own.
+        """Return the neighbours with noise of their own.
 
         Frames far apart agree less, since they show other things: what each has in
         common with one between them tells that both are of one seed.
+
+        Parameters
+        ----------
+        own : Stored
+            The frame.
+        others : sequence of Stored
+            Its neighbours.
+
+        Returns
+        -------
+        independent : list of Stored
+            Those of `others`, in their order, that have other noise than the frame and
+            than each other.
         """
         kinds: list[list[Stored]] = []
         for frame in (own, *others):
-            same = [x for x in kinds if any(self._are_equal(frame, y) for y in x)]
-            kinds = [x for x in kinds if x not in same]
+            same = [
+                kind
+                for kind in kinds
+                if any(self._are_equal(frame, other) for other in kind)
+            ]
+            kinds = [kind for kind in kinds if kind not in same]
             kinds.append([*(frame for kind in same for frame in kind), frame])
         of_own = next(kind for kind in kinds if own in kind)
         nearest_ones = [kind[0] for kind in kinds if kind is not of_own]
-        return [x for x in others if x in nearest_ones]
+        return [other for other in others if other in nearest_ones]
 
-    def _are_equal(self, one: Stored, two: Stored) -> bool:
-        first, last = sorted((one, two), key=lambda frame: frame.number)
+    def _are_equal(self, own: Stored, other: Stored) -> bool:
+        first, last = sorted((own, other), key=lambda frame: frame.number)
         pair = first.number, last.number
         if pair[0] == pair[1]:  # views of one moment
             return False
@@ -90,27 +111,42 @@ class IndependentFrames:
         return self._equal[pair]
 
 
-def have_equal_noise(one: Stored, two: Stored) -> bool:
-    """Whether two frames have the same noise; False where too little of it is seen."""
-    if one.noise is None or two.noise is None or one.shape != two.shape:
+def have_equal_noise(frame: Stored, other: Stored) -> bool:
+    """Whether two frames have the same noise, pixel by pixel.
+
+    Parameters
+    ----------
+    frame, other : Stored
+        Frames of one shot, the earlier one first.
+
+    Returns
+    -------
+    bool
+        False as well where too few pixels have noise to compare.
+    """
+    if frame.noise is None or other.noise is None or frame.shape != other.shape:
         return False
-    first, second = _spots_of(one), _spots_of(two)
-    spots, own, other = first.pixels, first.residual, second.residual
-    x, y = centres(spots, one.shape[1])
-    transform = reprojection(one.camera, two.camera)
-    there = nearest(
-        *reproject(transform, x, y, one.inverse_depth[spots])[:2], one.shape
+    first, second = _spots_of(frame), _spots_of(other)
+    spots, residual, other_residual = first.pixels, first.residual, second.residual
+    x, y = centres(spots, frame.shape[1])
+    transform = reprojection(frame.camera, other.camera)
+    places = nearest(
+        *reproject(transform, x, y, frame.inverse_depth[spots])[:2], frame.shape
     )
-    noisy = there.seen & (np.minimum(np.abs(own), np.abs(other)) > _NOISE)
+    noisy = places.seen & (
+        np.minimum(np.abs(residual), np.abs(other_residual)) > _NOISE
+    )
     even = noisy & first.is_even
-    moved = there.pixel != spots
+    moved = places.pixel != spots
     if (at := _chosen(even & moved, noisy & moved)) is not None:
-        beside = _residual(two, _inner(there.pixel[at], one.shape))
-        return _agree(own[at], other[at], beside)
+        beside = _residual(other, _inner(places.pixel[at], frame.shape))
+        return _agree(residual[at], other_residual[at], beside)
     if (at := _chosen(even & ~moved)) is None:
         return False
-    is_still = one.camera.same(two.camera)
-    return _differ_little(own[at], other[at], _STILL if is_still else _SLOW)
+    is_still = frame.camera.same(other.camera)
+    return _differ_little(
+        residual[at], other_residual[at], _STILL if is_still else _SLOW
+    )
 
 
 def _spots(shape: tuple[int, int]) -> Pixels:
@@ -169,7 +205,7 @@ def _chosen(*places: Mask) -> Mask | None:
 def _agree(own: Array, other: Array, beside: Array) -> bool:
     """Whether residuals agree at one place of the picture, more than on a surface."""
     same, texture = (
-        float(np.mean(np.sign(own) * np.sign(two))) for two in (other, beside)
+        float(np.mean(np.sign(own) * np.sign(residual))) for residual in (other, beside)
     )
     least = max(_AGREE, 5.0 / len(own) ** 0.5)
     return same > max(least, texture + _BEYOND)

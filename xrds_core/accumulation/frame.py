@@ -44,9 +44,16 @@ _TINY = np.float32(1e-9)
 class Halves:
     """The light of a frame's two half buffers, which tells its noise.
 
-    `radiance` is (2, H, W, 3); the halves are two subsets of one sample sequence, or
-    have two seeds. `shares` are their shares of the samples; `counts` (2, H, W) their
-    samples in each pixel, where they differ.
+    They are two subsets of one sample sequence, or have two seeds.
+
+    Attributes
+    ----------
+    radiance : (2, H, W, 3) float32 array
+        Radiance of both halves.
+    shares : tuple of float
+        Share of the frame's samples that each half has.
+    counts : (2, H, W) float32 array or None
+        Samples of each pixel, where pixels have different numbers of them.
     """
 
     radiance: Array
@@ -67,8 +74,8 @@ class Halves:
         """Return the first half's share of the samples: (H, W), or one number."""
         if self.counts is None:
             return np.asarray(self.shares[0], np.float32)
-        one, two = self.counts
-        return np.where(one > 0.0, one / np.maximum(one + two, _TINY), 0.0)
+        first, second = self.counts
+        return np.where(first > 0.0, first / np.maximum(first + second, _TINY), 0.0)
 
 
 _SEED = 7
@@ -77,7 +84,24 @@ _SEED = 7
 def pack(
     radiance: Array | None, albedo: Array, normal: Array, alpha: Array | None
 ) -> tuple[NDArray[np.float16], Mask]:
-    """Return `Stored.picture` of passes as in `Frame`, and its invalid pixels (H W)."""
+    """Pack the passes of a frame in half floats, channel beside channel.
+
+    Parameters
+    ----------
+    radiance : (H, W, 3) float32 array or None
+        Scene-linear radiance; None for a frame of guides alone.
+    albedo, normal : (H, W, 3) float32 array
+        Guides.
+    alpha : (H, W) float32 array or None
+        Alpha, if there is one.
+
+    Returns
+    -------
+    picture : (H W, 6 to 10) float16 array
+        Radiance, albedo, normal and alpha; values beyond +-65504 are clipped.
+    invalid : (H W,) bool array
+        Pixels that held NaN or infinities and are 0 now.
+    """
     packing = _Packing((radiance, albedo, normal, alpha))
     packing.run()
     return packing.picture, packing.invalid
@@ -86,9 +110,26 @@ def pack(
 def pack_with_noise(
     passes: Packed, samples: float, halves: Halves | None
 ) -> tuple[NDArray[np.float16], Mask, Noise]:
-    """Return the same of a frame with radiance, and its noise, 0 at invalid pixels.
+    """Pack the passes of a frame with radiance, and estimate its noise.
 
-    The noise is that of its `halves`, where there are any.
+    Parameters
+    ----------
+    passes : tuple of arrays
+        Radiance, albedo and normal (H, W, 3), and alpha (H, W) or None.
+    samples : float
+        Mean samples per pixel.
+    halves : Halves or None
+        Half buffers that noise is estimated from; without them it is estimated from the
+        surrounding pixels.
+
+    Returns
+    -------
+    picture : (H W, 9 or 10) float16 array
+        Radiance, albedo, normal and alpha; values beyond +-65504 are clipped.
+    invalid : (H W,) bool array
+        Pixels that held NaN or infinities and are 0 now.
+    noise : Noise
+        Its noise, 0 at invalid pixels.
     """
     packing = _Packing(passes)
     noise = packing.run_with_noise(samples, halves)
@@ -96,7 +137,20 @@ def pack_with_noise(
 
 
 def pack_parts(parts: Mapping[str, Array]) -> dict[str, NDArray[np.float16] | None]:
-    """Return `Stored.parts`; a part is 0 where it is not finite, the picture stays."""
+    """Pack AOVs and light passes in half floats.
+
+    A part is 0 where it is not finite; the pixel stays valid.
+
+    Parameters
+    ----------
+    parts : mapping of str to (H, W, 3) float32 array
+        AOVs and light passes, scene-linear, by name.
+
+    Returns
+    -------
+    packed : dict of str to (H W, 3) float16 array or None
+        None for a part that is dark everywhere.
+    """
     return {name: _packed_part(part) for name, part in parts.items()}
 
 
@@ -106,12 +160,15 @@ def _packed_part(part: Array) -> NDArray[np.float16] | None:
 
 
 def pack_vectors(vector: Array) -> NDArray[np.float16]:
-    """Return (H W, 4); infinite beyond half's range, where vectors are useless."""
+    """Pack motion vectors (H, W, 4) as float16 (H W, 4).
+
+    Vectors beyond the range of half floats are useless anyway and become infinite.
+    """
     return _to_halves(vector, keeps_infinities=True)[0]
 
 
 def pack_counts(counts: Array) -> NDArray[np.float16]:
-    """Flat, in half floats; what is no count becomes 0."""
+    """Pack sample counts (H, W) as float16 (H W,); what is not finite becomes 0."""
     counts = np.nan_to_num(counts.ravel(), posinf=0.0, neginf=0.0)
     return np.clip(counts, 0.0, LARGEST_HALF).astype(np.float16)
 
@@ -197,8 +254,8 @@ def _pass(arrays: Arrays, picture: Array) -> structures.Pass:
     return structures.Pass(first, *strides, picture.shape[2])
 
 
-# Relative to the surface's depth: how far behind it an image lies at least. Less is
-# the slope of a surface, or the edge of something.
+# Relative to the surface's depth: how far behind it a virtual image lies at least. Less
+# is the slope of a surface, or the edge of something.
 _BEHIND = 0.04
 
 
@@ -206,15 +263,29 @@ _BEHIND = 0.04
 class Frame(Passes):
     """One frame as the renderer returns it, and where it was seen from.
 
-    `number` is the frame's number: `vector` points to number - 1 and number + 1, and
-    frames of one number show one moment (the views of a stereo pair). `samples` per
-    pixel, the mean of `counts`, weight the frame against others.
+    Attributes
+    ----------
+    number : int
+        The frame's number: `vector` points to `number` - 1 and `number` + 1. Frames of
+        one number show one moment, such as the views of a stereo pair.
+    camera : Camera
+        The camera, and the part of its frame that the arrays hold.
+    samples : float
+        Mean samples per pixel, by which the frame is weighted against others.
+    still : bool
+        Whether nothing at all moves or changes from frame to frame, not even light:
+        frames of equal cameras then differ in their noise alone.
+    halves : Halves or None
+        Half buffers, from which noise is estimated better than from the surrounding
+        pixels.
+    subset : int or None
+        Number of the frame's part of a sample sequence that frames share: two frames
+        with the same number have the same noise. None for a sequence of its own.
 
-    `still` says that nothing at all moves or changes from frame to frame, not even
-    light: frames of equal cameras differ in their noise alone. `halves` are the half
-    buffers, from which noise is estimated better than from the surrounding pixels.
-    `subset` is the number of the part that the frame has of a sequence that frames
-    share: two with the same have the same noise. None of a sequence of its own.
+    Raises
+    ------
+    PictureError
+        If an array has another size than `normal`, or `samples` is not above 0.
     """
 
     number: int
@@ -244,15 +315,37 @@ class Frame(Passes):
 class Stored:
     """A frame as the window stores it: flat, packed, and free of NaN.
 
-    `picture` (H W, 6 to 10) holds radiance (not in a frame of guides alone), albedo,
-    normal and alpha (if any), in half floats to save memory. `inverse_depth` (H W) is
-    1 / depth, 0 without a hit; the depth itself for an orthographic camera; NaN where
-    unknown. `invalid` (H W) is the validity mask, negated: pixels that held NaN or
-    infinities and are 0 now; None if there were none. `counts` (H W): samples of each
-    pixel where they differ. `noise` is None in a frame of guides
-    alone. `image` (H W) is as `inverse_depth`, of the image that a mirror or glass
-    shows, NaN where there is none; None if there is none anywhere. `parts` (H W, 3), by
-    name, are light that the radiance is made of; None for one that is dark everywhere.
+    Attributes
+    ----------
+    number : int
+        The frame's number.
+    camera : Camera
+        The camera, and the part of its frame that the arrays hold.
+    shape : tuple of int
+        Height and width.
+    samples : float
+        Mean samples per pixel.
+    picture : (H W, 6 to 10) float16 array
+        Radiance (not in a frame of guides alone), albedo, normal and alpha (if any).
+    inverse_depth : (H W,) float32 array
+        1 / depth, 0 without a hit; the depth itself for an orthographic camera. NaN
+        where unknown.
+    invalid : (H W,) bool array or None
+        Pixels that held NaN or infinities and are 0 now; None if there were none.
+    vector : (H W, 4) float16 array or None
+        Cycles' Vector pass.
+    still : bool
+        Whether nothing at all moves or changes from frame to frame.
+    counts : (H W,) float16 array or None
+        Samples of each pixel, where they differ.
+    noise : Noise or None
+        Estimated noise; None for a frame of guides alone.
+    image : (H W,) float32 array or None
+        Inverse depth of the virtual image that a mirror or glass shows (for an
+        orthographic camera its depth), NaN where there is none; None if there is none
+        anywhere.
+    parts : mapping of str to (H W, 3) float16 array or None
+        AOVs and light passes, by name; None for one that is dark everywhere.
     """
 
     number: int
@@ -289,7 +382,7 @@ class Stored:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no pixel has a sample, as in a reprojected placeholder."""
+        """Whether no pixel has a sample, which is so for a reprojected placeholder."""
         return self.invalid is not None and bool(self.invalid.all())
 
     def shows_same(self, other: Stored) -> bool:
@@ -301,9 +394,21 @@ class Stored:
 def pack_frame(
     frame: Frame,
 ) -> tuple[NDArray[np.float16], NDArray[np.bool_], Noise | None]:
-    """Return `Stored.picture`, its invalid pixels, and the noise, 0 at these.
+    """Pack a frame, and estimate its noise if it has radiance.
 
-    There is none of guides alone.
+    Parameters
+    ----------
+    frame : Frame
+        A frame as rendered.
+
+    Returns
+    -------
+    picture : (H W, 6 to 10) float16 array
+        Radiance, albedo, normal and alpha, as far as the frame has them.
+    invalid : (H W,) bool array
+        Pixels that held NaN or infinities and are 0 now.
+    noise : Noise or None
+        Its noise, 0 at invalid pixels; None for a frame of guides alone.
     """
     passes = frame.radiance, frame.albedo, frame.normal, frame.alpha
     if frame.radiance is None:
@@ -315,6 +420,16 @@ def store(frame: Frame) -> Stored:
     """Pack a frame; pixels with NaN or infinities in any pass are invalid.
 
     Values beyond +-65504, the largest half float, are clipped.
+
+    Parameters
+    ----------
+    frame : Frame
+        A frame as rendered.
+
+    Returns
+    -------
+    stored : Stored
+        The same frame, flat and in half floats.
     """
     picture, invalid, noise = pack_frame(frame)
     return Stored(

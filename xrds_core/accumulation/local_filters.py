@@ -16,29 +16,48 @@ if TYPE_CHECKING:
     from ..arrays import Array
 
 
-def extreme(x: NDArray[Any], smaller: np.ufunc, step: int = 1) -> NDArray[Any]:
-    """Return the least (`np.fmin`) or largest (`np.fmax`) value of 3x3 pixels.
+def extreme(plane: NDArray[Any], smaller: np.ufunc, step: int = 1) -> NDArray[Any]:
+    """Return the least or largest value of the 3x3 pixels around each pixel.
 
-    NaN is ignored. On masks `np.logical_or` is a dilation. The pixels lie `step` apart,
-    the middle one at the pixel itself.
+    Parameters
+    ----------
+    plane : (H, W) array
+        Values; NaN is ignored.
+    smaller : ufunc
+        `np.fmin` or `np.fmax`; on masks `np.logical_or`, which makes a dilation.
+    step : int
+        Distance between the 3x3 pixels; the middle one lies at the pixel itself.
+
+    Returns
+    -------
+    (H, W) array
     """
-    wide = np.pad(x, step, "edge")
+    wide = np.pad(plane, step, "edge")
     end = slice(2 * step, None)
     rows = smaller(smaller(wide[: -2 * step], wide[step:-step]), wide[end])
     columns = smaller(rows[:, : -2 * step], rows[:, step:-step])
     return np.asarray(smaller(columns, rows[:, end]))
 
 
-def box(x: Array, size: int) -> Array:
-    """Return the mean over `size` x `size` pixels, as far as they are in the picture.
+def box(plane: Array, size: int) -> Array:
+    """Return the mean over a square around each pixel, within the picture.
 
-    `size` is odd. (H, W) -> (H, W).
+    Parameters
+    ----------
+    plane : (H, W) float32 array
+        Values.
+    size : int
+        Pixels along a side; odd.
+
+    Returns
+    -------
+    means : (H, W) float32 array
     """
-    wide = np.pad(x, size // 2)
-    rows = _sums(wide, x.shape[0], size)
-    sums = _sums(rows.T, x.shape[1], size).T
-    sums *= _shares(x.shape[0], size)[:, None]
-    sums *= _shares(x.shape[1], size)
+    wide = np.pad(plane, size // 2)
+    rows = _sums(wide, plane.shape[0], size)
+    sums = _sums(rows.T, plane.shape[1], size).T
+    sums *= _shares(plane.shape[0], size)[:, None]
+    sums *= _shares(plane.shape[1], size)
     return np.asarray(sums)
 
 
@@ -49,27 +68,38 @@ def _shares(side: int, size: int) -> Array:
     return (1.0 / (np.minimum(last, side - 1) - first + 1)).astype(np.float32)
 
 
-def _sums(x: Array, count: int, size: int) -> Array:
+def _sums(plane: Array, count: int, size: int) -> Array:
     """Return the sums of `size` consecutive rows, in thirds where possible."""
     if size > 3 and size % 3 == 0:
         third = size // 3
-        part = _sums(x, count + 2 * third, third)
+        part = _sums(plane, count + 2 * third, third)
         return np.asarray(
             part[:count] + part[third : third + count] + part[2 * third :]
         )
-    total = x[:count].copy()
+    total = plane[:count].copy()
     for i in range(1, size):
-        total += x[i : i + count]
+        total += plane[i : i + count]
     return total
 
 
 def find_rims(
     depth: Array, shape: tuple[int, int], nearer_is_less: bool
 ) -> NDArray[np.uint8]:
-    """Return (H W): pixels next to a nearer surface, some of whose light they contain.
+    """Find pixels next to a nearer surface: they contain some of its light.
 
-    0, or 1 + which of the 3x3 pixels around has the nearest surface. `depth` (H W) is
-    inverse depth, NaN where unknown, or depth where `nearer_is_less`.
+    Parameters
+    ----------
+    depth : (H W,) float32 array
+        Inverse depth, NaN where unknown; or depth where `nearer_is_less`.
+    shape : tuple of int
+        Height and width.
+    nearer_is_less : bool
+        Whether a smaller value is nearer.
+
+    Returns
+    -------
+    rims : (H W,) uint8 array
+        0, or 1 + which of the 3x3 pixels around has the nearest surface.
     """
     height, width = shape
     rims = np.empty(height * width, np.uint8)
@@ -84,8 +114,19 @@ def find_rims(
 
 
 def find_ranges(depth: Array, shape: tuple[int, int]) -> tuple[Array, Array]:
-    """Return the least and the largest `depth` (H W) of the 9x9 pixels around each one,
-    with some slack; NaN where nothing is known around.
+    """Find the range of depth in the 9x9 pixels around each pixel, with some slack.
+
+    Parameters
+    ----------
+    depth : (H W,) float32 array
+        Depth or inverse depth, NaN where unknown.
+    shape : tuple of int
+        Height and width.
+
+    Returns
+    -------
+    least, most : (H W,) float32 array
+        The range; NaN where nothing is known around.
     """
     height, width = shape
     least, most = np.empty((2, height * width), np.float32)

@@ -39,10 +39,14 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
 class Noise:
     """Estimates of a frame's noise, flat, in half floats.
 
-    `light` (H W, 2) is brightness and difference: the square root of luminance, the
-    mean of both halves' roots, and half the difference of these roots. They lie side by
-    side since they are gathered together. `guides` (H W) is the standard deviation of
-    the frame's guides.
+    Attributes
+    ----------
+    light : (H W, 2) float16 array
+        Brightness and difference: the mean over both halves of the square root of
+        luminance, and half the difference of these roots. They lie side by side since
+        they are gathered together.
+    guides : (H W,) float16 array
+        Standard deviation of the frame's guides.
     """
 
     light: NDArray[np.float16]
@@ -72,10 +76,20 @@ class Noise:
         return Noise(light, guides)
 
     def within(self, share: Array, others: Array, place: slice = slice(None)) -> Noise:
-        """Return the noise of a mean in which these samples have a `share` (H W).
+        """Return the noise of a mean in which these samples have a share.
 
-        `others` (H W) is the brightness of the rest; NaN where there are none of them.
-        Both are of the pixels of a `place`; elsewhere the noise stays.
+        Parameters
+        ----------
+        share : (n,) float32 array
+            Share of these samples in the mean.
+        others : (n,) float32 array
+            Brightness of the other samples; NaN where there are none.
+        place : slice
+            The pixels that `share` and `others` are of; elsewhere the noise stays.
+
+        Returns
+        -------
+        noise : Noise
         """
         rest = np.nan_to_num(others, posinf=0.0, neginf=0.0)
         light, guides = self.light.copy(), self.guides.copy()
@@ -102,9 +116,16 @@ def luminance(radiance: Array) -> Array:
 
 
 def guides_of(passes: Array) -> Array:
-    """Return albedo, normal and alpha, scaled for comparison.
+    """Scale guides for comparison.
 
-    `passes` (..., 6 or 7) are these; alpha may be missing.
+    Parameters
+    ----------
+    passes : (..., 6 or 7) float32 array
+        Albedo, normal and, if there is one, alpha.
+
+    Returns
+    -------
+    guides : (..., 6 or 7) float32 array
     """
     scale = np.ones(passes.shape[-1], np.float32)
     scale[3:6] = _NORMAL_SHARE**0.5
@@ -119,13 +140,14 @@ def guide_factor(samples: float) -> float:
 
 
 def light_factor(samples: float) -> float:
-    """Return how much more the halves of a frame differ than its pixels from those
-    around, which make up eight ninths of what they are compared with.
+    """Return how much more the halves of a frame differ than its pixels from others.
+
+    The surrounding pixels make up eight ninths of what a pixel is compared with.
     """
     return (9 / 8 * (1.0 + _HALVES_EXCESS / samples)) ** 0.5
 
 
-def _packed(x: Array) -> NDArray[np.float16]:
+def _packed(values: Array) -> NDArray[np.float16]:
     """Return half floats (n,), the largest ones for infinities, 0 for NaN."""
-    finite = np.nan_to_num(x.ravel(), nan=0.0)
+    finite = np.nan_to_num(values.ravel(), nan=0.0)
     return np.clip(finite, -LARGEST_HALF, LARGEST_HALF).astype(np.float16)

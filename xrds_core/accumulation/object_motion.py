@@ -54,21 +54,35 @@ class Movement:
     def object_motions(
         self, here: Stored, others: Sequence[Stored]
     ) -> list[ObjectMotion | None]:
-        """Return for each of `others` where the moving objects of `here` were.
+        """Return where the moving objects of a frame were in its neighbours.
 
-        Frames with the number of `here` show the same moment and need none. Vectors are
-        chained from each frame to the nearest one available.
+        Vectors are chained from each frame to the nearest one available.
+
+        Parameters
+        ----------
+        here : Stored
+            The frame.
+        others : sequence of Stored
+            Its neighbours.
+
+        Returns
+        -------
+        motions : list of ObjectMotion or None
+            One for each of `others`. None for a frame with the number of `here`: it
+            shows the same moment.
         """
-        frames = {x.number: x for x in (*others, here) if x.vector is not None}
+        frames = {
+            frame.number: frame for frame in (*others, here) if frame.vector is not None
+        }
         chains: dict[int, VectorChain] = {}
         if here.vector is not None:
             for step in (-1, 1):
                 chains |= self._chain(here, frames, step)
         return [
             None
-            if x.number == here.number
-            else self._object_motion(here, x, frames, chains)
-            for x in others
+            if other.number == here.number
+            else self._object_motion(here, other, frames, chains)
+            for other in others
         ]
 
     def _object_motion(
@@ -106,37 +120,49 @@ class Movement:
         steps = there.number - here.number
         start = nearest(x, y, here.shape)
         flow_x, flow_y = _flow(here, start.pixel, steps)
-        found = nearest(x + flow_x, y + flow_y, there.shape)
-        back_x, back_y = _flow(there, found.pixel, -steps)
+        end = nearest(x + flow_x, y + flow_y, there.shape)
+        back_x, back_y = _flow(there, end.pixel, -steps)
         with np.errstate(invalid="ignore"):  # infinite motion is never consistent
             left = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2
-        was, near = here.inverse_depth[start.pixel], there.inverse_depth[found.pixel]
+        was, near = here.inverse_depth[start.pixel], there.inverse_depth[end.pixel]
         consistent = (left < MOVING_TOLERANCE**2) & (np.abs(near - was) < _NEARER * was)
-        consistent &= self.moving(there, frames)[found.pixel] & found.seen & start.seen
+        consistent &= self.moving(there, frames)[end.pixel] & end.seen & start.seen
         return known(x + flow_x, y + flow_y, consistent)
 
     def moving(self, frame: Stored, frames: Mapping[int, Stored]) -> Mask:
-        """Return (H W): where the Vector pass is not explained by camera motion alone.
+        """Find the pixels whose motion vectors camera motion alone does not explain.
 
-        That is the motion to the next camera, or to the previous one where `frames`
-        end; never anything found earlier, so that parts of a shot give the same result
-        as the whole. Without an adjacent camera everything is assumed to move.
+        The camera's motion is that to the next frame, or to the previous one where
+        `frames` end. What other calls have found plays no part, so that a part of a
+        shot gives the same result as the whole. Without an adjacent frame everything is
+        assumed to move.
+
+        Parameters
+        ----------
+        frame : Stored
+            The frame to look at.
+        frames : mapping of int to Stored
+            Frames of the shot with Vector passes, by number.
+
+        Returns
+        -------
+        moving : (H W,) bool array
         """
-        known = self._moving.setdefault(frame, {})
+        masks = self._moving.setdefault(frame, {})
         for step in (1, -1):
             beside = _beside(frame, frames, step)
             if beside is not None and frame.vector is not None:
                 steps = beside.number - frame.number
-                if steps not in known:
-                    known[steps] = _unexplained(frame, beside.camera, steps)
-                return known[steps]
+                if steps not in masks:
+                    masks[steps] = _unexplained(frame, beside.camera, steps)
+                return masks[steps]
         return np.full(frame.inverse_depth.shape, frame.vector is not None)
 
 
 def _beside(frame: Stored, frames: Mapping[int, Stored], step: int) -> Stored | None:
     """Return the nearest of `frames` after a frame, or before it (`step` -1)."""
-    there = [n for n in frames if (n - frame.number) * step > 0]
-    return frames[min(there, key=lambda n: n * step)] if there else None
+    numbers = [n for n in frames if (n - frame.number) * step > 0]
+    return frames[min(numbers, key=lambda n: n * step)] if numbers else None
 
 
 def _unexplained(frame: Stored, beside: Camera, steps: int) -> Mask:

@@ -34,7 +34,12 @@ if TYPE_CHECKING:
 class PanoramaReprojection:
     """The reprojection of pixels from one panorama to another.
 
-    `turn` (4, 4) is the transform from the camera space of `here` to that of `there`.
+    Attributes
+    ----------
+    here, there : Camera
+        The panorama of the pixels, and the one that they are reprojected to.
+    turn : (4, 4) float64 array
+        Transform from the camera space of `here` to that of `there`.
     """
 
     here: Camera
@@ -44,7 +49,20 @@ class PanoramaReprojection:
     def reproject(
         self, x: Array, y: Array, inverse_depth: Array
     ) -> tuple[Array, Array, Array]:
-        """Return (x, y, inverse depth) there of pixels (n,) here."""
+        """Reproject pixels from one panorama to the other.
+
+        Parameters
+        ----------
+        x, y : (n,) float32 array
+            Positions here, in pixels.
+        inverse_depth : (n,) float32 array
+            Inverse depth here.
+
+        Returns
+        -------
+        x, y, inverse_depth : (n,) float32 array
+            The same there.
+        """
         ray = _directions(self.here, x, y)
         turn = self.turn.astype(np.float32)
         seen = turn[:3, :3] @ ray + turn[:3, 3:] * inverse_depth
@@ -54,8 +72,19 @@ class PanoramaReprojection:
             return across, down, inverse_depth / length
 
     def directions(self, shape: tuple[int, int]) -> tuple[Array, Array]:
-        """Return sine and cosine of the longitude of each column (W, 2) of `here`, and
-        of the latitude of each row (H, 2).
+        """Return the directions that the columns and rows of a picture show.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Height and width of a picture of `here`.
+
+        Returns
+        -------
+        columns : (W, 2) float32 array
+            Sine and cosine of the longitude of each column.
+        rows : (H, 2) float32 array
+            Sine and cosine of the latitude of each row.
         """
         half = np.float32(0.5)
         x, y = (np.arange(n, dtype=np.float32) + half for n in shape[::-1])
@@ -143,9 +172,14 @@ class Grid:
 
 @dataclass(frozen=True)
 class Places:
-    """The pixels of another frame that positions fall into, in their order (n,).
+    """The pixels of another frame that positions fall into, in their order.
 
-    `pixel`: flat index, 0 where not `seen`, outside of the frame.
+    Attributes
+    ----------
+    pixel : (n,) int32 array
+        Flat index; 0 where not `seen`.
+    seen : (n,) bool array
+        False for positions outside the frame.
     """
 
     pixel: NDArray[np.int32]
@@ -156,10 +190,17 @@ class Places:
 class ObjectMotion:
     """Where the moving objects of one frame were in another one.
 
-    `pixels`: flat, ascending, those of this frame that show moving objects; `x` and
-    `y`: where they were in the other frame, NaN where forward and backward motion are
-    inconsistent. All (m,). `moving` (H W): which pixels of the other frame show moving
-    objects. In a `Pair` their edges are among both.
+    In a `Pair` the edges of moving objects are included.
+
+    Attributes
+    ----------
+    pixels : (m,) int array
+        Flat, ascending: the pixels of this frame that show moving objects.
+    x, y : (m,) float32 array
+        Where they were in the other frame, in pixels; NaN where forward and backward
+        motion are inconsistent.
+    moving : (H W,) bool array
+        The pixels of the other frame that show moving objects.
     """
 
     pixels: NDArray[np.intp]
@@ -175,7 +216,21 @@ class ObjectMotion:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two frames, and the reprojection of pixels from one to the other and back."""
+    """Two frames, and the reprojection of pixels from one to the other and back.
+
+    Attributes
+    ----------
+    here : Stored
+        The frame that samples are gathered for.
+    there : Stored
+        Its neighbour.
+    forth, back : (4, 4) float32 array or PanoramaReprojection
+        Reprojection from `here` to `there`, and from `there` to `here`.
+    extent : tuple of (H W,) float32 arrays
+        Least and largest inverse depth around each pixel of `here`, from `find_ranges`.
+    object_motion : ObjectMotion or None
+        None where nothing but the camera moves.
+    """
 
     here: Stored
     there: Stored
@@ -252,7 +307,11 @@ def world_of(camera: Camera) -> Matrix:
 
 
 def pixels_of(camera: Camera) -> Matrix:
-    """Return (4, 4): world point -> (x w, y w, w, inverse depth w), as `world_of`."""
+    """Return (4, 4): world point -> (x w, y w, w, inverse depth w).
+
+    x and y are pixels of arrays. For an orthographic camera the depth takes the place
+    of its inverse.
+    """
     (width, height), (left, top) = camera.size, camera.window
     screen = np.array(
         [
@@ -268,8 +327,16 @@ def pixels_of(camera: Camera) -> Matrix:
 def reprojection(here: Camera, there: Camera) -> Reprojection:
     """Return the reprojection of pixels from one camera to another.
 
-    (4, 4): (x, y, 1, inverse depth) here -> (x w, y w, w, inverse depth w) there; of
-    panoramas `PanoramaReprojection`.
+    Parameters
+    ----------
+    here, there : Camera
+        The camera of the pixels, and the one that they are reprojected to.
+
+    Returns
+    -------
+    transform : (4, 4) float32 array or PanoramaReprojection
+        The matrix takes (x, y, 1, inverse depth) here to (x w, y w, w, inverse depth w)
+        there. Between panoramas the reprojection is not linear.
     """
     if here.sphere is not None and there.sphere is not None:
         return panorama_reprojection(here, there)
@@ -282,9 +349,22 @@ def pair(
     object_motion: ObjectMotion | None = None,
     extent: tuple[Array, Array] | None = None,
 ) -> Pair:
-    """Return what `places` needs to know of two frames.
+    """Describe a frame and its neighbour for reprojection.
 
-    `extent` is `find_ranges` of `here`, for callers with many pairs.
+    Parameters
+    ----------
+    here : Stored
+        The frame that samples are gathered for.
+    there : Stored
+        Its neighbour.
+    object_motion : ObjectMotion, optional
+        Where moving objects of `here` were in `there`.
+    extent : tuple of (H W,) float32 arrays, optional
+        `find_ranges` of `here`, for callers with many pairs. Computed by default.
+
+    Returns
+    -------
+    pair : Pair
     """
     forth = reprojection(here.camera, there.camera)
     back = reprojection(there.camera, here.camera)
@@ -348,7 +428,7 @@ def spot_stride(shape: tuple[int, int]) -> int:
 
 
 def spread(pixels: NDArray[np.integer], most: int) -> NDArray[np.integer]:
-    """Return at most so many of some pixels (n,), evenly."""
+    """Return at most `most` of some pixels (n,), evenly spread."""
     # an odd step has no common factor with the width of many pictures
     return pixels[:: (-(-len(pixels) // most) | 1)]
 
@@ -366,7 +446,22 @@ def grid(shape: tuple[int, int], first: int = 0, last: int | None = None) -> Gri
 def reproject(
     reprojection: Reprojection, x: Array, y: Array, inverse_depth: Array
 ) -> tuple[Array, Array, Array]:
-    """Return (x, y, inverse depth) there of pixels (n,) here; NaN behind the camera."""
+    """Reproject pixels from one frame to another.
+
+    Parameters
+    ----------
+    reprojection : (4, 4) float32 array or PanoramaReprojection
+        From `reprojection`.
+    x, y : (n,) float32 array
+        Positions here, in pixels.
+    inverse_depth : (n,) float32 array
+        Inverse depth here; the depth for an orthographic camera.
+
+    Returns
+    -------
+    x, y, inverse_depth : (n,) float32 array
+        The same there; NaN behind the camera.
+    """
     if isinstance(reprojection, PanoramaReprojection):
         return reprojection.reproject(x, y, inverse_depth)
     across, down, w, near = (
@@ -401,21 +496,36 @@ def known(x: Array, y: Array, mask: NDArray[np.bool_]) -> tuple[Array, Array]:
 def reprojected_placeholder(
     number: int, camera: Camera, beside: Sequence[Stored]
 ) -> Stored:
-    """Return a frame without samples, of the size and passes of the frames `beside` it.
+    """Return a frame without samples that shows the geometry of the frames beside it.
 
-    Its `inverse_depth` is NaN where none of them shows what it shows. Of orthographic
-    cameras that is the depth, so the smallest value is the nearest.
+    Of an orthographic camera the depth takes the place of its inverse, so the smallest
+    value is the nearest.
+
+    Parameters
+    ----------
+    number : int
+        Frame number of the placeholder.
+    camera : Camera
+        Its camera.
+    beside : sequence of Stored
+        Frames beside it, whose size and passes it gets.
+
+    Returns
+    -------
+    placeholder : Stored
+        All pixels are invalid. `inverse_depth` is reprojected from `beside`, NaN where
+        none of these frames shows what it shows.
     """
     first = beside[0]
     nearer = np.minimum if camera.orthographic else np.maximum
     near = np.full(first.inverse_depth.shape, np.inf if camera.orthographic else -1.0)
-    for each in beside:
-        own = grid(each.shape)
-        transform = reprojection(each.camera, camera)
-        x, y, reprojected = reproject(transform, own.x, own.y, each.inverse_depth)
-        found = nearest(x, y, first.shape)
-        lies = found.seen & np.isfinite(reprojected)
-        nearer.at(near, found.pixel[lies], reprojected[lies])
+    for frame in beside:
+        own = grid(frame.shape)
+        transform = reprojection(frame.camera, camera)
+        x, y, reprojected = reproject(transform, own.x, own.y, frame.inverse_depth)
+        places = nearest(x, y, first.shape)
+        is_seen = places.seen & np.isfinite(reprojected)
+        nearer.at(near, places.pixel[is_seen], reprojected[is_seen])
     near[~np.isfinite(near) | (near < 0.0)] = np.nan
     # pixels stretch where the camera comes nearer: adjacent pixels fill the gaps
     around = extreme(near.reshape(first.shape).astype(np.float32), np.fmax).ravel()

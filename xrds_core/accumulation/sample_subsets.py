@@ -18,12 +18,22 @@ _APART = 32_452_843  # of seeds: a prime that nothing else sets seeds apart by
 
 @dataclass(frozen=True)
 class SampleSubset:
-    """A frame's subset of a sample sequence, as Cycles' *Sample Subset*.
+    """A frame's part of a sample sequence: Cycles' *Sample Subset*.
 
-    In Cycles: `seed`; `whole` is `samples`, `offset` is `sample_offset` and `length`
-    is `sample_subset_length`, with `use_sample_subset` on unless the subset is the
-    whole sequence. Passes made of sample 0 alone (Depth, Position, indices) are empty
-    where `offset` is not 0; `Denoising Depth` is not.
+    Cycles leaves passes made of sample 0 alone (Depth, Position, indices) empty where
+    `offset` is not 0; `Denoising Depth` is filled. `use_sample_subset` is on unless the
+    subset is the whole sequence.
+
+    Attributes
+    ----------
+    seed : int
+        Cycles' `seed`.
+    whole : int
+        Length of the sequence: Cycles' `samples`.
+    offset : int
+        First sample of the subset: Cycles' `sample_offset`.
+    length : int
+        Number of samples of the subset: Cycles' `sample_subset_length`.
     """
 
     seed: int
@@ -55,11 +65,26 @@ class SampleSubset:
 def consecutive_subset(
     place: int, samples: int, radius: int, seed: int = 0, most: int = 0
 ) -> SampleSubset:
-    """Return the subset of a frame under a still camera.
+    """Return the sample subset of a frame under a still camera.
 
-    No other frame within `radius` has it, if all take as many samples. `place` is the
-    frame's index in the shot; `most` are the samples that a frame may take, `samples`
-    by default.
+    No other frame within `radius` has the same subset, if all take as many samples.
+
+    Parameters
+    ----------
+    place : int
+        The frame's index in the shot.
+    samples : int
+        Samples per pixel of this frame.
+    radius : int
+        Temporal radius, in frames.
+    seed : int
+        Seed of the sequence that the frames share.
+    most : int
+        Most samples that a frame of the shot may take, `samples` by default.
+
+    Returns
+    -------
+    subset : SampleSubset
     """
     frames = 2 * radius + 1
     whole = max(samples, most) * frames
@@ -67,10 +92,25 @@ def consecutive_subset(
 
 
 def running_subset(begin: int, samples: int, most: int, seed: int = 0) -> SampleSubset:
-    """Return the samples of a long sequence from `begin` on, the number taken so far.
+    """Return the next samples of a long sequence.
 
-    Frames that count samples on have none in common, however many each takes, up to
-    `most`; after as many as `_LONG` such frames take the sequence begins anew.
+    Frames that count samples on have none in common, however many each of them takes.
+    The sequence begins anew after as many samples as `_LONG` frames of `most` take.
+
+    Parameters
+    ----------
+    begin : int
+        How many samples earlier frames have taken.
+    samples : int
+        Samples per pixel of this frame.
+    most : int
+        Most samples that a frame of the shot may take.
+    seed : int
+        Seed of the sequence that the frames share.
+
+    Returns
+    -------
+    subset : SampleSubset
     """
     return SampleSubset(
         seed % _SEEDS, most * (_LONG + 1), begin % (most * _LONG), samples

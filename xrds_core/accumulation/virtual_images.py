@@ -1,10 +1,15 @@
 """Virtual images: where what mirrors and glass show was in other frames.
 
-A plane mirror shows things at the depth of their image behind it, a pane what is beyond
-it; a curved mirror shows them somewhere between its surface and the length of the path.
-And an image may move by itself: in curved mirrors and thick glass, or with what it
-shows. Each candidate is reprojected into all neighbours, and the one whose guides match
-best is taken (a plane sweep, Collins 1996), for a lattice of spots.
+A plane mirror shows things at the depth of their virtual image behind it, a pane what
+is beyond it; a curved mirror shows them somewhere between its surface and the length of
+the path. And a virtual image may move by itself: in curved mirrors and thick glass, or
+with what it shows. For a lattice of spots each candidate is reprojected into all
+neighbours, and the one whose guides match best is taken: a plane sweep.
+
+References
+----------
+.. [1] Collins, R. T. (1996). A space-sweep approach to true multi-image matching.
+   IEEE Conference on Computer Vision and Pattern Recognition.
 """
 
 from __future__ import annotations
@@ -30,17 +35,17 @@ if TYPE_CHECKING:
     from .frame import Stored
     from .reprojection import Pair
 
-    Each = Callable[[Callable[[Pair], Array], Sequence[Pair]], Iterable[Array]]
+    Apply = Callable[[Callable[[Pair], Array], Sequence[Pair]], Iterable[Array]]
 
 
 # Depths, from the surface (0) to the length of the path (1), which is a little too
 # short or too long, as its parts are weighted by what the mirror reflects.
 _SHARES = (0.06, 0.12, 0.25, 0.5, 0.75, 0.9, 1.0, 1.1)
-# Pixels per frame of an image's own motion, from coarse to fine.
+# Pixels per frame of a virtual image's own motion, from coarse to fine.
 _STEPS = (1.0, 0.5, 0.25)
 _AREA = 5  # spots across, over which guides are compared
-# An image is believed where it matches better than the surface by this factor, and by
-# so many standard errors of the difference, over the spots: one on the path, and one
+# A virtual image is used where it matches better than the surface by this factor, and
+# by so many standard errors of the difference, over the spots: one on the path, and one
 # that moves by itself, of which there are so many that one always matches by chance.
 _BETTER, _SURE, _SURE_IF_MOVED = 0.85, 2.0, 3.0
 _SEEN = 0.5  # of a candidate's spots, in neighbours
@@ -49,11 +54,18 @@ _TINY = np.float32(1e-9)
 
 @dataclass(frozen=True)
 class Images:
-    """The images that the pixels of a frame show.
+    """The virtual images that the pixels of a frame show.
 
-    `lattice` (h, w, 3) holds for every `stride` pixels where the image is, from the
-    surface (0) to the end of the path (1), NaN for a surface, and its own motion, x and
-    y in pixels per frame.
+    Attributes
+    ----------
+    frame : Stored
+        The frame.
+    stride : int
+        Distance between the spots of the lattice, in pixels.
+    lattice : (h, w, 3) float32 array
+        For each spot where the virtual image lies, from the surface (0) to the end of
+        the path (1), NaN for a surface; then its own motion, x and y in pixels per
+        frame.
     """
 
     frame: Stored
@@ -62,19 +74,30 @@ class Images:
 
     @cached_property
     def _shown(self) -> tuple[Grid, Array, Array]:
-        """The pixels that show an image, its inverse depth (n,) and motion (n, 2)."""
+        """Pixels with a virtual image, its inverse depth (n,) and motion (n, 2)."""
         assert self.frame.image is not None
         pixels = np.flatnonzero(~np.isnan(self.frame.image))
         row, column = np.divmod(pixels, self.frame.shape[1])
-        found = self.lattice[row // self.stride, column // self.stride]
-        shows = ~np.isnan(found[:, 0])
-        pixels, found = pixels[shows], found[shows]
+        images = self.lattice[row // self.stride, column // self.stride]
+        shows = ~np.isnan(images[:, 0])
+        pixels, images = pixels[shows], images[shows]
         spots = Grid(pixels, *centres(pixels, self.frame.shape[1]))
-        return spots, _depth_of(self.frame, spots, found[:, 0]), found[:, 1:]
+        return spots, _depth_of(self.frame, spots, images[:, 0]), images[:, 1:]
 
     def positions(self, pair: Pair) -> tuple[NDArray[np.intp], Array, Array]:
-        """Return pixels (n,), flat and ascending, and where their images were in the
-        other frame: x and y (n,).
+        """Return where the virtual images were in another frame.
+
+        Parameters
+        ----------
+        pair : Pair
+            The frame and the other one.
+
+        Returns
+        -------
+        pixels : (n,) int array
+            Pixels that show a virtual image, flat and ascending.
+        x, y : (n,) float32 array
+            Where it was in the other frame, in pixels.
         """
         spots, depth, motion = self._shown
         assert not isinstance(spots.pixels, slice)
@@ -82,22 +105,33 @@ class Images:
 
 
 def reach(shape: tuple[int, int]) -> int:
-    """Return the pixels on each side of a pixel that influence its image."""
+    """Return the pixels on each side of a pixel that influence its virtual image."""
     return spot_stride(shape) * (_AREA // 2 + 2)
 
 
 def find_images(
-    target: Stored, pairs: Sequence[Pair], each: Each = map
+    target: Stored, pairs: Sequence[Pair], apply: Apply = map
 ) -> Images | None:
-    """Return the images that `target` shows; None where it shows none.
+    """Find the virtual images that a frame shows.
 
-    `pairs` are of the target and each neighbour; `each` is `map`, or one that runs in
-    threads.
+    Parameters
+    ----------
+    target : Stored
+        The frame.
+    pairs : sequence of Pair
+        The frame and each of its neighbours.
+    apply : callable
+        `map`, or a function like it that runs in threads.
+
+    Returns
+    -------
+    images : Images or None
+        None where the frame shows no virtual image.
     """
     if target.image is None or not pairs:
         return None
     stride = spot_stride(target.shape)
-    lattice = _Sweep(target, pairs, stride, each).images()
+    lattice = _Sweep(target, pairs, stride, apply).images()
     return None if np.isnan(lattice[..., 0]).all() else Images(target, stride, lattice)
 
 
@@ -105,10 +139,10 @@ class _Sweep:
     """Tries candidates at the spots of a lattice, and keeps the best of each."""
 
     def __init__(
-        self, target: Stored, pairs: Sequence[Pair], stride: int, each: Each
+        self, target: Stored, pairs: Sequence[Pair], stride: int, apply: Apply
     ) -> None:
         assert target.image is not None
-        self._target, self._pairs, self._each = target, pairs, each
+        self._target, self._pairs, self._each = target, pairs, apply
         height, width = target.shape
         half = stride // 2
         self._shape = -(-height // stride), -(-width // stride)
@@ -139,8 +173,8 @@ class _Sweep:
                 if x or y:
                     self._try(images, centre, (0.0, x, y), _SURE_IF_MOVED)
         lattice = np.full((self._shape[0] * self._shape[1], 3), np.nan, np.float32)
-        found = images.cost < limit
-        lattice[self._at[found]] = images.candidates[found]
+        is_better = images.cost < limit
+        lattice[self._at[is_better]] = images.candidates[is_better]
         return _filled(lattice.reshape(*self._shape, 3))
 
     def _try(
@@ -166,12 +200,12 @@ class _Sweep:
         depth = _depth_of(self._target, self._spots, candidate[:, 0])
 
         def compare(pair: Pair) -> Array:
-            place = _positions(pair, self._spots, depth, candidate[:, 1:])
-            found = nearest(*place, pair.there.shape)
-            apart = _guides(pair.there, found.pixel, pair.turn) - self._own
-            seen = found.seen.astype(np.float32)
+            positions = _positions(pair, self._spots, depth, candidate[:, 1:])
+            places = nearest(*positions, pair.there.shape)
+            apart = _guides(pair.there, places.pixel, pair.turn) - self._own
+            seen = places.seen.astype(np.float32)
             if pair.there.invalid is not None:
-                seen[pair.there.invalid.take(found.pixel)] = 0.0
+                seen[pair.there.invalid.take(places.pixel)] = 0.0
             return np.stack([np.einsum("ij,ij->i", apart, apart) * seen, seen])
 
         error, seen = np.sum(list(self._each(compare, self._pairs)), axis=0)
@@ -180,10 +214,10 @@ class _Sweep:
         around[known < self._enough] = np.inf
         return around, error / np.maximum(seen, np.float32(1.0))
 
-    def _mean(self, x: Array) -> Array:
+    def _mean(self, values: Array) -> Array:
         """Return the mean over the spots around each (n,), 0 outside."""
         plane = np.zeros(self._shape[0] * self._shape[1], np.float32)
-        plane[self._at] = x
+        plane[self._at] = values
         return box(plane.reshape(self._shape), _AREA).ravel()[self._at]
 
 

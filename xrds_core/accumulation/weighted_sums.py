@@ -66,7 +66,7 @@ def light_for_albedo(frame: Stored) -> float:
     """Return the squared error of light's square root per squared error of albedo.
 
     A relative error of albedo is the same relative error of light, and half as much of
-    its square root. The mean over a frame.
+    its square root. The result is the mean over a frame.
     """
     assert frame.noise is not None
     light = float(floats(frame.noise.brightness[::7]).mean(dtype=np.float64)) ** 2 / 4
@@ -76,7 +76,7 @@ def light_for_albedo(frame: Stored) -> float:
 
 
 def penalties(samples: float) -> tuple[np.float32, np.float32]:
-    """Return those of errors seen in guides, and of light that changes."""
+    """Return the penalties of errors seen in guides, and of light that changes."""
     guides = max(_GUIDES / samples, _LEAST_GUIDES)
     changes = max(_CHANGES / samples, _LEAST_CHANGES)
     return np.float32(guides), np.float32(changes)
@@ -90,7 +90,21 @@ def guide_area(samples: float) -> int:
 def for_library(
     transform: Reprojection, shape: tuple[int, int], arrays: Arrays
 ) -> structures.Reprojection:
-    """Return the structure of a reprojection of pixels of a frame of a `shape`."""
+    """Convert a reprojection to the structure that the library reads.
+
+    Parameters
+    ----------
+    transform : (4, 4) float32 array or PanoramaReprojection
+        The reprojection.
+    shape : tuple of int
+        Height and width of the frame whose pixels are reprojected.
+    arrays : Arrays
+        Keeps what the structure points to.
+
+    Returns
+    -------
+    structure : structures.Reprojection
+    """
     result = structures.Reprojection()
     if not isinstance(transform, PanoramaReprojection):
         result.matrix[:] = transform.ravel().tolist()
@@ -126,8 +140,15 @@ class Aligned:
 class Reprojected:
     """A neighbour whose pixels are found by reprojection and weighted.
 
-    `tiles` are its weights by coarse rejection; `fall` times the squared distance is
-    the logarithm of a weight.
+    Attributes
+    ----------
+    pair : Pair
+        The frame and the neighbour.
+    tiles : (rows, columns) float32 array
+        Weights of the tiles, from coarse rejection.
+    fall : float
+        The logarithm of a weight by distance is `fall` times the squared distance in
+        pixels.
     """
 
     pair: Pair
@@ -147,10 +168,18 @@ class Reprojected:
 
 @dataclass(frozen=True)
 class Means:
-    """Means over a frame's own and the samples that it reuses.
+    """Means over a frame's own and the reused samples.
 
-    `passes` of the picture, each (H, W, C), `parts` that are lit (H, W, 3), `samples`
-    (H, W), and how many samples were `reused` in all.
+    Attributes
+    ----------
+    passes : list of (H, W, C) float32 array
+        Passes of the picture.
+    parts : list of (H, W, 3) float32 array
+        AOVs and light passes that have light in any frame.
+    samples : (H, W) float32 array
+        Samples per pixel that the means are taken over.
+    reused : float
+        How many samples of neighbours were reused in all.
     """
 
     passes: list[Array]
@@ -161,10 +190,20 @@ class Means:
 
 @dataclass(frozen=True)
 class Work:
-    """The means of one frame and any of its neighbours.
+    """Computes the means over the samples of one frame and of any of its neighbours.
 
-    `images` are those that it shows, `usual` is `light_for_albedo`, `lit` are the names
-    of the parts with light in any frame.
+    Attributes
+    ----------
+    target : Stored
+        The frame that samples are gathered for.
+    images : Images or None
+        Virtual images that the frame shows.
+    usual : float
+        `light_for_albedo` of the frame.
+    lit : tuple of str
+        Names of the AOVs and light passes that have light in any frame.
+    threads : int or None
+        Number of threads; None for one for each processor.
     """
 
     target: Stored
@@ -174,12 +213,21 @@ class Work:
     threads: int | None
 
     def guess(self, neighbours: Sequence[Aligned | Reprojected]) -> Guess:
-        """Return what the means of some neighbours guess of the picture: planes
-        (n, H, W) of its passes and parts, and of brightness.
+        """Guess the picture from the samples of some neighbours.
+
+        Parameters
+        ----------
+        neighbours : sequence of Aligned or Reprojected
+            The neighbours.
+
+        Returns
+        -------
+        guess : (n, H, W) float16 array
+            Planes of the picture's passes and parts, and of brightness.
         """
         planes = self.target.picture.shape[1] + 3 * len(self.lit) + 1
         guess = np.empty((planes, *self.target.shape), np.float16)
-        call = _Call(self, [(x, 0) for x in neighbours])
+        call = _Call(self, [(neighbour, 0) for neighbour in neighbours])
         call.target.guess_out = guess.ctypes.data
         call.run()
         return guess
@@ -189,15 +237,27 @@ class Work:
         groups: Sequence[Sequence[Aligned | Reprojected]],
         guess: Guess | None = None,
     ) -> Means:
-        """Return the means over two groups of neighbours, which are judged apart.
+        """Compute the means over the samples of a frame and its neighbours.
 
-        With a `guess` the offsets of the pixels taken are taken out.
+        Parameters
+        ----------
+        groups : sequence of sequences of Aligned or Reprojected
+            Two groups of neighbours, which are judged apart.
+        guess : (n, H, W) float16 array, optional
+            From `guess`. With it the offsets of the pixels taken are taken out.
+
+        Returns
+        -------
+        means : Means
         """
         (height, width), channels = self.target.shape, self.target.picture.shape[1]
         means = np.empty((channels, height * width), np.float32)
         parts = np.empty((3 * len(self.lit), height * width), np.float32)
         samples = np.empty((height, width), np.float32)
-        call = _Call(self, [(x, n) for n, group in enumerate(groups) for x in group])
+        call = _Call(
+            self,
+            [(neighbour, n) for n, group in enumerate(groups) for neighbour in group],
+        )
         if guess is not None:
             call.target.guess = guess.ctypes.data
         call.target.means, call.target.part_means = means.ctypes.data, parts.ctypes.data
@@ -217,9 +277,16 @@ class Work:
 class Spots:
     """Where every `step`th pixel of a frame was, as if only the camera moved.
 
-    `pixel` (n,) is the flat pixel of the neighbour, `seen` (n,) whether it shows the
-    same, `in_frame` (n,) whether it is in the neighbour at all. In both directions the
-    first one is pixel `step` // 2.
+    In both directions the first one is pixel `step` // 2.
+
+    Attributes
+    ----------
+    pixel : (n,) int32 array
+        Flat index in the neighbour.
+    seen : (n,) bool array
+        Whether the neighbour shows the same there.
+    in_frame : (n,) bool array
+        Whether it is in the neighbour at all.
     """
 
     pixel: NDArray[np.int32]
@@ -231,10 +298,18 @@ class Spots:
 class Compared:
     """What some pixels of two frames say of each other.
 
-    `tiles` (4, rows, columns): of those of each tile that match how many there are, the
-    sum of what their light differs by, of its square, and of their own light. Of all
-    pixels, and of those that show a surface and no sky, how many were `compared` and
-    matched. `surfaces`: how many show one, compared or not.
+    Attributes
+    ----------
+    tiles : (4, rows, columns) float64 array
+        Of the pixels of each tile that match: their number, the sum of the differences
+        of their light, the sum of the squared differences, and the sum of their own
+        light.
+    compared, matching : int
+        How many pixels were compared, and how many match.
+    compared_surfaces, matching_surfaces : int
+        The same of pixels that show a surface, not the sky.
+    surfaces : int
+        How many pixels show a surface, compared or not.
     """
 
     tiles: NDArray[np.float64]
@@ -251,21 +326,47 @@ def tile_grid(shape: tuple[int, int]) -> tuple[int, int]:
 
 
 def find_spots(pair: Pair, step: int) -> Spots:
-    """Return where every `step`th pixel was."""
+    """Reproject every `step`th pixel of a frame, as if only the camera moved.
+
+    Parameters
+    ----------
+    pair : Pair
+        The frame and its neighbour.
+    step : int
+        Distance between the pixels, along both axes.
+
+    Returns
+    -------
+    spots : Spots
+    """
     return _spots(_spot_call(pair), pair, step)
 
 
 def compare_spots(pair: Pair, step: int) -> Compared:
-    """Compare every `step`th pixel that neither moves nor is invalid, tile by tile."""
+    """Compare every `step`th pixel of two frames, tile by tile.
+
+    Pixels that move by themselves or are invalid are left out.
+
+    Parameters
+    ----------
+    pair : Pair
+        The frame and its neighbour.
+    step : int
+        Distance between the pixels compared, along both axes.
+
+    Returns
+    -------
+    comparison : Compared
+    """
     call = _spot_call(pair)
-    found = _spots(call, pair, step)
+    spots = _spots(call, pair, step)
     tiles = np.zeros((4, *tile_grid(pair.here.shape)))
     counts = np.zeros(5, np.int64)
     library().compare_spots(
         call.target,
         call.target.all[0],
         step,
-        *(x.ctypes.data for x in (found.pixel, found.seen, found.in_frame)),
+        *(x.ctypes.data for x in (spots.pixel, spots.seen, spots.in_frame)),
         *(x.ctypes.data for x in (tiles, counts)),
     )
     return Compared(tiles, *counts.tolist())
@@ -358,23 +459,23 @@ class _Call:
         return result
 
     def _neighbour(
-        self, found: Aligned | Reprojected, group: int
+        self, neighbour: Aligned | Reprojected, group: int
     ) -> structures.Neighbour:
-        if isinstance(found, Aligned):
+        if isinstance(neighbour, Aligned):
             result = structures.Neighbour(aligned=True)
-            result.frame = self._frame(found.other, False)
+            result.frame = self._frame(neighbour.other, False)
             result.turn[:] = np.eye(3).ravel().tolist()
         else:
-            pair = found.pair
+            pair = neighbour.pair
             result = self._reprojected(pair)
             self._moving(result, pair)
-            result.fall, result.most = found.fall, found.tiles.max()
+            result.fall, result.most = neighbour.fall, neighbour.tiles.max()
             at_rims = _AT_RIMS if pair.leads else _AT_RIMS_OF_FEW
-            result.at_rims = -at_rims / found.fall if found.fall else 0.0
-            result.tile_rows, result.tile_columns = found.tiles.shape
-            if not (found.tiles == 1.0).all():
+            result.at_rims = -at_rims / neighbour.fall if neighbour.fall else 0.0
+            result.tile_rows, result.tile_columns = neighbour.tiles.shape
+            if not (neighbour.tiles == 1.0).all():
                 result.tiles = self._arrays.at(
-                    found.tiles, np.float32, found.tiles.size
+                    neighbour.tiles, np.float32, neighbour.tiles.size
                 )
             if self._work.images is not None:
                 result.images = self._places(*self._work.images.positions(pair))
@@ -385,8 +486,8 @@ class _Call:
         motion = pair.object_motion
         if motion is None:
             return
-        there = len(pair.there.picture)
-        result.moving = self._arrays.at(motion.moving, np.bool_, there)
+        count = len(pair.there.picture)
+        result.moving = self._arrays.at(motion.moving, np.bool_, count)
         result.moved = self._places(motion.pixels, motion.x, motion.y)
 
     def _places(
@@ -411,7 +512,7 @@ class _Call:
         (height, width), at = frame.shape, self._arrays.at
         count = height * width
         channels = frame.picture.shape[1]
-        found = structures.Frame(
+        structure = structures.Frame(
             picture=at(frame.picture, np.float16, count * channels),
             depth=at(frame.inverse_depth, np.float32, count),
             counts=at(frame.counts, np.float16, count),
@@ -423,10 +524,10 @@ class _Call:
             samples=frame.samples,
         )
         if frame.noise is not None:
-            found.noise = at(frame.noise.light, np.float16, 2 * count)
+            structure.noise = at(frame.noise.light, np.float16, 2 * count)
         if is_reprojected:
-            found.rims = at(frame.rims, np.uint8, count)
-        return found
+            structure.rims = at(frame.rims, np.uint8, count)
+        return structure
 
     def _parts(self, frame: Stored) -> Any:
         parts = [frame.parts[name] for name in self._work.lit]

@@ -61,8 +61,10 @@ _SECONDS = {_SMALL: 0.4, _LARGE: 0.8, "picture": 1.0, "second picture": 1.0}
 
 
 class _ForParts(NamedTuple):
-    """A network for parts, its seconds as above, and for how many parts it may be used:
-    all together take at most twice the seconds of the picture and its guides.
+    """A network for AOVs and light passes, used for up to `most` of them.
+
+    `seconds` are relative to those of the picture. All parts together take at most
+    twice the seconds of the picture and its guides.
     """
 
     network: str
@@ -119,18 +121,25 @@ class Denoiser:
     Reuse it: filters and their memory serve the next picture, too. Calls from several
     threads run one after the other.
 
-    Args:
-        quality: `best`, `high`, `medium`, `balanced` or `fast`; see `QUALITIES`.
-        device: `auto` (the fastest there is), `cpu`, `cuda` or `metal`.
-        threads: of the CPU; 0 for one per core.
-        memory_limit: bytes that a call may take beside the arrays given and returned;
-            it works in tiles then. A target, not a bound: a tile has a least size. By
-            default it works in tiles on the processor where a picture is larger than
-            1920x1080.
+    Parameters
+    ----------
+    quality : {'best', 'high', 'medium', 'balanced', 'fast'}
+        See `QUALITIES`.
+    device : {'auto', 'cpu', 'cuda', 'metal'}
+        `auto` is the fastest there is.
+    threads : int
+        Threads of the CPU; 0 for one per core.
+    memory_limit : int, optional
+        Bytes that a call may take beside the arrays given and returned; it works in
+        tiles then. A target, not a bound: a tile has a least size. By default it works
+        in tiles on the processor where a picture is larger than 1920x1080.
 
-    Raises:
-        UsageError: the quality is unknown, the device not here, or a number negative.
-        XRDSError: the library cannot be loaded.
+    Raises
+    ------
+    UsageError
+        If the quality is unknown, the device not here, or a number negative.
+    XRDSError
+        If the library cannot be loaded.
     """
 
     def __init__(
@@ -179,22 +188,41 @@ class Denoiser:
     ) -> Denoised:
         """Denoise a picture; the arrays given stay as they are.
 
-        Args:
-            radiance: (H, W, 3), or (H, W, 4) with alpha, premultiplied. Its noise must
-                not be correlated between pixels, as interpolation makes it.
-            albedo: (H, W, 3); values above 1, as of lamps, count as 1, as in Blender.
-            normal: (H, W, 3), means of unit vectors of any space, 0 where nothing is.
-            parts: (H, W, 3) by name, light that radiance is made of. Each is denoised
-                by itself with the same guides, in a smaller network where they are
-                many; one without light costs nothing.
-            hdr: False for values in [0, 1] that are shown as they are.
-            guides_are_clean: True if all that they show may appear in the picture,
-                False if not, None to decide for each by its own noise, as `best`,
-                `high` and `medium` do: the others then assume that they are noisy.
-            progress: takes a fraction in [0, 1] that never falls; False as its result
-                cancels.
+        Parameters
+        ----------
+        radiance : (H, W, 3) or (H, W, 4) float32 array
+            Scene-linear, with alpha premultiplied. Its noise must not be correlated
+            between pixels, which interpolation would cause.
+        albedo : (H, W, 3) float32 array, optional
+            Values above 1, such as those of lamps, count as 1: so Blender treats them.
+        normal : (H, W, 3) float32 array, optional
+            Means of unit vectors of any space, 0 where nothing is.
+        parts : mapping of str to (H, W, 3) float32 array, optional
+            AOVs and light passes, by name. Each is denoised by itself with the same
+            guides, by a smaller network where they are many; one without light costs
+            nothing.
+        hdr : bool
+            False for values in [0, 1] that are shown as they are.
+        guides_are_clean : bool, optional
+            True if all that they show may appear in the picture, False if not. None to
+            decide for each by its own noise, which `best`, `high` and `medium` do; the
+            other qualities then assume that guides are noisy.
+        progress : callable, optional
+            Takes a fraction in [0, 1] that never falls; False as its result cancels.
 
-        Raises PictureError for arrays that do not fit, Cancelled, and OutOfMemory.
+        Returns
+        -------
+        denoised : Denoised
+            The picture and its parts.
+
+        Raises
+        ------
+        PictureError
+            If the arrays do not fit each other.
+        Cancelled
+            If `progress` returned False.
+        OutOfMemory
+            If the device has too little memory.
         """
         if self._device is None:
             raise UsageError("this denoiser is closed; make another one")
@@ -220,28 +248,40 @@ class Denoiser:
     ) -> tuple[Array, Array]:
         """Denoise the guides alone; one that is clean is returned as it was given.
 
-        Args:
-            albedo: (H, W, 3), without NaN; values above 1 count as 1.
-            normal: (H, W, 3), without NaN.
-            progress: takes a fraction in [0, 1] that never falls; False as its result
-                cancels.
+        Parameters
+        ----------
+        albedo : (H, W, 3) float32 array
+            Without NaN; values above 1 count as 1.
+        normal : (H, W, 3) float32 array
+            Without NaN.
+        progress : callable, optional
+            Takes a fraction in [0, 1] that never falls; False as its result cancels.
 
-        Raises Cancelled and OutOfMemory.
+        Returns
+        -------
+        albedo, normal : (H, W, 3) float32 array
+
+        Raises
+        ------
+        Cancelled
+            If `progress` returned False.
+        OutOfMemory
+            If the device has too little memory.
         """
         if self._device is None:
             raise UsageError("this denoiser is closed; make another one")
         work = Progress(progress)
-        found = {"albedo": albedo, "normal": normal}
+        guides = {"albedo": albedo, "normal": normal}
         with self._lock, oidn_device.explained(self.device, albedo.shape):
             work.report(0.0)
-            for name, guide in found.items():
-                work.begin_stage(1 / len(found))
+            for name, guide in guides.items():
+                work.begin_stage(1 / len(guides))
                 if not self._is_clean(name, guide):
                     held = np.clip(guide, *_RANGE[name])
                     quiet = self._prefilter(name, held, name, work)
-                    found[name] = quiet.astype(np.float32)
+                    guides[name] = quiet.astype(np.float32)
             work.report(1.0)
-        return found["albedo"], found["normal"]
+        return guides["albedo"], guides["normal"]
 
     def _to_prefilter(
         self, pictures: Pictures, are_clean: bool | None
@@ -282,7 +322,7 @@ class Denoiser:
         pictures_made = ("picture", "second picture")[: 1 + (self.quality == "best")]
         networks = {name: self._network(name) for name in prefiltered}
         for_part = self._for_parts(len(pictures.lit))
-        total = sum(_SECONDS[x] for x in (*networks.values(), *pictures_made))
+        total = sum(_SECONDS[stage] for stage in (*networks.values(), *pictures_made))
         total += for_part.seconds * len(pictures.lit)
         for name, guide in pictures.guides.items():
             images[name] = _rows(guide, turn)
@@ -336,8 +376,8 @@ class Denoiser:
 
     def _for_parts(self, count: int) -> _ForParts:
         """Return the network for so many parts, none better than the picture's."""
-        own = [x.network for x in _FOR_PARTS].index(QUALITIES[self.quality])
-        return next(x for x in _FOR_PARTS[own:] if count <= x.most)
+        own = [choice.network for choice in _FOR_PARTS].index(QUALITIES[self.quality])
+        return next(choice for choice in _FOR_PARTS[own:] if count <= choice.most)
 
     def _light_filters(self, parts: int) -> list[Any]:
         """Return the filters of the picture and of so many parts."""
@@ -438,10 +478,39 @@ def denoise(
     memory_limit: int | None = None,
     progress: Callback | None = None,
 ) -> Array:
-    """Denoise one picture; see `Denoiser` for the arrays, the choices and the errors.
+    """Denoise one picture; the last denoiser used stays loaded.
 
-    Returns radiance (H, W, 3), or (H, W, 4) with the alpha that was given. The last
-    denoiser used stays loaded.
+    Parameters
+    ----------
+    radiance : (H, W, 3) or (H, W, 4) float32 array
+        Scene-linear, with alpha premultiplied.
+    albedo : (H, W, 3) float32 array, optional
+        Values above 1 count as 1.
+    normal : (H, W, 3) float32 array, optional
+        Means of unit vectors of any space, 0 where nothing is.
+    quality, device, memory_limit
+        Options of `Denoiser`.
+    guides_are_clean : bool, optional
+        True if all that the guides show may appear in the picture, False if not, None
+        to decide by their noise.
+    progress : callable, optional
+        Takes a fraction in [0, 1] that never falls; False as its result cancels.
+
+    Returns
+    -------
+    radiance : (H, W, 3) or (H, W, 4) float32 array
+        With the alpha that was given.
+
+    Raises
+    ------
+    UsageError
+        If the quality is unknown or the device not here.
+    PictureError
+        If the arrays do not fit each other.
+    Cancelled
+        If `progress` returned False.
+    OutOfMemory
+        If the device has too little memory.
     """
     return _denoiser(quality, device, memory_limit)(
         radiance, albedo, normal, guides_are_clean=guides_are_clean, progress=progress

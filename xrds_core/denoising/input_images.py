@@ -49,9 +49,27 @@ class Pictures:
 def check(
     radiance: Any, albedo: Any, normal: Any, parts: Mapping[str, Any]
 ) -> Pictures:
-    """Return the arrays, cleaned; float32 ones without a fault are not copied.
+    """Check and clean the arrays given to a denoiser.
 
-    Raises PictureError, with the sizes and the remedy, for arrays that do not fit.
+    Parameters
+    ----------
+    radiance : array_like
+        (H, W, 3) or (H, W, 4) floats.
+    albedo, normal : array_like or None
+        (H, W, 3) floats.
+    parts : mapping of str to array_like
+        AOVs and light passes, (H, W, 3), by name.
+
+    Returns
+    -------
+    pictures : Pictures
+        Without NaN, infinities or negative radiance. Float32 arrays without a fault are
+        not copied.
+
+    Raises
+    ------
+    PictureError
+        If arrays do not fit each other; it states their sizes and the remedy.
     """
     whole = float_array("radiance", radiance, (3, 4))
     given = {"albedo": albedo, "normal": normal}
@@ -68,15 +86,27 @@ def check(
     filled = {name: fill_holes(guide) for name, guide in guides.items()}
     clean = {name: clean_radiance(part) for name, part in lights.items()}
     bad_pixels += holes + sum(n for _, n in (*filled.values(), *clean.values()))
-    held, made_of = ({k: x for k, (x, _) in each.items()} for each in (filled, clean))
+    held, made_of = (
+        {k: x for k, (x, _) in images.items()} for images in (filled, clean)
+    )
     return Pictures(light, alpha, held, made_of, bad_pixels)
 
 
 def sample(guide: Array) -> Array | None:
-    """Return blocks of a guide, side by side, that show whether it is noisy.
+    """Return blocks of a guide that show whether it is noisy.
 
-    Half of them are the busiest, the others represent the rest of the picture. None
-    where the picture is so small that a sample would save no time.
+    Half of them are the busiest, the others represent the rest of the picture.
+
+    Parameters
+    ----------
+    guide : (H, W, 3) float32 array
+        Albedo or normal.
+
+    Returns
+    -------
+    blocks : (h, w, 3) float32 array or None
+        The blocks side by side. None where the picture is so small that a sample would
+        save no time.
     """
     rows, columns = (size // _BLOCK for size in guide.shape[:2])
     count = _SIDE**2
@@ -90,9 +120,9 @@ def sample(guide: Array) -> Array | None:
     return grid.reshape(_SIDE * _BLOCK, _SIDE * _BLOCK, 3)
 
 
-def _split(x: Array, rows: int, columns: int) -> Array:
+def _split(picture: Array, rows: int, columns: int) -> Array:
     """(rows block, columns block, 3) -> (rows columns, block, block, 3)."""
-    blocks = x.reshape(rows, _BLOCK, columns, _BLOCK, 3).swapaxes(1, 2)
+    blocks = picture.reshape(rows, _BLOCK, columns, _BLOCK, 3).swapaxes(1, 2)
     return blocks.reshape(-1, _BLOCK, _BLOCK, 3)
 
 
@@ -101,5 +131,5 @@ def _busy(blocks: Array) -> Array:
     return np.abs(np.diff(blocks[..., 1], axis=2)).mean(axis=(1, 2))
 
 
-def _size(x: Array) -> str:
-    return f"{x.shape[1]}x{x.shape[0]}"
+def _size(picture: Array) -> str:
+    return f"{picture.shape[1]}x{picture.shape[0]}"

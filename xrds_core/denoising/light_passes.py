@@ -21,9 +21,15 @@ _SHIPPED = Path(__file__).with_name("renderers.toml")
 
 @dataclass(frozen=True)
 class Lobe:
-    """A pass of light under one of its `names`; light is the pass times `colour`.
+    """A light pass; its light is the pass times a colour pass.
 
-    That is the pass it was divided by, under one of its names; () where there is none.
+    Attributes
+    ----------
+    names : tuple of str
+        The names that the pass may have.
+    colour : tuple of str
+        The names that the colour pass may have; () where the pass is not divided by a
+        colour.
     """
 
     names: tuple[str, ...]
@@ -32,10 +38,19 @@ class Lobe:
 
 @dataclass(frozen=True)
 class Renderer:
-    """The passes of light of one renderer.
+    """The AOVs and light passes of one renderer.
 
-    `lobes` add up to the picture. So do `groups`, patterns in which * stands for
-    anything; what is `alone` adds up to nothing.
+    Attributes
+    ----------
+    name : str
+        The renderer.
+    lobes : tuple of Lobe
+        Light passes that add up to the picture.
+    groups : tuple of str
+        Patterns of light groups, which add up to the picture too; * stands for
+        anything.
+    alone : tuple of str
+        Names of AOVs that add up to nothing.
     """
 
     name: str
@@ -45,10 +60,22 @@ class Renderer:
 
 
 def read_renderers(path: Path | None = None) -> tuple[Renderer, ...]:
-    """Return the renderers of a TOML file, before the known ones.
+    """Read the renderers of a TOML file.
 
-    `renderers.toml` beside this module shows its form. Raises UsageError, with what is
-    wrong and where, for a file that has another.
+    Parameters
+    ----------
+    path : Path, optional
+        A file of the form that `renderers.toml` beside this module has.
+
+    Returns
+    -------
+    renderers : tuple of Renderer
+        Those of the file, then the known ones.
+
+    Raises
+    ------
+    UsageError
+        If the file has another form; it says what is wrong and where.
     """
     return (_read(path) if path is not None else ()) + _shipped()
 
@@ -60,10 +87,10 @@ def _shipped() -> tuple[Renderer, ...]:
 
 def _read(path: Path) -> tuple[Renderer, ...]:
     try:
-        found = tomllib.loads(path.read_text("utf-8"))
+        renderers = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UsageError(f"cannot read the passes in {path}: {error}") from error
-    return tuple(_renderer(path, name, each) for name, each in found.items())
+    return tuple(_renderer(path, name, table) for name, table in renderers.items())
 
 
 def _renderer(path: Path, name: str, given: Any) -> Renderer:
@@ -74,7 +101,7 @@ def _renderer(path: Path, name: str, given: Any) -> Renderer:
         raise UsageError(f"{where} lobes: give a list of tables")
     return Renderer(
         name,
-        tuple(_lobe(where, each) for each in lobes),
+        tuple(_lobe(where, lobe) for lobe in lobes),
         _texts(f"{where} groups", given.get("groups", [])),
         _texts(f"{where} alone", given.get("alone", [])),
     )
@@ -109,10 +136,21 @@ NONE, GROUPS, ALL = "none", "groups", "all"
 
 @dataclass(frozen=True)
 class LightPart:
-    """A pass of light: its `channels` R, G, B, and those of the `colour` it is over.
+    """An AOV or light pass of a file.
 
-    `colour` is () where the pass is light as it is. Parts of one `sum` add up to the
-    picture; "" adds up to nothing. `names` are all that it is known by.
+    Attributes
+    ----------
+    name : str
+        The name of the pass.
+    channels : tuple of str
+        Its channels R, G, B.
+    colour : tuple of str
+        Channels R, G, B of the colour that it was divided by; () where the pass is
+        light as it is.
+    sum : str
+        Parts with the same `sum` add up to the picture; "" adds up to nothing.
+    names : tuple of str
+        All names that it is known by.
     """
 
     name: str
@@ -129,9 +167,16 @@ class LightPart:
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which parts are wanted: NONE, GROUPS, ALL, or names.
+    """Which AOVs and light passes are wanted.
 
-    `alone` are names of further passes of light, which add up to nothing.
+    Attributes
+    ----------
+    which : tuple of str
+        NONE, GROUPS, ALL, or names.
+    alone : tuple of str
+        Names of further passes, which add up to nothing.
+    renderers : tuple of Renderer
+        What renderers call their passes.
     """
 
     which: tuple[str, ...] = (NONE,)
@@ -143,43 +188,66 @@ class Wanted:
 
 
 def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPart, ...]:
-    """Return the wanted parts of one layer of a file, and of what has no layer.
+    """Find the wanted AOVs and light passes of a file.
 
-    Raises UsageError for names that the file does not have.
+    Parameters
+    ----------
+    channels : Channels
+        Names of the file's channels.
+    layer : str
+        The layer to search, beside what lies in no layer.
+    wanted : Wanted
+        Which passes are wanted.
+
+    Returns
+    -------
+    parts : tuple of LightPart
+        Each pass once.
+
+    Raises
+    ------
+    UsageError
+        If the file lacks a pass that is wanted by its name.
     """
     if not wanted:
         return ()
     passes = _passes(channels, layer)
-    known = max((_of(x, passes) for x in wanted.renderers), key=len)
+    known = max(
+        (_parts_written_by(renderer, passes) for renderer in wanted.renderers), key=len
+    )
     named = {name: part for part in known for name in part.names}
-    found: list[LightPart] = []
+    parts: list[LightPart] = []
     for which in wanted.which:
         if which == GROUPS:
-            found += [part for part in known if part.sum == GROUPS]
+            parts += [part for part in known if part.sum == GROUPS]
         elif which == ALL:
-            found += known
+            parts += known
         elif which != NONE:
-            found.append(_named(channels, which, named, known))
+            parts.append(_find_part(channels, which, named, known))
     for name in wanted.alone:
         if name not in passes:
             raise _unknown(channels, name, passes)
-        found.append(LightPart(name, passes[name], names=(name,)))
-    return tuple({part.channels: part for part in found}.values())
+        parts.append(LightPart(name, passes[name], names=(name,)))
+    return tuple({part.channels: part for part in parts}.values())
 
 
 def _passes(channels: Channels, layer: str) -> dict[str, tuple[str, ...]]:
     """The channels of all colours in a layer, or in none, by the passes' names."""
     ahead = f"{layer}." if layer else ""
     prefixes = sorted({name.rpartition(".")[0] for name in channels.names})
-    found = ((prefix, channels.of(prefix, ("RGB", "rgb"))) for prefix in prefixes)
+    channels_by_prefix = (
+        (prefix, channels.of(prefix, ("RGB", "rgb"))) for prefix in prefixes
+    )
     return {
         prefix.removeprefix(ahead): tuple(names)
-        for prefix, names in found
+        for prefix, names in channels_by_prefix
         if names and prefix and (prefix.startswith(ahead) or "." not in prefix)
     }
 
 
-def _of(renderer: Renderer, passes: dict[str, tuple[str, ...]]) -> list[LightPart]:
+def _parts_written_by(
+    renderer: Renderer, passes: dict[str, tuple[str, ...]]
+) -> list[LightPart]:
     """The parts that a renderer would have written."""
     parts = []
     for lobe in renderer.lobes:
@@ -190,8 +258,11 @@ def _of(renderer: Renderer, passes: dict[str, tuple[str, ...]]) -> list[LightPar
             parts.append(LightPart(name, passes[name], over, "lobes", lobe.names))
     taken = {part.name for part in parts}
     for name, channels in passes.items():
-        if any(fnmatchcase(name, x) for x in renderer.groups) and name not in taken:
-            group = (name, *(_short(name, x) for x in renderer.groups))
+        if (
+            any(fnmatchcase(name, pattern) for pattern in renderer.groups)
+            and name not in taken
+        ):
+            group = (name, *(_short(name, pattern) for pattern in renderer.groups))
             parts.append(LightPart(name, channels, (), GROUPS, group))
         elif name in renderer.alone:
             parts.append(LightPart(name, channels, names=(name,)))
@@ -207,7 +278,7 @@ def _short(name: str, pattern: str) -> str:
     return name.removeprefix(pattern.rstrip("*"))
 
 
-def _named(
+def _find_part(
     channels: Channels,
     name: str,
     named: dict[str, LightPart],
@@ -216,21 +287,32 @@ def _named(
     exact = next((part for part in known if part.name == name), None)
     part = exact or named.get(name)
     if part is None:
-        raise _unknown(channels, name, [x.name for x in known])
+        raise _unknown(channels, name, [known_part.name for known_part in known])
     return part
 
 
 def _unknown(channels: Channels, name: str, known: Collection[str]) -> UsageError:
-    there = ", ".join(sorted(known)) or "none"
-    return UsageError(f"{channels.path} has no light {name!r}; it holds {there}")
+    names = ", ".join(sorted(known)) or "none"
+    return UsageError(f"{channels.path} has no light {name!r}; it holds {names}")
 
 
 def light_of(
     parts: Sequence[LightPart], read: Callable[[tuple[str, ...]], Array]
 ) -> dict[str, Array]:
-    """Return the light of each part (H, W, 3), by its name, and the colours by theirs.
+    """Read the light of AOVs and light passes.
 
-    `read` gives the pixels of three channels.
+    Parameters
+    ----------
+    parts : sequence of LightPart
+        The passes.
+    read : callable
+        Takes three channel names and returns their pixels, (H, W, 3).
+
+    Returns
+    -------
+    light : dict of str to (H, W, 3) float32 array
+        Scene-linear light by the part's name: a pass times its colour. The colours are
+        added under `LightPart.colour_name`.
     """
     light: dict[str, Array] = {}
     for part in parts:
@@ -247,24 +329,34 @@ def light_of(
 def passes_of(
     parts: Sequence[LightPart], light: Mapping[str, Array]
 ) -> dict[tuple[str, ...], Array]:
-    """Return the pixels of each part's channels, and of the colours'.
+    """Return the pixels to write for AOVs and light passes: the inverse of `light_of`.
 
-    `light` is as `light_of` returns it.
+    Parameters
+    ----------
+    parts : sequence of LightPart
+        The passes.
+    light : mapping of str to (H, W, 3) float32 array
+        Light of the parts, and the colours, by name.
+
+    Returns
+    -------
+    passes : dict of tuple of str to (H, W, 3) float32 array
+        Light divided by its colour, and the colours, by their three channel names.
     """
-    found: dict[tuple[str, ...], Array] = {}
+    passes: dict[tuple[str, ...], Array] = {}
     for part in parts:
         pixels = light[part.name]
         if part.colour:
-            colour = found[part.colour] = light[part.colour_name]
+            colour = passes[part.colour] = light[part.colour_name]
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
                 pixels = np.where(colour > 0.0, pixels / colour, np.float32(0.0))
-        found[part.channels] = pixels
-    return found
+        passes[part.channels] = pixels
+    return passes
 
 
 def passes_by_name(
     parts: Sequence[LightPart], light: Mapping[str, Array]
 ) -> dict[str, Array]:
-    """Return as `passes_of`, by the names of the passes."""
-    found = passes_of(parts, light)
-    return {channels[0].rpartition(".")[0]: x for channels, x in found.items()}
+    """Return what `passes_of` returns, by the names of the passes."""
+    passes = passes_of(parts, light)
+    return {channels[0].rpartition(".")[0]: x for channels, x in passes.items()}

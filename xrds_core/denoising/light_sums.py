@@ -24,38 +24,62 @@ _ROWS = 128  # at a time, so that memory does not grow with the picture
 def add_up(
     picture: Array, parts: Mapping[str, Array], masks: Mapping[str, Array] | None = None
 ) -> dict[str, Array]:
-    """Return parts (H, W, 3) that add up to a picture (H, W, 3); none is negative.
+    """Make AOVs or light passes add up to a picture; none becomes negative.
 
-    The rest goes to each by the square of its light: a denoiser's errors grow with it.
-    `masks`, by name, are colours (H, W, 3): a part that is 0 times one cannot have
-    light there, others take it. A part that is dark everywhere stays so.
+    What they miss of the picture goes to each by the square of its light: a denoiser's
+    errors grow with it.
+
+    Parameters
+    ----------
+    picture : (H, W, 3) float32 array
+        Scene-linear radiance.
+    parts : mapping of str to (H, W, 3) float32 array
+        Light by name. A part that is dark everywhere stays so.
+    masks : mapping of str to (H, W, 3) float32 array, optional
+        Colours by the part's name: where one is 0 the part cannot have light, and
+        others take it.
+
+    Returns
+    -------
+    parts : dict of str to (H, W, 3) float32 array
+        Light that adds up to the picture.
     """
     lit = [name for name, part in parts.items() if part.any()] or list(parts)
-    found = dict(parts) | {name: np.empty_like(parts[name]) for name in lit}
+    result = dict(parts) | {name: np.empty_like(parts[name]) for name in lit}
     for first in range(0, len(picture), _ROWS):
         rows = slice(first, first + _ROWS)
         whole = np.maximum(picture[rows], np.float32(0.0))
-        held = {name: _held(parts[name][rows]) for name in lit}
-        can = {name: _can(name, rows, masks or {}) for name in lit}
-        weights = {k: (np.square(x) + _TINY) * can[k] for k, x in held.items()}
+        light = {name: _finite_light(parts[name][rows]) for name in lit}
+        allowed = {name: _allowed_light(name, rows, masks or {}) for name in lit}
+        weights = {k: (np.square(x) + _TINY) * allowed[k] for k, x in light.items()}
         total = np.maximum(sum(weights.values()), _TINY * _TINY)
-        rest = (whole - sum(held[k] * can[k] for k in held)) / total
-        for name, part in held.items():
-            shared = part * can[name] + rest * weights[name]
-            held[name] = np.maximum(shared, np.float32(0.0))
-        made = sum(held.values())
+        rest = (whole - sum(light[k] * allowed[k] for k in light)) / total
+        for name, part in light.items():
+            shared = part * allowed[name] + rest * weights[name]
+            light[name] = np.maximum(shared, np.float32(0.0))
+        made = sum(light.values())
         scale = whole / np.maximum(made, _TINY * _TINY)
-        for name, part in held.items():
+        for name, part in light.items():
             by_weight = whole * (weights[name] / total)
-            found[name][rows] = np.where(made > 0.0, part * scale, by_weight)
-    return found
+            result[name][rows] = np.where(made > 0.0, part * scale, by_weight)
+    return result
 
 
 def completed(colour: Array) -> Array:
-    """Return a colour pass (H, W, 3) that is 0 only where it is around a pixel, too.
+    """Fill the zeros of a colour pass from the pixels around them.
 
-    Where a pixel's few samples have missed a lobe, its colour is 0, but not the light
-    that is denoised there. It becomes the mean of the 3x3 pixels around.
+    Where a pixel's few samples have missed a lobe its colour is 0, but the denoised
+    light there is not.
+
+    Parameters
+    ----------
+    colour : (H, W, 3) float32 array
+        A colour pass.
+
+    Returns
+    -------
+    completed : (H, W, 3) float32 array
+        Zeros are the mean of the 3x3 pixels around; 0 only where all of these are 0.
     """
     known = np.maximum(np.nan_to_num(colour, posinf=0.0), np.float32(0.0))
     if known.all():
@@ -64,11 +88,13 @@ def completed(colour: Array) -> Array:
     return np.where(known > 0.0, known, around)
 
 
-def _held(part: Array) -> Array:
+def _finite_light(part: Array) -> Array:
     return np.maximum(np.nan_to_num(part, posinf=0.0), np.float32(0.0))
 
 
-def _can(name: str, rows: slice, masks: Mapping[str, Array]) -> Array | np.float32:
+def _allowed_light(
+    name: str, rows: slice, masks: Mapping[str, Array]
+) -> Array | np.float32:
     """Where a part can have light: 1, elsewhere 0."""
     if name not in masks:
         return np.float32(1.0)
@@ -85,21 +111,38 @@ def light_in(
     parts: Sequence[LightPart],
     like: Collection[str] | None = None,
 ) -> dict[str, Array]:
-    """Return the parts of a frame's `light` (H, W, 3), by name, without colours.
+    """Return the AOVs and light passes of a frame, without the colours.
 
-    Where those of one sum do not make up the radiance, what they miss is one more; or
-    where it is among the names that the result is to be `like`.
+    Where the parts of one sum do not make up the radiance, what they miss is one part
+    more.
+
+    Parameters
+    ----------
+    radiance : (H, W, 3) float32 array or None
+        Scene-linear radiance; None adds no such part.
+    light : mapping of str to (H, W, 3) float32 array
+        Light of the parts, and the colours, by name: what `light_of` returns.
+    parts : sequence of LightPart
+        The parts to return.
+    like : collection of str, optional
+        Names of the parts that the result is to have: what is missing is then a part
+        exactly where its name is among them.
+
+    Returns
+    -------
+    parts : dict of str to (H, W, 3) float32 array
+        Light by name.
     """
-    found = {part.name: light[part.name] for part in parts}
-    if radiance is None or not found:
-        return found
+    light_by_name = {part.name: light[part.name] for part in parts}
+    if radiance is None or not light_by_name:
+        return light_by_name
     least = _ALL * float(np.nan_to_num(radiance).mean())
     for name, members in _sums(parts).items():
-        missing = radiance - sum(found[part.name] for part in members)
+        missing = radiance - sum(light_by_name[part.name] for part in members)
         is_much = float(np.nan_to_num(np.abs(missing)).mean()) > least
         if is_much if like is None else _rest(name) in like:
-            found[_rest(name)] = np.maximum(missing, np.float32(0.0))
-    return found
+            light_by_name[_rest(name)] = np.maximum(missing, np.float32(0.0))
+    return light_by_name
 
 
 def added_up(
@@ -108,11 +151,25 @@ def added_up(
     parts: Sequence[LightPart],
     colours: Mapping[str, Array],
 ) -> dict[str, Array]:
-    """Return denoised parts that add up to the denoised picture (H, W, 3 or 4).
+    """Make denoised AOVs and light passes add up to the denoised picture.
 
-    `colours` (H, W, 3) are those that parts are divided by, by name.
+    Parameters
+    ----------
+    picture : (H, W, 3) or (H, W, 4) float32 array
+        The denoised picture.
+    denoised : mapping of str to (H, W, 3) float32 array
+        Denoised light by name.
+    parts : sequence of LightPart
+        The parts to return.
+    colours : mapping of str to (H, W, 3) float32 array
+        The colours that parts are divided by, by `LightPart.colour_name`.
+
+    Returns
+    -------
+    parts : dict of str to (H, W, 3) float32 array
+        Light by name; parts that belong to no sum stay as they are.
     """
-    found = {part.name: denoised[part.name] for part in parts}
+    light_by_name = {part.name: denoised[part.name] for part in parts}
     for name, members in _sums(parts).items():
         sums = {part.name: denoised[part.name] for part in members}
         if _rest(name) in denoised:
@@ -120,8 +177,8 @@ def added_up(
         masks = {
             part.name: colours[part.colour_name] for part in members if part.colour
         }
-        found |= add_up(picture[..., :3], sums, masks)
-    return {part.name: found[part.name] for part in parts}
+        light_by_name |= add_up(picture[..., :3], sums, masks)
+    return {part.name: light_by_name[part.name] for part in parts}
 
 
 def _sums(parts: Sequence[LightPart]) -> dict[str, list[LightPart]]:

@@ -32,16 +32,37 @@ def load() -> ModuleType:
 
 
 def devices() -> list[str]:
-    """Return the devices that are here, the fastest first; raises as `load`."""
-    found = (device.type.name.lower() for device in load().physical_devices())
-    return [name for name in dict.fromkeys(found) if name in DEVICES]
+    """Return the devices that are here, the fastest first.
+
+    Raises
+    ------
+    XRDSError
+        If the library cannot be loaded.
+    """
+    names = (device.type.name.lower() for device in load().physical_devices())
+    return [name for name in dict.fromkeys(names) if name in DEVICES]
 
 
 def open_device(name: str, threads: int) -> Any:
-    """Return OIDN's device of a name, or the fastest one for `auto`.
+    """Open a device of OIDN.
 
-    `threads` are of the CPU, 0 for one per core. Raises UsageError if the device is
-    not here, and as `load`.
+    Parameters
+    ----------
+    name : {'auto', 'cpu', 'cuda', 'metal'}
+        `auto` is the fastest there is.
+    threads : int
+        Threads of the CPU; 0 for one per core.
+
+    Returns
+    -------
+    device : mitsuba_oidn.Device
+
+    Raises
+    ------
+    UsageError
+        If the device is not here.
+    XRDSError
+        If the library cannot be loaded.
     """
     oidn = load()
     if name != "auto" and name not in DEVICES:

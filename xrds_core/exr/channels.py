@@ -21,7 +21,15 @@ _COMPOSITED = "Composite."  # Blender's layer for the output of its compositor
 
 
 class Channels:
-    """Names of channels, and which of them make a pass; `path` stands in errors."""
+    """Names of a file's channels, and which of them make a pass.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, for error messages.
+    names : collection of str
+        Full names of its channels.
+    """
 
     def __init__(self, path: str | Path, names: Collection[str]) -> None:
         self.path = path
@@ -34,10 +42,27 @@ class Channels:
         *,
         any_case: bool = False,
     ) -> str | None:
-        """Return the full name of the one pass that is called so, or None.
+        """Find a pass by its name.
 
-        `letters`: of its channels, any of these; of a colour or a direction by default.
-        Raises PictureError where several layers have it.
+        Parameters
+        ----------
+        wanted : str
+            The name; layers before it may be left out.
+        letters : sequence of str
+            Letters that the pass's channels may have; those of a colour or a direction
+            by default.
+        any_case : bool
+            Whether upper and lower case are the same.
+
+        Returns
+        -------
+        name : str or None
+            The full name of the pass; None if there is none.
+
+        Raises
+        ------
+        PictureError
+            If several layers have it.
         """
         prefixes = {name.rpartition(".")[0] for name in self.names}
         ending = f".{wanted}"
@@ -48,7 +73,9 @@ class Channels:
         ]
         if wanted in matches:
             return wanted
-        matches = [x for x in matches if not x.startswith(_COMPOSITED)] or matches
+        matches = [
+            match for match in matches if not match.startswith(_COMPOSITED)
+        ] or matches
         if len(matches) > 1:
             raise PictureError(
                 f"{self.path} holds {wanted!r} in several layers: "
@@ -59,8 +86,8 @@ class Channels:
     def of(self, prefix: str, letters: Sequence[str] = COMPONENTS) -> list[str]:
         """Return the channels of a pass, the first of `letters` that are all there."""
         dotted = f"{prefix}." if prefix else ""
-        for each in letters:
-            names = [dotted + letter for letter in each]
+        for components in letters:
+            names = [dotted + letter for letter in components]
             if all(name in self.names for name in names):
                 return names
         return []
@@ -81,7 +108,7 @@ _USUAL = ("left", "right")
 
 
 def with_view(name: str, part: Part) -> str:
-    """A channel's full name with the view of its part, if that has one."""
+    """Return a channel's full name with the view of its part, if that has one."""
     view = part.attributes.get("view")
     if not isinstance(view, str) or view in name.split("."):
         return name
@@ -91,29 +118,44 @@ def with_view(name: str, part: Part) -> str:
 def by_view(
     parts: Sequence[Part], places: Mapping[str, Any]
 ) -> dict[str, dict[str, Any]]:
-    """Return the places of channels by their names without that of their view.
+    """Sort the places of channels by the view that they belong to.
 
-    The first view comes first; a file without views has one that is called "".
+    Parameters
+    ----------
+    parts : sequence of Part
+        Parts of a file.
+    places : mapping of str to object
+        Where each channel lies, by its full name.
+
+    Returns
+    -------
+    places_by_view : dict of str to dict
+        The first view comes first; names are without that of the view. A file without
+        views has one that is called "".
     """
     views = _views(parts, places)
     if len(views) < 2:
         return {"": dict(places)}
-    found: dict[str, dict[str, Any]] = {view: {} for view in views}
+    by_name: dict[str, dict[str, Any]] = {view: {} for view in views}
     for name, place in places.items():
         *layers, letter = name.split(".")
-        named = [x for x in layers if x in found]
+        named = [layer for layer in layers if layer in by_name]
         if named:
             del layers[len(layers) - 1 - layers[::-1].index(named[-1])]
-            found[named[-1]][".".join((*layers, letter))] = place
+            by_name[named[-1]][".".join((*layers, letter))] = place
         else:
-            found[views[0]].setdefault(name, place)
-    return {view: channels for view, channels in found.items() if channels} or {"": {}}
+            by_name[views[0]].setdefault(name, place)
+    return {view: channels for view, channels in by_name.items() if channels} or {
+        "": {}
+    }
 
 
 def _views(parts: Sequence[Part], names: Mapping[str, Any]) -> list[str]:
-    for told in (part.attributes.get(VIEWS) for part in parts):
-        if isinstance(told, list) and all(x and isinstance(x, str) for x in told):
-            return list(dict.fromkeys(told))
+    for declared in (part.attributes.get(VIEWS) for part in parts):
+        if isinstance(declared, list) and all(
+            x and isinstance(x, str) for x in declared
+        ):
+            return list(dict.fromkeys(declared))
     of_parts = [part.attributes.get("view") for part in parts]
     views = list(dict.fromkeys(x for x in of_parts if isinstance(x, str)))
     if views:

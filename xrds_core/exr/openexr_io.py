@@ -40,7 +40,15 @@ LARGEST_HALF = 65504.0
 
 @dataclass(frozen=True)
 class Encoding:
-    """16 bits for each number or 32, compressed by one of CODECS."""
+    """How numbers are stored in a file.
+
+    Attributes
+    ----------
+    half : bool
+        16 bits for each number, or else 32.
+    codec : str
+        Compression, one of CODECS.
+    """
 
     half: bool = False
     codec: str = "zip"
@@ -59,9 +67,9 @@ FLOAT_ZIP = Encoding()
 
 
 def fitting(pixels: Pixels, dtype: Any) -> Pixels:
-    """Pixels in another number format; what half floats cannot hold is bounded.
+    """Convert pixels to another number format; what half floats cannot hold is clipped.
 
-    Infinity stays what it is.
+    Infinity stays infinite.
     """
     if dtype == np.float16:
         bounded = np.clip(pixels, -LARGEST_HALF, LARGEST_HALF)
@@ -98,8 +106,21 @@ class Part:
 def read(path: str | Path) -> list[Part]:
     """Read all parts of a file.
 
-    Raises PictureError if it is not whole, or its header claims more than
-    `limits.limit_of` allows: then before memory is allocated.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    parts : list of Part
+        Parts with their channels.
+
+    Raises
+    ------
+    PictureError
+        If the file is not whole; or if its header claims more than
+        `raw_header.limit_of` allows, before memory is allocated.
     """
     limit = limit_of(check_input(Path(path)))
     return _read(path, limit) if not _is_shadowed() else _read_apart(path, limit)
@@ -117,9 +138,23 @@ def write(
     codec: str = FLOAT_ZIP.codec,
     attributes: Attributes | None = None,
 ) -> None:
-    """Write planes of one size by channel name, in their own number formats.
+    """Write planes of one size as a file of one part.
 
-    Raises PictureError with the library's reason if they cannot be written.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    planes : mapping of str to (H, W) array
+        Pixels by channel name, in their own number formats.
+    codec : str
+        Compression, one of CODECS.
+    attributes : dict, optional
+        Further attributes of the header.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written, with the library's reason.
     """
     height, width = next(iter(planes.values())).shape
     window = ((0, 0), (width - 1, height - 1))
@@ -130,7 +165,21 @@ def write(
 def write_part(path: str | Path, part: Part, codec: str = FLOAT_ZIP.codec) -> None:
     """Write a file of one part, with its windows and attributes.
 
-    Matrices are written in single precision. Raises PictureError as `write`.
+    Matrices are written in single precision.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    part : Part
+        Its only part.
+    codec : str
+        Compression, one of CODECS.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written, with the library's reason.
     """
     if not _is_shadowed():
         _write(path, part, codec)
@@ -150,27 +199,45 @@ def copy(
     window: Window | None = None,
     metadata: Mapping[str, str] | None = None,
 ) -> None:
-    """Write `source` to `path` with some channels replaced or added, by part.
+    """Copy a file with some channels replaced or added.
 
-    All others, the windows and attributes stay as they are; a plane that replaces
-    another gets its number format. `alone`: only the `planes`, of one part, are
-    written, with its windows and attributes. With a `window` all parts are cropped to
-    it, and planes are of it. `metadata` is added to the headers of parts with planes.
-    Raises PictureError.
+    All other channels, the windows and the attributes stay as they are. A plane that
+    replaces another gets its number format.
+
+    Parameters
+    ----------
+    source : str or Path
+        The file to copy.
+    path : str or Path
+        The file to write.
+    planes : mapping of int to mapping of str to (H, W) array
+        New pixels by the number of the part and the name of the channel.
+    alone : bool
+        Whether to write only `planes`, which are then of one part, with its windows and
+        attributes.
+    window : Window, optional
+        What all parts are cropped to; `planes` are then of this window.
+    metadata : mapping of str to str, optional
+        Added to the headers of the parts that `planes` are of.
+
+    Raises
+    ------
+    PictureError
+        If the source cannot be read or cropped, or the file not written.
     """
     limit = limit_of(check_input(Path(source)))
-    told = dict(metadata or {})
+    added = dict(metadata or {})
     if not _is_shadowed():
-        _copy(source, path, planes, alone, window, told, limit)
+        _copy(source, path, planes, alone, window, added, limit)
         return
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         unread = ((0, 0), (0, 0))  # the source has them
         options: Attributes = {"source": os.fspath(source), "alone": alone}
-        options |= {"window": window, "metadata": told}
+        options |= {"window": window, "metadata": added}
         parts = [
-            Part("", unread, unread, dict(each), options | {"part": number})
-            for number, each in planes.items()
+            Part("", unread, unread, dict(channels), options | {"part": number})
+            for number, channels in planes.items()
         ]
         _pack(archive, parts)
         _apart("copy", path, archive, str(limit))
@@ -203,13 +270,13 @@ def _library() -> Any:
 def _read(path: str | Path, limit: int) -> list[Part]:
     parts = _opened(path, limit).parts
     return [
-        _part(each, {name: x.pixels for name, x in each.channels.items()})
-        for each in parts
+        _part(part, {name: channel.pixels for name, channel in part.channels.items()})
+        for part in parts
     ]
 
 
 def _read_headers(path: str | Path) -> list[Part]:
-    return [_part(each, {}) for each in _whole_headers(path)]
+    return [_part(part, {}) for part in _whole_headers(path)]
 
 
 def _whole_headers(path: str | Path) -> Any:
@@ -233,8 +300,8 @@ def _part(part: Any, channels: dict[str, Pixels]) -> Part:
 
 def _headers(path: str | Path, limit: float = math.inf) -> Any:
     openexr = _library()
-    with readable(path) as there:
-        headers = openexr.File(str(there), header_only=True).parts
+    with readable(path) as readable_path:
+        headers = openexr.File(str(readable_path), header_only=True).parts
     check_claims(path, [part.header for part in headers], limit)
     return headers
 
@@ -246,8 +313,8 @@ def _opened(path: str | Path, limit: int) -> Any:
         # OpenEXR leaves out a part that it cannot read and says why on stdout
         with _silent_library(), redirect_stdout(StringIO()) as output:
             headers = _headers(path, limit)
-            with readable(path) as there:
-                file = openexr.File(str(there), separate_channels=True)
+            with readable(path) as readable_path:
+                file = openexr.File(str(readable_path), separate_channels=True)
     except _FAULTS as error:
         raise _incomplete(path, error) from error
     if not file.parts or len(file.parts) != len(headers):
@@ -376,7 +443,7 @@ def _copy(
 ) -> None:
     openexr = _library()
     if alone:
-        ((number, only),) = planes.items()
+        ((number, new_channels),) = planes.items()
         whole = _whole_headers(source)[number].header
         header = {k: v for k, v in whole.items() if k not in _OF_CHANNELS}
         header["compression"] = _lossless(header["compression"])
@@ -385,13 +452,13 @@ def _copy(
             header["dataWindow"] = _corners(window)
         header |= metadata
         channels: dict[str, Any] = {}
-        _put(channels, only)
+        _set_channels(channels, new_channels)
     else:
         file = _opened(source, limit)
         if window is not None:
             _crop(file.parts, window)
-        for number, each in planes.items():
-            _put(file.parts[number].channels, each)
+        for number, new_channels in planes.items():
+            _set_channels(file.parts[number].channels, new_channels)
             file.parts[number].header |= metadata
     try:
         if alone:
@@ -430,7 +497,7 @@ def _corners(window: Window) -> tuple[Any, Any]:
     return first, last
 
 
-def _put(channels: dict[str, Any], planes: Mapping[str, Pixels]) -> None:
+def _set_channels(channels: dict[str, Any], planes: Mapping[str, Pixels]) -> None:
     """Replace or add channels of a part."""
     openexr = _library()
     for name, pixels in planes.items():
@@ -544,8 +611,8 @@ def _main(task: str, path: str, archive: str, how: str) -> int:
             options = parts[0].attributes
             planes = {part.attributes["part"]: part.channels for part in parts}
             window = options["window"] and _window(options["window"])
-            told = options["alone"], window, options["metadata"]
-            _copy(options["source"], path, planes, *told, int(how))
+            chosen = options["alone"], window, options["metadata"]
+            _copy(options["source"], path, planes, *chosen, int(how))
     except PictureError as error:
         print(error, file=sys.stderr)
         return 1

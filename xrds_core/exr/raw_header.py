@@ -38,15 +38,29 @@ def is_mostly_empty(pixels: int, whole: int) -> bool:
 
 
 def limit_of(size: int) -> int:
-    """The bytes of pixels that are read of a file of `size` bytes."""
+    """Return the bytes of pixels that may be read from a file of `size` bytes."""
     return _allowed or max(_ALWAYS_READ, size * _USUAL_RATIO)
 
 
 def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
-    """Raise PictureError for impossible windows, or ones with too many pixels.
+    """Check what headers claim before memory is allocated for it.
 
-    The data window is inside the display window, or both inside one around them. Deep
-    pixels have any number of samples, which no header states: they are rejected.
+    The data window may lie inside the display window, or both inside one around them.
+    Deep pixels have any number of samples, which no header states: they are rejected.
+
+    Parameters
+    ----------
+    path : object
+        The file, for error messages.
+    headers : sequence of mapping
+        Headers of its parts.
+    limit : float
+        Most bytes of pixels.
+
+    Raises
+    ------
+    PictureError
+        For impossible windows, more pixels than the limit, or deep pixels.
     """
     claimed = 0
     for header in headers:
@@ -54,7 +68,9 @@ def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
             raise PictureError(
                 f"{path} is deep; save it with flat channels of full resolution"
             )
-        windows = [_window(path, header, x) for x in ("dataWindow", "displayWindow")]
+        windows = [
+            _window(path, header, window) for window in ("dataWindow", "displayWindow")
+        ]
         claimed += _area_around(windows) * len(header["channels"]) * _BYTES
     if claimed > limit:
         raise PictureError(
@@ -169,21 +185,32 @@ def readable(path: str | Path) -> Iterator[Path]:
     with scratch_folder() as folder:
         copy = folder / "readable.exr"
         shutil.copyfile(path, copy)
-        _patch(copy, {x.place: x.veiled for x in refused})
+        _patch(copy, {attribute.place: attribute.veiled for attribute in refused})
         yield copy
 
 
 def restore(source: str | Path, path: str | Path) -> None:
     """Give a file that was made of a `source` its names and kinds of attributes."""
-    heads = {x.veiled: x.head for x in _refused(source)}
+    heads = {attribute.veiled: attribute.head for attribute in _refused(source)}
     if heads:
-        found = attributes_in(_beginning(path))
-        _patch(path, {x.place: heads[x.head] for x in found if x.head in heads})
+        attributes = attributes_in(_beginning(path))
+        _patch(
+            path,
+            {
+                attribute.place: heads[attribute.head]
+                for attribute in attributes
+                if attribute.head in heads
+            },
+        )
 
 
 def _refused(path: str | Path) -> list[Attribute]:
     try:
-        return [x for x in attributes_in(_beginning(path)) if x.is_refused]
+        return [
+            attribute
+            for attribute in attributes_in(_beginning(path))
+            if attribute.is_refused
+        ]
     except ValueError:  # damaged: the library says how
         return []
 

@@ -65,10 +65,24 @@ class Guides:
 
 
 def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
-    """Read the picture: the pass `names.beauty`, or plain R, G, B.
+    """Read the picture of a file, and its noisy picture where it has one.
 
-    With it, where there is one, the noisy pass. Raises PictureError if the file cannot
-    be read or has no such pass.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    names : Names
+        What the passes are called.
+
+    Returns
+    -------
+    beauty : Beauty
+        The pass `names.beauty`, or plain R, G, B.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be read or has no such pass.
     """
     file = File(path)
     radiance = file.colour(names.beauty, plain=True)
@@ -77,9 +91,23 @@ def read_beauty(path: str | Path, names: Names = CYCLES) -> Beauty:
 
 
 def read_guides(path: str | Path, names: Names = CYCLES) -> Guides:
-    """Read albedo and normal and, where there is one, alpha.
+    """Read albedo, normal and, where there is one, alpha.
 
-    Raises PictureError if the file cannot be read or lacks a pass.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    names : Names
+        What the passes are called.
+
+    Returns
+    -------
+    guides : Guides
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be read or lacks a pass.
     """
     file = File(path)
     albedo, normal = file.colour(names.albedo), file.colour(names.normal)
@@ -92,10 +120,23 @@ def write_picture(
     encoding: Encoding = FLOAT_ZIP,
     metadata: Mapping[str, str] | None = None,
 ) -> None:
-    """Write (H, W) planes by channel name, all at once or not at all.
+    """Write a picture, all at once or not at all.
 
-    `metadata` goes into the header. Raises PictureError, and leaves `path` as it was,
-    if it cannot be written.
+    Parameters
+    ----------
+    path : str or Path
+        The file, which stays as it was on an error.
+    channels : mapping of str to (H, W) float32 array
+        Planes by channel name.
+    encoding : Encoding
+        How numbers are stored.
+    metadata : mapping of str to str, optional
+        Attributes of the header.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written.
     """
     planes = {name: encoding.plane(pixels) for name, pixels in channels.items()}
     with _whole(path) as unfinished:
@@ -113,28 +154,59 @@ def copy_picture(
     metadata: Mapping[str, str] | None = None,
     check: Callable[[], None] = lambda: None,
 ) -> None:
-    """Write `source` to `path` with other pixels in some channels, by part.
+    """Copy a file with other pixels in some channels, all at once or not at all.
 
-    The (H, W) planes are of the part's data window, or of `window`, to which the file
-    is cropped. What is not in `channels` stays as it is, or is left out if they stand
-    `alone`: those of one part can. `metadata` goes into the header of these parts.
-    `check` raises PictureError where `source` is another file meanwhile: then nothing
-    is written. Raises PictureError as `write_picture`.
+    Parameters
+    ----------
+    source : str or Path
+        The file to copy.
+    path : str or Path
+        The file to write, which stays as it was on an error.
+    channels : mapping of int to mapping of str to (H, W) float32 array
+        New pixels by the number of the part and the name of the channel. They are of
+        the part's data window, or of `window`.
+    alone : bool
+        Whether all other channels are left out; `channels` are then of one part.
+    window : Window, optional
+        What the file is cropped to.
+    metadata : mapping of str to str, optional
+        Added to the headers of the parts that `channels` are of.
+    check : callable
+        Raises PictureError where `source` was replaced meanwhile: then nothing is
+        written.
+
+    Raises
+    ------
+    PictureError
+        If the source cannot be read or cropped, or the file not written.
     """
     planes = {
-        part: {k: np.ascontiguousarray(v, np.float32) for k, v in each.items()}
-        for part, each in channels.items()
+        part: {k: np.ascontiguousarray(v, np.float32) for k, v in pixels.items()}
+        for part, pixels in channels.items()
     }
     with _whole(path) as unfinished:
-        told = dict(metadata or {})
+        added = dict(metadata or {})
         openexr_io.copy(
-            source, unfinished, planes, alone=alone, window=window, metadata=told
+            source, unfinished, planes, alone=alone, window=window, metadata=added
         )
         check()
 
 
 def write_part(path: str | Path, part: Part) -> None:
-    """Write a file of one part; raises PictureError as `write_picture`."""
+    """Write a file of one part, all at once or not at all.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, which stays as it was on an error.
+    part : Part
+        Its only part.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written.
+    """
     with _whole(path) as unfinished:
         openexr_io.write_part(unfinished, part)
 
@@ -149,17 +221,28 @@ def _whole(path: str | Path) -> Iterator[Path]:
 
 
 def attributes(path: str | Path) -> list[Attributes]:
-    """Return those of a file's parts; PictureError where it is not complete."""
+    """Return the attributes of each part; PictureError if the file is not complete."""
     return [part.attributes for part in openexr_io.read(path)]
 
 
 class File:
-    """The channels of a file by full name, as `ViewLayer.Combined.R`.
+    """The channels of a file by full name, such as `ViewLayer.Combined.R`.
 
-    Planes are of the display window, or of `window` where that is set; zero where the
-    file has no pixels. Files that `also` belong to it add the channels that it lacks;
-    the only picture of such a file is called as the name given with it. Raises
-    PictureError if a file cannot be read, or has another size.
+    Planes are of the display window, or of `window` where that is set; they are zero
+    where the file has no pixels.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    also : mapping of str to Path, optional
+        Files that belong to it, which add the channels that it lacks. The only picture
+        of such a file is called by the name given with it.
+
+    Raises
+    ------
+    PictureError
+        If a file cannot be read, or has another size.
     """
 
     def __init__(
@@ -177,13 +260,13 @@ class File:
 
     def views(self) -> list[File]:
         """Return the same file for each of its views, with its channels alone."""
-        found: list[File] = []
+        views: list[File] = []
         for view, places in by_view(self.parts, self._places).items():
-            each = copy(self)
-            each._places, each.names = places, Channels(self.path, places)
-            each.view, each.is_first = view, not found
-            found.append(each)
-        return found
+            file = copy(self)
+            file._places, file.names = places, Channels(self.path, places)
+            file.view, file.is_first = view, not views
+            views.append(file)
+        return views
 
     def _add(self, name: str, path: Path) -> None:
         parts = openexr_io.read(path)

@@ -27,7 +27,7 @@ HERE = Path(__file__).resolve().parent
 LIBRARIES = HERE / "lib"
 """Where the libraries lie in an installed package, and in a source tree."""
 ZIG = "ziglang>=0.15.2,<0.18"
-"""As pyproject.toml requires it."""
+"""The versions that pyproject.toml requires."""
 
 
 class CompileError(Exception):
@@ -82,16 +82,28 @@ def this_platform() -> str:
     """
     name = sysconfig.get_platform()
     machine = name if sys.platform == "win32" else os.uname().machine
-    for platform, told in PLATFORMS.items():
-        if told.system == (sys.platform, machine):
+    for platform, description in PLATFORMS.items():
+        if description.system == (sys.platform, machine):
             return platform
     raise CompileError(f"no library for {name}; there is {', '.join(PLATFORMS)}")
 
 
 def chosen(text: str | None) -> list[str]:
-    """The platforms named in a text, as `linux-x64,macos-x64`; without one this one.
+    """Return the platforms named in a text such as `linux-x64,macos-x64`.
 
-    Raises CompileError for a name that is unknown.
+    Parameters
+    ----------
+    text : str or None
+        Names, or `all`; without any it is this platform.
+
+    Returns
+    -------
+    platforms : list of str
+
+    Raises
+    ------
+    CompileError
+        If a name is unknown.
     """
     names = (text or "").replace(",", " ").split()
     if names == ["all"]:
@@ -119,11 +131,31 @@ def compile_libraries(
     flags: Sequence[str] = (),
     compiler: str | None = None,
 ) -> list[Path]:
-    """Compile a library for each platform into a folder; returns their paths.
+    """Compile a library for each platform.
 
-    `flags` come behind all others; with some, symbols stay in the library. A `compiler`
-    takes the place of zig, for this platform. An earlier library is replaced as a
-    whole, so that a process that has loaded it runs on. Raises CompileError.
+    An earlier library is replaced as a whole, so that a process that has loaded it runs
+    on.
+
+    Parameters
+    ----------
+    platforms : iterable of str
+        Names among PLATFORMS.
+    folder : Path
+        Where the libraries go.
+    flags : sequence of str
+        Further flags, behind all others; with some, symbols stay in the library.
+    compiler : str, optional
+        Takes the place of zig, for this platform.
+
+    Returns
+    -------
+    paths : list of Path
+        The libraries.
+
+    Raises
+    ------
+    CompileError
+        If zig is missing or the sources do not compile.
     """
     if compiler is None and find_spec("ziglang") is None:
         raise CompileError(f"zig is missing: run pip install '{ZIG}'")
@@ -153,16 +185,16 @@ def _objects(platform: str, work: Path) -> dict[Path, list[str]]:
     windows = target.startswith("x86_64-windows")
     base = ["-target", target, *_FLAGS, *([] if windows else ["-fPIC"])]
     levels = _LEVELS if target.startswith("x86_64") else {"v1": ""}
-    found = {}
+    arguments = {}
     for level, processor in levels.items():
         named = [f"-DNAME(x)=x##_{level}", *_processor(processor)]
-        found[f"kernels_{level}"] = ["kernels.c", *named]
-    found["dispatch"] = ["dispatch.c", *_processor(levels["v1"])]
+        arguments[f"kernels_{level}"] = ["kernels.c", *named]
+    arguments["dispatch"] = ["dispatch.c", *_processor(levels["v1"])]
     if windows:
-        found["windows"] = ["windows.c", *_processor(levels["v1"])]
+        arguments["windows"] = ["windows.c", *_processor(levels["v1"])]
     return {
         work / f"{platform}-{name}.o": [*base, *words, str(HERE / source)]
-        for name, (source, *words) in found.items()
+        for name, (source, *words) in arguments.items()
     }
 
 
@@ -196,8 +228,8 @@ def _link(
 
 def _cache(work: Path) -> Path:
     """Where zig keeps what it compiled: its own place, if that can be written to."""
-    if told := os.environ.get("ZIG_GLOBAL_CACHE_DIR"):
-        return Path(told)
+    if folder := os.environ.get("ZIG_GLOBAL_CACHE_DIR"):
+        return Path(folder)
     windows = sys.platform == "win32"
     kept = os.environ.get("LOCALAPPDATA" if windows else "XDG_CACHE_HOME")
     if not kept and not windows and (home := os.environ.get("HOME")):
@@ -229,8 +261,8 @@ def _run(compiler: str | None, cache: Path, words: list[str]) -> None:
         check=False,
     )
     if done.returncode:
-        told = f"{shlex.join(command)}\n{done.stdout}"
-        raise CompileError(f"the C core does not compile\n{told}")
+        output = f"{shlex.join(command)}\n{done.stdout}"
+        raise CompileError(f"the C core does not compile\n{output}")
     if done.stdout:
         print(done.stdout, file=sys.stderr, end="")
 

@@ -86,21 +86,21 @@ def library() -> CDLL:
     path = FOLDER / file_name()
     try:
         _check_length(path)
-        found = CDLL(str(path))
+        compiled = CDLL(str(path))
     except OSError as error:
         raise LibraryError(
             f"the compiled library {path} cannot be loaded ({error}): install XRDS "
             "again, or in a checkout run make native"
         ) from error
     for name, (result, arguments) in _FUNCTIONS.items():
-        function = getattr(found, name, None)
+        function = getattr(compiled, name, None)
         if function is None:
             raise LibraryError(_other_version(path))
         function.restype, function.argtypes = result, arguments
-    sizes = [found.struct_size(number) for number in range(len(IN_ORDER))]
-    if sizes != [sizeof(each) for each in IN_ORDER]:
+    sizes = [compiled.struct_size(number) for number in range(len(IN_ORDER))]
+    if sizes != [sizeof(structure) for structure in IN_ORDER]:
         raise LibraryError(_other_version(path))
-    return found
+    return compiled
 
 
 def _check_length(path: Path) -> None:
@@ -131,33 +131,56 @@ class Arrays:
     def __init__(self) -> None:
         self._kept: list[Any] = []
 
-    def at(self, x: NDArray[Any] | None, dtype: DTypeLike, count: int) -> int | None:
-        """Return the address of `count` numbers, None of no array.
+    def at(
+        self, array: NDArray[Any] | None, dtype: DTypeLike, count: int
+    ) -> int | None:
+        """Return the address of an array for the library, and keep the array.
 
-        They are copied where they do not lie one after the other. Raises ValueError
-        where there are more or fewer, or of another type: the library would read what
-        is no number.
+        Numbers are copied where they do not lie one after the other.
+
+        Parameters
+        ----------
+        array : array or None
+            The array.
+        dtype : dtype
+            The type that the library reads.
+        count : int
+            The number of numbers that it reads.
+
+        Returns
+        -------
+        address : int or None
+            None for no array.
+
+        Raises
+        ------
+        ValueError
+            If there are more or fewer numbers, or of another type: the library would
+            read what is no number.
         """
-        if x is None:
+        if array is None:
             return None
-        if x.dtype != dtype or x.size != count:
+        if array.dtype != dtype or array.size != count:
             raise ValueError(
-                f"{x.size} numbers of {x.dtype} where {count} of {np.dtype(dtype)} are "
-                "needed"
+                f"{array.size} numbers of {array.dtype} where {count} of "
+                f"{np.dtype(dtype)} are needed"
             )
-        x = np.ascontiguousarray(x)
-        self._kept.append(x)
-        return x.ctypes.data
+        array = np.ascontiguousarray(array)
+        self._kept.append(array)
+        return array.ctypes.data
 
-    def strided(self, x: NDArray[Any]) -> tuple[int, tuple[int, ...]]:
-        """Return the address of the first float32, and how many lie between the first
-        ones along each axis.
-        """
-        x = x.astype(np.float32, copy=False)
-        if any(step % x.itemsize for step in x.strides) or x.ctypes.data % x.itemsize:
-            x = np.ascontiguousarray(x)
-        self._kept.append(x)
-        return x.ctypes.data, tuple(step // x.itemsize for step in x.strides)
+    def strided(self, array: NDArray[Any]) -> tuple[int, tuple[int, ...]]:
+        """Return the address of the first float32, and the step along each axis."""
+        array = array.astype(np.float32, copy=False)
+        if (
+            any(step % array.itemsize for step in array.strides)
+            or array.ctypes.data % array.itemsize
+        ):
+            array = np.ascontiguousarray(array)
+        self._kept.append(array)
+        return array.ctypes.data, tuple(
+            step // array.itemsize for step in array.strides
+        )
 
     def addresses(self, addresses: Sequence[int | None]) -> Any:
         """Return a C array of addresses."""
@@ -183,10 +206,24 @@ def processors() -> int:
 def in_threads(
     work: Callable[[Item], Result], items: Sequence[Item], threads: int | None = None
 ) -> list[Result]:
-    """Return the results of `work`, in the order of the items.
+    """Do work in threads.
 
-    `threads`: all processors by default. No thread works any more when this ends, by an
-    interrupt or several as well: what it writes into is freed then.
+    No thread works any more when this ends, by an interrupt or several as well: what it
+    writes into is freed then.
+
+    Parameters
+    ----------
+    work : callable
+        Takes an item and returns a result.
+    items : sequence
+        The items.
+    threads : int, optional
+        Number of threads, one for each processor by default.
+
+    Returns
+    -------
+    results : list
+        In the order of the items.
     """
     count = min(threads or processors(), len(items))
     if count <= 1:

@@ -145,4 +145,4 @@ class Area(Structure):
 
 
 IN_ORDER = (Frame, Reprojection, Places, Neighbour, Target, Pass, Packing)
-"""As `struct_size` of the library counts them."""
+"""In the order in which `struct_size` of the library counts them."""

@@ -56,15 +56,30 @@ def error_ratio(
 ) -> Ratio:
     """Return the squared error of a picture over that of a frame of all samples.
 
-    `parts` are a `share` of all samples each, of seeds of their own; `picture`
-    (H, W, 3) and `noisy`, the mean of samples that the parts do not have either, were
-    made without them. All are radiance. Errors count as they are seen: relative to the
-    local light of their channel, and less where it is beyond white, 1 / `exposure`. The
-    ratio is infinite where noise hides the error of all samples.
+    Errors count as they are seen: relative to the local light of their channel, and
+    less where it is beyond white.
+
+    Parameters
+    ----------
+    picture : (H, W, 3) float32 array
+        Radiance of a picture that was made without `parts`.
+    noisy : (H, W, 3) float32 array
+        Radiance, the mean of samples that the parts do not have either.
+    parts : tuple of Rendered
+        Two renders, each with a share of all samples and a seed of its own.
+    exposure : float
+        White is a radiance of 1 / `exposure`.
+    share : float
+        Share of all samples that each part has.
+
+    Returns
+    -------
+    ratio : Ratio
+        Infinite where noise hides the error of all samples.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
-        ours, one = _errors(picture, noisy, parts, exposure)
-        return Ratio(*_ratio(ours, one * share**FALL))
+        errors, part_errors = _errors(picture, noisy, parts, exposure)
+        return Ratio(*_ratio(errors, part_errors * share**FALL))
 
 
 def _errors(
@@ -75,8 +90,8 @@ def _errors(
     An error by two noisy renders has the product of their noises in it. So the
     picture's is that of a part, and their difference by one render.
     """
-    one, two = parts
-    shown = (picture + one.denoised + two.denoised) / 3
+    first_part, second_part = parts
+    shown = (picture + first_part.denoised + second_part.denoised) / 3
     dark = max(float(np.nan_to_num(luminance(shown)).mean()) * _DARKEST, _TINY)
     light = [box(np.nan_to_num(shown[..., i]), _SEEN) for i in range(3)]
     bright = np.maximum(np.stack(light, axis=-1), 0.0) + np.float32(dark)
@@ -84,13 +99,18 @@ def _errors(
     scale = np.nan_to_num(1.0 / (bright * pressed**2), posinf=0.0)
 
     def product(first: Array, second: Array) -> Array:
-        found = (first * second * scale).mean(-1)
-        return block_means(np.nan_to_num(found, posinf=0.0, neginf=0.0))
+        products = (first * second * scale).mean(-1)
+        return block_means(np.nan_to_num(products, posinf=0.0, neginf=0.0))
 
-    noise = product(one.noisy - two.noisy, one.noisy - two.noisy)
+    noise = product(
+        first_part.noisy - second_part.noisy, first_part.noisy - second_part.noisy
+    )
     kept = noise <= np.quantile(noise, 1.0 - _NOISIEST)
     half, more = np.zeros((2, *noise.shape))
-    for made, other in ((one.denoised, two.noisy), (two.denoised, one.noisy)):
+    for made, other in (
+        (first_part.denoised, second_part.noisy),
+        (second_part.denoised, first_part.noisy),
+    ):
         apart = made - other
         half += product(apart, made - noisy)
         # the difference of two squares: noise counts once in it, and little
@@ -100,14 +120,14 @@ def _errors(
     return half + more, half
 
 
-def _ratio(one: Array, two: Array) -> tuple[float, float]:
+def _ratio(errors: Array, reference: Array) -> tuple[float, float]:
     """Return the ratio of two sums over blocks, and its standard error."""
-    whole = float(two.sum())
-    if whole <= 2.0 * _spread(two):
+    whole = float(reference.sum())
+    if whole <= 2.0 * _spread(reference):
         return float("inf"), 0.0
-    ratio = max(float(one.sum()), 0.0) / whole
+    ratio = max(float(errors.sum()), 0.0) / whole
     # blocks that are hard to render are so both ways: what is left counts
-    return ratio, _spread(one - ratio * two) / whole
+    return ratio, _spread(errors - ratio * reference) / whole
 
 
 def _spread(errors: Array) -> float:
@@ -117,10 +137,16 @@ def _spread(errors: Array) -> float:
 
 @dataclass(frozen=True)
 class Gain:
-    """What neighbours bring to a frame, by blocks.
+    """What the samples of neighbours bring to a frame, by blocks.
 
-    `errors` are what is left of each block's error, 1 where they bring nothing;
-    `noise` is the noise of its own samples, and `seen` whether it is ever visible.
+    Attributes
+    ----------
+    errors : (rows, columns) array
+        What is left of each block's error, 1 where neighbours bring nothing.
+    noise : (rows, columns) array
+        Noise of the frame's own samples.
+    seen : (rows, columns) bool array
+        Whether that noise is visible.
     """
 
     errors: Array
@@ -129,24 +155,36 @@ class Gain:
 
     @property
     def blocks(self) -> Array:
-        """How many times its own samples a block is worth; infinite without noise."""
+        """How many times its own samples a block equals; infinite without noise."""
         return np.where(self.seen, self.errors ** (-1.0 / FALL), np.inf)
 
     def of(self, blocks: NDArray[np.bool_]) -> float:
-        """How many times their own samples some blocks are worth together."""
+        """How many times their own samples some blocks together equal."""
         error = float(np.average(self.errors[blocks], weights=self.noise[blocks]))
         return float(max(error, _TINY) ** (-1.0 / FALL))
 
 
-def gain(accumulated: Accumulated, own: Stored, lent: float = 1.0) -> Gain:
-    """Return what a frame of its own samples has gained by accumulation.
+def gain(accumulated: Accumulated, own: Stored, factor: float = 1.0) -> Gain:
+    """Return what a frame has gained by the samples of its neighbours.
 
-    It is what it would have gained if neighbours had lent `lent` times their samples.
     Errors fall with `FALL`; the noise of a pixel is its weight.
+
+    Parameters
+    ----------
+    accumulated : Accumulated
+        The frame with its neighbours' samples.
+    own : Stored
+        The frame as rendered.
+    factor : float
+        The gain is that of `factor` times the reused samples.
+
+    Returns
+    -------
+    gain : Gain
     """
     noise = root_noise(own)
     alone = sample_counts(own).reshape(own.shape)
-    reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(lent)
+    reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(factor)
     share = alone / np.maximum(alone + reused, _TINY)
     weights, weighted = block_means(noise), block_means(noise * share**FALL)
     assert own.noise is not None

@@ -1,6 +1,6 @@
 """Samples that a frame gets beside its own, after its neighbours' were accumulated.
 
-From then on they are the frame's own: it lends them as well.
+From then on they are the frame's own: other frames reuse them as well.
 """
 
 from __future__ import annotations
@@ -48,13 +48,25 @@ def _counts(extra: Passes) -> Array:
 
 
 def enriched(frame: Stored, alone: Accumulated, extra: Passes) -> Stored:
-    """Return a frame whose own samples are extra ones as well.
+    """Return a frame whose own samples include extra ones.
 
-    `alone` is the frame as accumulated without neighbours. `noise` stays that of the
-    samples which the frame had: the mean root of more samples is larger, and would be
-    other light beside frames that have fewer.
+    `noise` stays that of the samples which the frame had: the mean root of more samples
+    is larger, and would be other light beside frames that have fewer.
+
+    Parameters
+    ----------
+    frame : Stored
+        The frame as rendered.
+    alone : Accumulated
+        The frame as accumulated without neighbours.
+    extra : Passes
+        Its extra samples.
+
+    Returns
+    -------
+    enriched : Stored
     """
-    found = with_extra(alone, alone, extra)
+    combined = with_extra(alone, alone, extra)
     rows = _rows(_counts(extra))
     width = frame.shape[1]
     place = slice(rows.start * width, rows.stop * width)
@@ -63,11 +75,11 @@ def enriched(frame: Stored, alone: Accumulated, extra: Passes) -> Stored:
     if frame.invalid is not None:
         invalid |= frame.invalid
     light, alpha = (
-        None if x is None else x[rows] for x in (found.radiance, found.alpha)
+        None if x is None else x[rows] for x in (combined.radiance, combined.alpha)
     )
-    guides = found.albedo[rows], found.normal[rows]
+    guides = combined.albedo[rows], combined.normal[rows]
     picture[place], invalid[place] = pack(light, *guides, alpha)
-    total = found.samples
+    total = combined.samples
     is_even = bool((total == total.flat[0]).all())
     noise = frame.noise
     if noise is not None:
@@ -81,17 +93,29 @@ def enriched(frame: Stored, alone: Accumulated, extra: Passes) -> Stored:
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=noise,
-        parts=pack_parts(found.parts),
+        parts=pack_parts(combined.parts),
     )
 
 
 def with_extra(
     frame: Accumulated, alone: Accumulated, extra: Passes, worth: float = 1.0
 ) -> Accumulated:
-    """Return a frame with extra samples; itself where these are not finite.
+    """Return an accumulated frame with extra samples, where these are finite.
 
-    `alone` is the frame without its neighbours, whose samples count as `worth` of its
-    own.
+    Parameters
+    ----------
+    frame : Accumulated
+        The frame with the samples of its neighbours.
+    alone : Accumulated
+        The frame without them.
+    extra : Passes
+        Its extra samples.
+    worth : float
+        Value of a neighbour's sample relative to one of the frame's own.
+
+    Returns
+    -------
+    combined : Accumulated
     """
     more = _counts(extra)
     rows = _rows(more)  # often few of many
@@ -111,27 +135,31 @@ def with_extra(
         whole = values[0]
         wide = (...,) + (None,) * (whole.ndim - 2)
         mixed = np.zeros_like(whole[rows])
-        for each, share in zip(values, shares, strict=True):
+        for plane, share in zip(values, shares, strict=True):
             if share.any():
                 # NaN where there are no samples
-                mixed += np.where(share[wide] > 0.0, each[rows], 0.0) * share[wide]
+                mixed += np.where(share[wide] > 0.0, plane[rows], 0.0) * share[wide]
         return _with_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
 
-    def of(name: str) -> Array | None:
+    def mean_pass(name: str) -> Array | None:
         whole = getattr(frame, name)
-        return None if whole is None else mean(whole, *(getattr(x, name) for x in rest))
+        return (
+            None
+            if whole is None
+            else mean(whole, *(getattr(samples, name) for samples in others))
+        )
 
-    rest = alone, extra
-    albedo, normal = of("albedo"), of("normal")
+    others = alone, extra
+    albedo, normal = mean_pass("albedo"), mean_pass("normal")
     assert albedo is not None
     assert normal is not None
     counted = np.where(usable, total, frame.samples[rows])
     return replace(
         frame,
-        radiance=of("radiance"),
+        radiance=mean_pass("radiance"),
         albedo=albedo,
         normal=normal,
-        alpha=of("alpha"),
+        alpha=mean_pass("alpha"),
         parts={
             name: mean(part, alone.parts[name], extra.parts[name])
             for name, part in frame.parts.items()
@@ -142,11 +170,11 @@ def with_extra(
 
 def _rows(samples: Array) -> slice:
     """Return the rows from the first to the last one with samples."""
-    found = np.flatnonzero(samples.any(axis=1))
-    return slice(found[0], found[-1] + 1) if len(found) else slice(0, 0)
+    rows = np.flatnonzero(samples.any(axis=1))
+    return slice(rows[0], rows[-1] + 1) if len(rows) else slice(0, 0)
 
 
 def _with_rows(whole: Array, rows: slice, values: Array) -> Array:
-    found = whole.copy()
-    found[rows] = values
-    return found
+    result = whole.copy()
+    result[rows] = values
+    return result

@@ -1,9 +1,9 @@
 """The history of a shot whose camera stands still: frames that have left its window.
 
 There every pixel shows the same surface for as long as nothing moves in front of it, so
-frames older than the temporal radius are still worth something. They are stored as one
-frame, the mean of their samples. A frame joins it as it takes neighbours itself: where
-it shows something else, or in other light, the pixel's history begins anew.
+frames older than the temporal radius are still useful. They are stored as one frame,
+the mean of their samples. A frame joins it in the way it reuses neighbours itself:
+where it shows something else, or other light, the pixel's history begins anew.
 """
 
 from __future__ import annotations
@@ -42,9 +42,12 @@ class History:
         return next(iter(self.views.values())).number
 
     def advance(self, window: Mapping[int, Mapping[str, Stored]]) -> None:
-        """Take in what was in the window before, and lies before all of it now.
+        """Add the frames that have left the window to the history.
 
-        `window` are frames by number, their views by name.
+        Parameters
+        ----------
+        window : mapping of int to mapping of str to Stored
+            Frames of the new window by number, their views by name.
         """
         first = min(window)
         for number in sorted(n for n in self._window if n < first):
@@ -55,14 +58,34 @@ class History:
 
 
 def extended(history: Stored | None, frame: Stored, movement: Movement) -> Stored:
-    """Return a history with the samples of a frame that comes after it."""
+    """Add the samples of a frame to the history before it.
+
+    Parameters
+    ----------
+    history : Stored or None
+        The history of a view; None where it begins.
+    frame : Stored
+        A later frame.
+    movement : Movement
+        Cache of the shot's object motion.
+
+    Returns
+    -------
+    history : Stored
+        The mean of the samples of both, with the frame's number.
+    """
     if history is None:
         return frame
-    found = accumulate(frame, [history], movement)
+    accumulated = accumulate(frame, [history], movement)
     own = sample_counts(frame)
-    total = found.samples.ravel()
+    total = accumulated.samples.ravel()
     counts = np.minimum(total, own * LONGEST)
-    passes = found.radiance, found.albedo, found.normal, found.alpha
+    passes = (
+        accumulated.radiance,
+        accumulated.albedo,
+        accumulated.normal,
+        accumulated.alpha,
+    )
     picture, invalid = pack(*passes)
     share = np.where(total > 0.0, own / np.maximum(total, 1e-9), 1.0)
     noise = frame.noise
@@ -75,5 +98,5 @@ def extended(history: Stored | None, frame: Stored, movement: Movement) -> Store
         picture=picture,
         invalid=invalid if invalid.any() else None,
         noise=noise,
-        parts=pack_parts(found.parts),
+        parts=pack_parts(accumulated.parts),
     )

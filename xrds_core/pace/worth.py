@@ -1,9 +1,9 @@
-"""What a sample of a neighbour is worth beside one of a frame's own, in a shot.
+"""The value of a neighbour: of its samples beside a frame's own, in a shot.
 
 It is measured in the first frame, again in the first one beyond its neighbours, in the
-20th, and then each time that the shot is twice as far: so chance counts less and
-less, and the seconds of measuring are soon a small part of the shot's. Where a small
-picture shows more chance than anything else, what other shots have shown counts.
+20th, and then each time that the shot is twice as far: so chance counts less and less,
+and the seconds of measuring are soon a small part of the shot's. Where a small picture
+shows more chance than anything else, what other shots have shown counts.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _USUAL, _SPREAD = 0.45, 0.25
 # No ratio is better known than this, relative to it: errors do not fall quite with
 # `FALL`, nor does every measure of them see the same.
 _EXACT = 0.06
-_CAUTION = 0.16  # probability that it is worth less: the mean less its standard error
+_CAUTION = 0.16  # probability of a lower value: the mean less its standard error
 FALL = 0.7
 """The error of a denoised picture falls with about this power of its samples."""
 _STEPS = np.linspace(0.0, 1.0, 201)
@@ -32,7 +32,12 @@ _STEPS = np.linspace(0.0, 1.0, 201)
 class Ratio(NamedTuple):
     """The squared error of fewer samples with neighbours over that of all without.
 
-    `spread` is its standard error.
+    Attributes
+    ----------
+    value : float
+        The ratio.
+    spread : float
+        Its standard error.
     """
 
     value: float
@@ -41,7 +46,7 @@ class Ratio(NamedTuple):
 
 @dataclass
 class Worth:
-    """The worth, from 0 to 1, of the samples of neighbours in one shot."""
+    """The value, from 0 to 1, of the samples of neighbours in one shot."""
 
     _likelihoods: list[np.ndarray] = field(default_factory=list)
     _neighbours: int = 0
@@ -55,10 +60,22 @@ class Worth:
         return self._frames >= self._next or more
 
     def add(self, ratio: Ratio, share: float, gain: float, neighbours: int) -> None:
-        """Take in what was measured in a frame that has a `share` of all samples.
+        """Add the measurement of a frame.
 
-        With its `neighbours` it has `gain` times its own. Fewer of them lie on one side
-        only, and are worth less: they no longer count.
+        Where a frame has few neighbours these lie on one side only and are less
+        valuable: earlier measurements with fewer neighbours are dropped.
+
+        Parameters
+        ----------
+        ratio : Ratio
+            Squared error of the frame with its neighbours over that of one of all
+            samples.
+        share : float
+            Share of all samples that the frame has.
+        gain : float
+            How many times its own samples the frame has with its neighbours.
+        neighbours : int
+            How many neighbours it has.
         """
         if neighbours > self._neighbours:
             self._likelihoods.clear()
@@ -72,7 +89,7 @@ class Worth:
 
     @property
     def value(self) -> float:
-        """What it is at least, but for chance; 0 where noise has hidden all errors."""
+        """A cautious estimate; 0 where noise has hidden all errors."""
         if not self._likelihoods:
             return 0.0
         usual = -0.5 * np.square((_STEPS - _USUAL) / _SPREAD)
@@ -89,7 +106,10 @@ _LATER = 1.1  # times Cycles' seconds, from which it is said
 class Clock:
     """Seconds of the frames of a shot, and what Cycles alone would take for them.
 
-    Cycles' denoiser takes about as long as ours for one picture: `denoising`.
+    Attributes
+    ----------
+    denoising : float
+        Seconds of our denoiser for one picture; Cycles' takes about as long.
     """
 
     denoising: float = 0.0
@@ -99,7 +119,7 @@ class Clock:
     _is_said: bool = False
 
     def leave_out(self, now: float) -> None:
-        """A frame was measured in, which takes longer than others.
+        """Leave out a frame that was measured in, which takes longer than others.
 
         Those before it had other samples than those that come, often more.
         """
@@ -108,9 +128,16 @@ class Clock:
         self._theirs.clear()
 
     def add(self, now: float, seconds: Mapping[str, float], share: float) -> None:
-        """Note a frame that took `seconds` by stage for a `share` of all samples.
+        """Note a frame; one line is printed where frames take longer than Cycles would.
 
-        One line is printed where frames take longer than Cycles would.
+        Parameters
+        ----------
+        now : float
+            The time, in seconds.
+        seconds : mapping of str to float
+            What the frame took, by stage.
+        share : float
+            Share of all samples that it was rendered with.
         """
         if self._last is not None:
             sampling = seconds.get("beauty", 0.0) / share

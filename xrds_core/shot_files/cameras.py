@@ -167,10 +167,24 @@ def has_camera(header: Mapping[str, Any]) -> bool:
 
 
 def from_header(header: Mapping[str, Any], size: tuple[int, int]) -> Camera | None:
-    """Return the camera that a header describes; None without the attributes.
+    """Read the camera that a header describes.
 
-    `size` is (width, height) of the display window. Raises ValueError for values that
-    describe no camera.
+    Parameters
+    ----------
+    header : mapping
+        Attributes of a file.
+    size : tuple of int
+        Width and height of the display window.
+
+    Returns
+    -------
+    camera : Camera or None
+        None without the attributes of a camera.
+
+    Raises
+    ------
+    ValueError
+        If the values describe no camera.
     """
     if not has_camera(header):
         return None
@@ -214,7 +228,7 @@ def _project(seen: Matrix, perspective: bool) -> Matrix:
 
 
 def to_json(camera: Camera) -> dict[str, Any]:
-    """Return a camera as `read_cameras` reads it; not of a panorama."""
+    """Return a camera in the form of a JSON file of cameras; not of a panorama."""
     return {
         "to_world": np.linalg.inv(camera.view).tolist(),
         "project": camera.project.tolist(),
@@ -223,15 +237,33 @@ def to_json(camera: Camera) -> dict[str, Any]:
 
 
 def read_cameras(path: Path) -> dict[int | None, dict[str, Any]]:
-    """Read cameras by frame number from a JSON file; None is for all other frames.
+    """Read cameras by frame number from a JSON file.
 
-    An object from frame numbers, or "all", to cameras: `to_world`, 4 rows of 4 numbers,
-    is the transform to world space from that of a camera that looks along -Z, Y up (the
-    columns are its axes and its position); `focal_length` and `sensor_width` in one
-    unit, or `ortho_width` in the world's; optional `shift`, two fractions of the width
-    by which the frame is moved right and up. Instead of these `project`, 4 rows of 4
-    numbers, is the transform from camera space to OpenGL clip space. No samples are
-    reused between cameras with different `name`s. Raises UsageError.
+    The file holds an object from frame numbers, or "all", to cameras with these keys:
+
+    - `to_world`, 4 rows of 4 numbers: the transform to world space from that of a
+      camera that looks along -Z, Y up (its columns are the camera's axes and position);
+    - `focal_length` and `sensor_width` in one unit, or `ortho_width` in the world's;
+    - optional `shift`, two fractions of the width by which the frame is moved right and
+      up;
+    - instead of these `project`, 4 rows of 4 numbers: the transform from camera space
+      to OpenGL clip space;
+    - optional `name`: no samples are reused between cameras with different names.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    cameras : dict of int or None to dict
+        Entries by frame number; None is for all other frames.
+
+    Raises
+    ------
+    UsageError
+        If the file cannot be read or holds no cameras.
     """
     try:
         entries = json.loads(read_stream(path, _MOST_BYTES).decode("utf-8"))
@@ -253,10 +285,28 @@ def camera_of_frame(
     size: tuple[int, int],
     aspect: float = 1.0,
 ) -> Camera | None:
-    """Return the camera of a frame from those of `read_cameras`, or None.
+    """Return the camera of a frame.
 
-    `size` is (width, height) of the display window, `aspect` a pixel's width over its
-    height. Raises ValueError if the two together give no camera.
+    Parameters
+    ----------
+    cameras : mapping
+        What `read_cameras` returns.
+    number : int
+        Frame number.
+    size : tuple of int
+        Width and height of the display window.
+    aspect : float
+        A pixel's width over its height.
+
+    Returns
+    -------
+    camera : Camera or None
+        None where the file has no camera for this frame.
+
+    Raises
+    ------
+    ValueError
+        If the entry and the size together give no camera.
     """
     entry = cameras.get(number, cameras.get(None))
     return None if entry is None else _camera(entry, size, aspect)

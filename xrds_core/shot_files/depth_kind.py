@@ -52,9 +52,12 @@ _NO_FIT = (
 
 
 class DepthKind:
-    """Looks at the frames of a shot, as long as nothing is known.
+    """Looks at the frames of a shot, as long as nothing is known of their depth.
 
-    `say` takes one line about a depth that is of another kind.
+    Parameters
+    ----------
+    say : callable
+        Takes one line of text about a depth that is of another kind.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
@@ -68,17 +71,28 @@ class DepthKind:
             return
         self._left -= 1
         with np.errstate(all="ignore"):  # depths may be anything
-            found = kind_of(own) or (others and unit_of(own, others[-1]))
-        if found:
+            mismatch = kind_of(own) or (others and unit_of(own, others[-1]))
+        if mismatch:
             self._left = 0
             self._say(
-                f"the depth of frame {own.number} {found}; as it is, few "
+                f"the depth of frame {own.number} {mismatch}; as it is, few "
                 "samples of neighbours are reused: convert it, or render Position"
             )
 
 
 def kind_of(frame: Stored) -> str:
-    """Say how a depth differs from one along the axis by its normals; "" if it fits."""
+    """Say how a depth differs from one along the camera's axis, by its normals.
+
+    Parameters
+    ----------
+    frame : Stored
+        A frame with a perspective camera.
+
+    Returns
+    -------
+    mismatch : str
+        A phrase; "" if the depth fits or nothing can be said.
+    """
     pairs = _surface(frame)
     if pairs.shape[1] < _FEWEST:
         return ""
@@ -104,7 +118,18 @@ def kind_of(frame: Stored) -> str:
 
 
 def unit_of(frame: Stored, other: Stored) -> str:
-    """Say by which factor the depth of two frames fits their cameras; "" for 1."""
+    """Say by which factor depths have to be multiplied to fit the cameras.
+
+    Parameters
+    ----------
+    frame, other : Stored
+        Two frames of a shot.
+
+    Returns
+    -------
+    mismatch : str
+        A phrase; "" if the depth fits or nothing can be said.
+    """
     if frame.shape != other.shape:
         return ""
     spots = spread(np.flatnonzero(frame.inverse_depth > 0.0), _SPOTS)
@@ -117,9 +142,9 @@ def unit_of(frame: Stored, other: Stored) -> str:
 
     def misfit(factor: float) -> float:
         inverse = frame.inverse_depth[spots] / np.float32(factor)
-        there = nearest(*reproject(transform, x, y, inverse)[:2], frame.shape)
-        apart = np.abs(own - floats(beside[there.pixel])).mean(axis=-1)
-        return float(np.where(there.seen, np.minimum(apart, _MOST), _MOST).mean())
+        places = nearest(*reproject(transform, x, y, inverse)[:2], frame.shape)
+        apart = np.abs(own - floats(beside[places.pixel])).mean(axis=-1)
+        return float(np.where(places.seen, np.minimum(apart, _MOST), _MOST).mean())
 
     as_it_is = misfit(1.0)
     if as_it_is < _DIFFERS:
@@ -150,8 +175,11 @@ def _surface(frame: Stored) -> Pixels:
     inner = np.arange(height * width).reshape(height, width)[:-1, :-1]
     pixels = spread(inner.ravel(), 8 * _SPOTS)
     pairs = np.stack((pixels, pixels + width + 1))
-    one, two = frame.inverse_depth[pairs]
-    close = (np.abs(one - two) < _NEAR * np.minimum(one, two)) & (one > 0.0)
+    first_depth, second_depth = frame.inverse_depth[pairs]
+    close = (
+        np.abs(first_depth - second_depth)
+        < _NEAR * np.minimum(first_depth, second_depth)
+    ) & (first_depth > 0.0)
     first, second = floats(frame.picture[pairs][..., frame.normals])
     smooth = (first * second).sum(axis=-1) > _SMOOTH
     return pairs[:, spread(np.flatnonzero(close & smooth), _SPOTS)]

@@ -20,7 +20,7 @@ from ..exr.raw_header import is_mostly_empty
 from ..frames import MOST_RADIUS, frame_path
 from . import cameras
 from .cameras import camera_of_frame, from_header, has_camera
-from .pass_names import Found, PassNames, find
+from .pass_names import PassChannels, PassNames, find_passes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -47,13 +47,27 @@ _CENTRE = Camera(np.eye(4), np.eye(4), (1, 1))  # placeholder where none is need
 class Reading:
     """Options for reading files, for what they do not say themselves.
 
-    `cameras` are those of `cameras.read_cameras`; `samples` per pixel; `normal_space`
-    and `position_space` are `world` or `camera`, None for what the passes' names say;
-    `motion_scale` are the factors that convert a motion pass of two channels to pixels
-    to the next frame, x to the right and y upwards. `halves` is a pattern of files with
-    the second half buffers: as many other samples of each frame. `light` are the parts
-    of the light that are read as well; `also` are patterns of files with further
-    passes. The picture of one without passes is called as the file without the number.
+    Attributes
+    ----------
+    names : PassNames
+        What passes are called.
+    cameras : mapping or None
+        What `cameras.read_cameras` returns; None for the cameras of the headers.
+    samples : int or None
+        Samples per pixel.
+    normal_space, position_space : {'world', 'camera'} or None
+        None for what the passes' names say.
+    motion_scale : tuple of float
+        Factors that convert a motion pass of two channels to pixels to the next frame,
+        x to the right and y upwards.
+    halves : str or None
+        Pattern of files with the second half buffers: as many other samples of each
+        frame.
+    light : Wanted
+        AOVs and light passes to read as well.
+    also : tuple of str
+        Patterns of files with further passes. The picture of one without passes is
+        called by the file's name without the number.
     """
 
     names: PassNames = field(default_factory=PassNames)
@@ -69,18 +83,38 @@ class Reading:
 
 @dataclass(frozen=True)
 class FrameFile:
-    """A frame of a file.
+    """A frame read from a file.
 
-    `stored` covers the display window and all that the picture's data window has
-    beyond it, or, of a frame that is not to be reused, the data window alone; `inner`
-    crops its arrays to the latter, `data_window`. `part` is the file's part with the
-    picture and `channels` are those of the picture, R, G, B and, where the file has
-    alpha, A. Frames with the same `key` have the same render settings; "" if unknown.
-    `radius` is the one that the file recommends, or None, and `subset` that of
-    `Frame`. `reusable` is False where the frame cannot be reprojected. `light` are the
-    parts of its light that were read; `places` says in which part of the file a channel
-    lies, and what it is called there.
-    `others` are the other views of a stereo file, `unread` says why some are not read.
+    Attributes
+    ----------
+    stored : Stored
+        Covers the display window and all that the picture's data window has beyond it;
+        for a frame that is not to be reused, the data window alone.
+    inner : tuple of slice
+        Crops the arrays of `stored` to `data_window`.
+    data_window : Window
+        Data window of the picture.
+    part : int
+        The file's part with the picture.
+    channels : list of str
+        Channels of the picture: R, G, B and, where the file has alpha, A.
+    key : str
+        Frames with the same key have the same render settings; "" if unknown.
+    radius : int or None
+        The temporal radius that the file recommends.
+    reusable : bool
+        False where the frame cannot be reprojected.
+    subset : int or None
+        `Frame.subset`.
+    light : tuple of LightPart
+        AOVs and light passes that were read.
+    places : mapping of str to (int, str)
+        The part of the file that a channel of `light` lies in, and what it is called
+        there.
+    others : mapping of str to FrameFile
+        The other views of a stereo file.
+    unread : mapping of str to str
+        Why some views are not read.
     """
 
     stored: Stored
@@ -101,10 +135,31 @@ class FrameFile:
 def read_frame(
     path: Path, number: int, reading: Reading, *, reusable: bool = True
 ) -> FrameFile:
-    """Read a frame; one that need not be `reusable` needs no camera and no depth.
+    """Read a frame; of a stereo file the first view, with the others in `others`.
 
-    Of a stereo file it is the first view, with the `others`. Raises Unfit, also
-    NotReusable, with the path and the remedy, and PictureError for an incomplete file.
+    Parameters
+    ----------
+    path : Path
+        The file.
+    number : int
+        Frame number.
+    reading : Reading
+        Options.
+    reusable : bool
+        False for a frame that needs no camera and no depth.
+
+    Returns
+    -------
+    frame : FrameFile
+
+    Raises
+    ------
+    NotReusable
+        If the frame can be denoised by itself, but not be reprojected.
+    Unfit
+        If the file lacks a pass, with the path and the remedy.
+    PictureError
+        If the file is incomplete.
     """
     first, *rest = File(path, _also(path, number, reading)).views()
     frame = _read_view(first, number, reading, reusable)
@@ -118,32 +173,32 @@ def read_frame(
 
 
 def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> FrameFile:
-    found = find(file.names, reading.names)
-    number_of_part, channels = _target(file, found)
+    passes = find_passes(file.names, reading.names)
+    number_of_part, channels = _target(file, passes)
     part = file.parts[number_of_part]
     file.window = _window(file.path, part) if reusable else part.data_window
-    camera, depth = _geometry(file, part, found, number, reading, reusable)
-    beauty = _stack(file, found.beauty)
-    light = find_parts(file.names, _layer(found), reading.light)
+    camera, depth = _geometry(file, part, passes, number, reading, reusable)
+    beauty = _stack(file, passes.beauty)
+    light = find_parts(file.names, _layer(passes), reading.light)
     frame = Frame(
         number=number,
         camera=camera or _CENTRE,
         radiance=beauty,
-        albedo=_guide(_stack(file, found.albedo)),
-        normal=_guide(_normal(file, found, camera, reading)),
+        albedo=_guide(_stack(file, passes.albedo)),
+        normal=_guide(_normal(file, passes, camera, reading)),
         depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
         samples=_samples(file, part, reading),
-        alpha=file.plane(found.alpha) if found.alpha else None,
-        vector=_vector(file, found, reading) if reusable else None,
+        alpha=file.plane(passes.alpha) if passes.alpha else None,
+        vector=_vector(file, passes, reading) if reusable else None,
         still=cameras.whole_or_none(part.attributes.get(STILL)) == 1,
         parts=_light(file, light),
-        **_others(file, found),
+        **_others(file, passes),
     )
     if reading.halves is not None:
         frame = _with_other_half(frame, file, camera, reading)
     stored = store(frame)
-    if reading.halves is None and found.noise:
-        stored = replace(stored, noise=_noise(file, found))
+    if reading.halves is None and passes.noise:
+        stored = replace(stored, noise=_noise(file, passes))
     return FrameFile(
         stored=stored,
         inner=_inner(file.window, part.data_window),
@@ -157,32 +212,32 @@ def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> Fra
         light=light,
         places={
             name: _place(file, number_of_part, name)
-            for each in light
-            for name in (*each.channels, *each.colour)
+            for light_part in light
+            for name in (*light_part.channels, *light_part.colour)
         },
     )
 
 
 def _also(path: Path, number: int, reading: Reading) -> dict[str, Path]:
     """The files that belong to a frame's, by their names without its number."""
-    found = {}
+    files = {}
     for pattern in reading.also:
         other = frame_path(pattern, number)
         if not other.is_file():
             raise PictureError(f"there is no file {other}, which belongs to {path}")
-        found[Path(pattern).stem.partition("#")[0].rstrip("._-")] = other
-    return found
+        files[Path(pattern).stem.partition("#")[0].rstrip("._-")] = other
+    return files
 
 
 def _place(file: File, part: int, name: str) -> tuple[int, str]:
     """Where a channel is written to: what lies in other files is added to a `part`."""
-    there, own = file.place(name)
-    return (there, own) if there < file.own_parts else (part, name)
+    source_part, own_name = file.place(name)
+    return (source_part, own_name) if source_part < file.own_parts else (part, name)
 
 
-def _layer(found: Found) -> str:
+def _layer(passes: PassChannels) -> str:
     """The layer that the noisy radiance lies in; "" where it lies in none."""
-    return found.beauty[0].rpartition(".")[0].rpartition(".")[0]
+    return passes.beauty[0].rpartition(".")[0].rpartition(".")[0]
 
 
 def _light(file: File, parts: Sequence[LightPart]) -> dict[str, Array]:
@@ -197,22 +252,22 @@ def _with_other_half(
     path = frame_path(reading.halves, frame.number)
     if not path.is_file():
         raise PictureError(f"there is no file {path}, the frame's other half")
-    views = {each.view: each for each in File(path).views()}
+    views = {half.view: half for half in File(path).views()}
     other = views.get(file.view)
     if other is None:
         raise Unfit(f"{path} is no half of {file.path}: it lacks the view {file.view}")
-    found = find(other.names, reading.names)
-    part = other.parts[_target(other, found)[0]]
+    passes = find_passes(other.names, reading.names)
+    part = other.parts[_target(other, passes)[0]]
     same_size = part.display_window == file.parts[0].display_window
-    if not same_size or (found.alpha is None) != (frame.alpha is None):
+    if not same_size or (passes.alpha is None) != (frame.alpha is None):
         raise Unfit(f"{path} is no half of {file.path}: its size or alpha differs")
     other.window = file.window
-    light = find_parts(other.names, _layer(found), reading.light)
+    light = find_parts(other.names, _layer(passes), reading.light)
     second = Passes(
-        radiance=_stack(other, found.beauty),
-        albedo=_guide(_stack(other, found.albedo)),
-        normal=_guide(_normal(other, found, camera, reading)),
-        alpha=other.plane(found.alpha) if found.alpha else None,
+        radiance=_stack(other, passes.beauty),
+        albedo=_guide(_stack(other, passes.albedo)),
+        normal=_guide(_normal(other, passes, camera, reading)),
+        alpha=other.plane(passes.alpha) if passes.alpha else None,
         parts=_light(other, light),
     )
     if second.parts.keys() != frame.parts.keys():
@@ -234,7 +289,12 @@ _REMEDY = {
 
 
 def _geometry(
-    file: File, part: Part, found: Found, number: int, reading: Reading, reusable: bool
+    file: File,
+    part: Part,
+    passes: PassChannels,
+    number: int,
+    reading: Reading,
+    reusable: bool,
 ) -> tuple[Camera | None, Array | None]:
     """Camera and depth; if not `reusable`, a camera if there is one, and no depth.
 
@@ -248,7 +308,7 @@ def _geometry(
         camera = None
     if not reusable:
         return camera, None
-    depth = None if camera is None else _depth(file, found, camera, reading)
+    depth = None if camera is None else _depth(file, passes, camera, reading)
     if camera is None or depth is None:
         lacking = "camera" if camera is None else "depth"
         raise NotReusable(f"{file.path} has no {lacking}", _REMEDY[lacking])
@@ -280,20 +340,22 @@ def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | N
 
 def _header_with_camera(file: File, part: Part) -> Attributes:
     """The part's header, or else that of the first part that holds a camera."""
-    headers = [part.attributes, *(each.attributes for each in file.parts)]
-    return next((x for x in headers if has_camera(x)), part.attributes)
+    headers = [part.attributes, *(other.attributes for other in file.parts)]
+    return next((header for header in headers if has_camera(header)), part.attributes)
 
 
-def _depth(file: File, found: Found, camera: Camera, reading: Reading) -> Array | None:
+def _depth(
+    file: File, passes: PassChannels, camera: Camera, reading: Reading
+) -> Array | None:
     """Depth (H, W) along the camera's axis, infinite without a hit."""
-    position, depth = found.position, found.depth
+    position, depth = passes.position, passes.depth
     if depth and position and _is_half(file, position):
         position = []  # half floats give positions only to centimetres
     if not position:
         if not depth:
             return None
         plane = file.plane(depth[0])
-        if found.has_length:
+        if passes.has_length:
             height, width = plane.shape
             plane = plane * camera.depth_per_length((height, width))
         return _from_depth(plane)
@@ -317,11 +379,11 @@ def _from_depth(depth: Array) -> Array:
     return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
 
 
-def _others(file: File, found: Found) -> dict[str, Any]:
+def _others(file: File, passes: PassChannels) -> dict[str, Any]:
     """The passes that have one name alone."""
     return {
         name: _stack(file, names) if LAYOUT[name].channels else file.plane(names[0])
-        for name, names in found.others.items()
+        for name, names in passes.others.items()
     }
 
 
@@ -332,10 +394,12 @@ def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
         return
     spots = seen[:: max(1, seen.size // _SPOTS)]
     world = points.reshape(-1, 3)[spots].astype(np.float64)
-    there = pixels_of(camera) @ np.column_stack((world, np.ones(len(world)))).T
+    projected = pixels_of(camera) @ np.column_stack((world, np.ones(len(world)))).T
     x, y = centres(spots, depth.shape[1])
     with np.errstate(all="ignore"):  # a wrong camera may be at a point, or far off
-        apart = np.hypot(there[0] / there[2] - x, there[1] / there[2] - y)
+        apart = np.hypot(
+            projected[0] / projected[2] - x, projected[1] / projected[2] - y
+        )
         off = float(np.median(apart))
     if not off < _FITS:
         raise NotReusable(
@@ -345,12 +409,14 @@ def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
         )
 
 
-def _normal(file: File, found: Found, camera: Camera | None, reading: Reading) -> Array:
-    """Normals in the camera's axes, Z away from the viewer, as Cycles' guides."""
-    normal = _stack(file, found.normal)
+def _normal(
+    file: File, passes: PassChannels, camera: Camera | None, reading: Reading
+) -> Array:
+    """Return normals in the camera's axes, Z away from the viewer."""
+    normal = _stack(file, passes.normal)
     space = reading.normal_space
     if space is None:
-        space = "camera" if found.has_camera_normal else "world"
+        space = "camera" if passes.has_camera_normal else "world"
     if space == "camera" or camera is None:
         return normal
     turn = np.diag([1.0, 1.0, -1.0]) @ camera.view[:3, :3]
@@ -358,20 +424,20 @@ def _normal(file: File, found: Found, camera: Camera | None, reading: Reading) -
         return normal @ turn.T.astype(np.float32)
 
 
-def _vector(file: File, found: Found, reading: Reading) -> Array | None:
+def _vector(file: File, passes: PassChannels, reading: Reading) -> Array | None:
     """Cycles' Vector pass, or one of one direction: motion is assumed to be uniform."""
-    if not found.vector:
+    if not passes.vector:
         return None
-    motion = _stack(file, found.vector)
+    motion = _stack(file, passes.vector)
     if motion.shape[-1] == 2:
         motion = motion * np.array(reading.motion_scale, np.float32)
         return -np.concatenate((motion, motion), axis=-1)
     return motion
 
 
-def _noise(file: File, found: Found) -> Noise:
+def _noise(file: File, passes: PassChannels) -> Noise:
     """The noise of a frame as XRDS stored it."""
-    return Noise.of(*(file.plane(name) for name in found.noise))
+    return Noise.of(*(file.plane(name) for name in passes.noise))
 
 
 def _samples(file: File, part: Part, reading: Reading) -> float:
@@ -382,9 +448,9 @@ def _samples(file: File, part: Part, reading: Reading) -> float:
     if isinstance(mean, float) and 1.0 <= mean <= cameras.MOST:
         return mean
     values = []
-    for each in (part, *file.parts):  # renderers may tell the first part alone
-        values.append(each.attributes.get(SAMPLES))
-        values += [v for k, v in each.attributes.items() if _is_cycles_samples(k)]
+    for file_part in (part, *file.parts):  # renderers may tell the first part alone
+        values.append(file_part.attributes.get(SAMPLES))
+        values += [v for k, v in file_part.attributes.items() if _is_cycles_samples(k)]
     counts = [cameras.whole_or_none(x, 1) for x in values]
     return next((x for x in counts if x is not None), _DEFAULT_SAMPLES)
 
@@ -393,12 +459,12 @@ def _is_cycles_samples(name: str) -> bool:
     return name.startswith("cycles.") and name.endswith(".samples")
 
 
-def _target(file: File, found: Found) -> tuple[int, list[str]]:
+def _target(file: File, passes: PassChannels) -> tuple[int, list[str]]:
     """Return the part that the picture is written to, and its channels' names there.
 
     Raises Unfit where it lies in another file than the one that is copied.
     """
-    part, names = _target_of_all(file, found)
+    part, names = _target_of_all(file, passes)
     if part >= file.own_parts:
         raise Unfit(
             f"the picture of {file.path} lies in a file of --also: give that file as "
@@ -407,20 +473,20 @@ def _target(file: File, found: Found) -> tuple[int, list[str]]:
     return part, names
 
 
-def _target_of_all(file: File, found: Found) -> tuple[int, list[str]]:
-    prefix = found.picture[0].rpartition(".")[0]
+def _target_of_all(file: File, passes: PassChannels) -> tuple[int, list[str]]:
+    prefix = passes.picture[0].rpartition(".")[0]
     alpha = f"{prefix}.A" if prefix else "A"
-    wanted = [*found.picture, alpha] if found.alpha is not None else found.picture
-    there = [name for name in wanted if name in file.names.names]
-    parts = {file.place(name)[0] for name in there}
+    wanted = [*passes.picture, alpha] if passes.alpha is not None else passes.picture
+    present = [name for name in wanted if name in file.names.names]
+    parts = {file.place(name)[0] for name in present}
     if len(parts) > 1:
         raise Unfit(
-            f"{file.path} holds {', '.join(there)} in several parts; save them in one"
+            f"{file.path} holds {', '.join(present)} in several parts; save them in one"
         )
     if not parts:
         names = [_in_layer(file.view, x.rpartition(".")[2]) for x in wanted]
-        return file.place(found.beauty[0])[0], names
-    ahead = file.place(there[0])[1].rpartition(".")[0]
+        return file.place(passes.beauty[0])[0], names
+    ahead = file.place(present[0])[1].rpartition(".")[0]
     return parts.pop(), [_in_layer(ahead, x.rpartition(".")[2]) for x in wanted]
 
 
@@ -428,10 +494,10 @@ def _in_layer(layer: str, letter: str) -> str:
     return f"{layer}.{letter}" if layer else letter
 
 
-def _guide(x: Array) -> Array:
+def _guide(guide: Array) -> Array:
     """Guides without NaN: a sky may have no normal, and its light is valid anyway."""
-    known = np.isfinite(x).all(axis=-1, keepdims=True)
-    return x if known.all() else np.where(known, x, np.float32(0.0))
+    known = np.isfinite(guide).all(axis=-1, keepdims=True)
+    return guide if known.all() else np.where(known, guide, np.float32(0.0))
 
 
 def _stack(file: File, names: list[str]) -> Array:

@@ -20,10 +20,26 @@ if TYPE_CHECKING:
 
 
 class Loader:
-    """Reads frames; `failed` holds the reasons for unreadable ones, by number.
+    """Reads the frames of a sequence.
 
     A frame that is damaged or lacks passes is left out, and the others go on without
     it. But what the first two lack is assumed to be missing in all: that is raised.
+
+    Parameters
+    ----------
+    pattern : str
+        Path of the files, with # for the digits of the frame number.
+    recipe : Recipe
+        The files of each frame, and how they are read.
+    reusable : bool
+        False for frames that need no camera and no depth.
+    say : callable
+        Takes one line of text about a frame.
+
+    Attributes
+    ----------
+    failed : dict of int to str
+        Why frames were not read, by number.
     """
 
     def __init__(
@@ -43,9 +59,17 @@ class Loader:
         self._any_is_fit = False
         self._seconds = 0.0
 
-    def look(self, numbers: Sequence[int], there: Container[int]) -> None:
-        """Report frames without a file, in one line; `there` are those with one."""
-        missing = [n for n in numbers if n not in there]
+    def look(self, numbers: Sequence[int], existing: Container[int]) -> None:
+        """Report frames without a file, in one line.
+
+        Parameters
+        ----------
+        numbers : sequence of int
+            The frames.
+        existing : container of int
+            Those with a file.
+        """
+        missing = [n for n in numbers if n not in existing]
         paths = {n: frame_path(self._pattern, n) for n in missing}
         self.failed |= {n: f"no file {path}" for n, path in paths.items()}
         self._ahead |= dict.fromkeys(missing)
@@ -54,9 +78,22 @@ class Loader:
             self._say(f"left out for lack of a file, such as {first}: frames {which}")
 
     def first(self, numbers: Iterable[int]) -> FrameFile | None:
-        """Return the first frame of `numbers` that can be read; None if none can.
+        """Load the first frame that can be read.
 
-        Raises Unfit if the first two are unfit, or the only one is.
+        Parameters
+        ----------
+        numbers : iterable of int
+            Frame numbers.
+
+        Returns
+        -------
+        frame : FrameFile or None
+            None if no frame can be read.
+
+        Raises
+        ------
+        Unfit
+            If the first two are unfit, or the only one is.
         """
         unfit: Unfit | None = None
         for number in numbers:
@@ -127,10 +164,15 @@ class Loader:
 
 
 class NeighbourSelection:
-    """Leaves out neighbours of another size, with other passes, or of another render.
+    """Leaves out neighbours whose samples cannot be reused.
 
-    And those that have the same noise. `say` takes a line about each frame that does
-    not fit its neighbours, once, and about depths of another kind.
+    Those have another size, other passes, the same noise, or come from another render.
+
+    Parameters
+    ----------
+    say : callable
+        Takes one line of text about each frame that does not fit its neighbours, and
+        about depths of another kind.
     """
 
     def __init__(self, say: Callable[[str], object]) -> None:
@@ -143,7 +185,22 @@ class NeighbourSelection:
     def select(
         self, number: int, own: FrameFile, beside: Mapping[int, FrameFile]
     ) -> list[Stored]:
-        """Return the neighbours whose samples frame `number` reuses, in their order."""
+        """Select the neighbours whose samples a frame reuses.
+
+        Parameters
+        ----------
+        number : int
+            Frame number.
+        own : FrameFile
+            The frame.
+        beside : mapping of int to FrameFile
+            Its neighbours.
+
+        Returns
+        -------
+        neighbours : list of Stored
+            In the order of `beside`.
+        """
         if not own.reusable:
             return []
         fitting = [
@@ -176,18 +233,18 @@ class NeighbourSelection:
         return not why
 
 
-def _difference(one: FrameFile, two: FrameFile) -> str:
+def _difference(own: FrameFile, other: FrameFile) -> str:
     """Return why two frames cannot share samples; "" if they can."""
-    if one.stored.shape != two.stored.shape:
-        old, new = (f"{w}x{h}" for h, w in (one.stored.shape, two.stored.shape))
+    if own.stored.shape != other.stored.shape:
+        old, new = (f"{w}x{h}" for h, w in (own.stored.shape, other.stored.shape))
         return f"their sizes are {old} and {new} pixels"
-    if one.stored.picture.shape[1] != two.stored.picture.shape[1]:
+    if own.stored.picture.shape[1] != other.stored.picture.shape[1]:
         return "one has alpha, the other has not"
-    if one.stored.parts.keys() != two.stored.parts.keys():
+    if own.stored.parts.keys() != other.stored.parts.keys():
         return "they hold different parts of the light"
-    if one.key != two.key:
+    if own.key != other.key:
         return "they were rendered from other files or with other settings"
-    if one.subset is not None and one.subset == two.subset:
+    if own.subset is not None and own.subset == other.subset:
         return (
             "they have the same noise, of frames in other steps; render both with the "
             "frames of the whole shot"

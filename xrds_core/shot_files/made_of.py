@@ -31,26 +31,48 @@ State = tuple[tuple[str, int, int, str] | None, ...]
 
 @dataclass(frozen=True)
 class Recipe:
-    """What all frames are made of: patterns of their files, options, and settings."""
+    """What all frames are made of.
+
+    Attributes
+    ----------
+    patterns : tuple of str
+        Patterns of the files of a frame.
+    reading : Reading
+        How they are read.
+    settings : tuple
+        Settings that change the picture.
+    """
 
     patterns: tuple[str, ...]
     reading: Reading
     settings: tuple[object, ...]
 
     def state(self, number: int) -> State:
-        """The files of a frame, as they are now."""
-        return tuple(_state(frame_path(x, number)) for x in self.patterns)
+        """Return the state of a frame's files, as they are now."""
+        return tuple(_state(frame_path(pattern, number)) for pattern in self.patterns)
 
     def digest(self, states: Mapping[int, State], number: int) -> str:
-        """Of a frame, from the `states` of its files and of its neighbours'."""
+        """Return a digest of what a frame is made of.
+
+        Parameters
+        ----------
+        states : mapping of int to State
+            States of the files of the frame and of its neighbours.
+        number : int
+            Frame number.
+
+        Returns
+        -------
+        digest : str
+        """
         cameras = self.reading.cameras or {}
         seen = {n: cameras.get(n, cameras.get(None)) for n in states}
         # the states tell which files these are
         halves = self.reading.halves and "given"
         reading = replace(self.reading, cameras=None, halves=halves, also=())
         parts = (number, sorted(states.items()), sorted(seen.items()))
-        told = repr((*parts, reading, self.settings))
-        return hashlib.blake2b(told.encode(), digest_size=16).hexdigest()
+        text = repr((*parts, reading, self.settings))
+        return hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
 
 
 def is_made_of(path: Path, digest: str) -> bool:
@@ -66,7 +88,7 @@ def is_complete(path: Path) -> bool:
 def _digests(path: Path) -> list[str | None]:
     """Return those of all parts; none of a file that is damaged."""
     try:
-        return [each.get(MADE_OF) for each in exr.attributes(path)]
+        return [attributes.get(MADE_OF) for attributes in exr.attributes(path)]
     except PictureError:
         return []
 
@@ -82,5 +104,5 @@ def _state(path: Path) -> tuple[str, int, int, str] | None:
         header = header_bytes(path) if path.is_file() else b""
     except OSError:
         return None
-    told = hashlib.blake2b(header, digest_size=16).hexdigest()
-    return path.name, status.st_size, status.st_mtime_ns, told
+    digest = hashlib.blake2b(header, digest_size=16).hexdigest()
+    return path.name, status.st_size, status.st_mtime_ns, digest

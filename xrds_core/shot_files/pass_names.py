@@ -35,9 +35,9 @@ _MOTION = ("XYZW", "RGBA", "xyzw", "XY", "RG", "xy", "rg", "UV", "uv")
 
 @dataclass(frozen=True)
 class PassNames:
-    """The names of the passes; None for the usual ones.
+    """What the passes of a file are called; None for the usual names.
 
-    Their layer may be left out. `beauty` is the noisy radiance.
+    Layers before the names may be left out. `beauty` is the noisy radiance.
     """
 
     beauty: str | None = None
@@ -52,12 +52,31 @@ PASSES = tuple(field.name for field in fields(PassNames))
 
 
 @dataclass(frozen=True)
-class Found:
+class PassChannels:
     """The full names of the channels of the passes that a file has.
 
-    `picture` are the channels that the finished picture is written to, R, G, B, and
-    `alpha` is the one that holds alpha in the input. With `has_length` depth is a
-    length along the ray. `others` are passes of `LAYOUT` that have one name alone.
+    Lists are empty where the file lacks a pass.
+
+    Attributes
+    ----------
+    beauty : list of str
+        Noisy radiance.
+    albedo, normal : list of str
+        Guides.
+    position, depth, vector : list of str
+        Geometry and motion.
+    noise : list of str
+        Noise that XRDS has stored.
+    others : dict of str to list of str
+        Passes of `LAYOUT` that have one name alone, by the name of their field.
+    picture : list of str
+        Channels that the finished picture is written to: R, G, B.
+    alpha : str or None
+        The channel with the alpha of the input.
+    has_camera_normal : bool
+        Whether normals are in camera space.
+    has_length : bool
+        Whether depth is a length along the ray.
     """
 
     beauty: list[str]
@@ -74,22 +93,37 @@ class Found:
     has_length: bool
 
 
-def find(channels: Channels, names: PassNames) -> Found:
+def find_passes(channels: Channels, names: PassNames) -> PassChannels:
     """Find the passes of a file.
 
-    Raises Unfit where beauty, albedo or normal is missing, or a pass requested by name;
-    PictureError where several layers hold one.
+    Parameters
+    ----------
+    channels : Channels
+        Names of the file's channels.
+    names : PassNames
+        What its passes are called.
+
+    Returns
+    -------
+    passes : PassChannels
+
+    Raises
+    ------
+    Unfit
+        If beauty, albedo or normal is missing, or a pass requested by its name.
+    PictureError
+        If several layers hold a pass.
     """
     beauty = _pass(channels, names, "beauty")
     prefix = "" if beauty is None else beauty
-    here = channels.of(prefix)
-    if not here:
+    radiance = channels.of(prefix)
+    if not radiance:
         raise _missing(channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB")
     target = _target(channels, prefix)
     alphas = [f"{x}.A" if x else "A" for x in (prefix, target)]
     normal, depth = _pass(channels, names, "normal"), _depth(channels, names)
-    return Found(
-        beauty=here,
+    return PassChannels(
+        beauty=radiance,
         albedo=_needed(channels, names, "albedo"),
         normal=_needed(channels, names, "normal"),
         position=_channels(channels, names, "position"),
@@ -107,20 +141,20 @@ def find(channels: Channels, names: PassNames) -> Found:
 def _others(channels: Channels, depth: list[str]) -> dict[str, list[str]]:
     """The passes that have one name alone, but for one that serves as depth."""
     names = LAYOUT.keys() - {*_USUAL, "radiance", "alpha"}
-    found = {}
+    others = {}
     for name in sorted(names):
         layout = LAYOUT[name]
         letters = (layout.letters, *(() if layout.channels else _SINGLE))
-        there = _by_name(channels, layout.name, letters)
-        if there and there != depth:
-            found[name] = there
-    return found
+        full_names = _by_name(channels, layout.name, letters)
+        if full_names and full_names != depth:
+            others[name] = full_names
+    return others
 
 
 def _by_name(channels: Channels, name: str, letters: Sequence[str]) -> list[str]:
     """The channels of a pass of this name."""
-    found = channels.find(name, letters)
-    return [] if found is None else channels.of(found, letters)
+    full_name = channels.find(name, letters)
+    return [] if full_name is None else channels.of(full_name, letters)
 
 
 def _target(channels: Channels, prefix: str) -> str:
@@ -141,16 +175,16 @@ def _pass(
     """The full name of a pass; None where there is none of the usual names."""
     requested = getattr(names, kind)
     if requested is not None:
-        found = channels.find(requested, letters)
-        if found is None:
+        full_name = channels.find(requested, letters)
+        if full_name is None:
             raise _missing(channels, kind, requested)
-        return found
+        return full_name
     if kind == "beauty" and channels.of("") and not channels.find(NOISY):
         return None  # plain R, G, B
     for wanted in _USUAL[kind]:
-        found = channels.find(wanted, letters, any_case=True)
-        if found is not None:
-            return found
+        full_name = channels.find(wanted, letters, any_case=True)
+        if full_name is not None:
+            return full_name
     return None
 
 
@@ -160,8 +194,8 @@ def _channels(
     kind: str,
     letters: Sequence[str] = COMPONENTS,
 ) -> list[str]:
-    found = _pass(channels, names, kind, letters)
-    return [] if found is None else channels.of(found, letters)
+    full_name = _pass(channels, names, kind, letters)
+    return [] if full_name is None else channels.of(full_name, letters)
 
 
 def _depth(channels: Channels, names: PassNames) -> list[str]:
@@ -173,10 +207,10 @@ def _depth(channels: Channels, names: PassNames) -> list[str]:
 
 
 def _needed(channels: Channels, names: PassNames, kind: str) -> list[str]:
-    found = _channels(channels, names, kind)
-    if not found:
+    channel_names = _channels(channels, names, kind)
+    if not channel_names:
         raise _missing(channels, kind, getattr(names, kind) or _USUAL[kind][0])
-    return found
+    return channel_names
 
 
 def _missing(channels: Channels, kind: str, name: str) -> Unfit:

@@ -1,4 +1,4 @@
-"""Frames stored on disk before denoising, in the format that `reading` reads.
+"""Frames stored on disk before denoising, in the format that `frame_file` reads.
 
 One OpenEXR file with Cycles' pass names holds what accumulation needs: light, guides
 and motion in half floats, as a window stores them in memory, and depths in full. So a
@@ -34,8 +34,14 @@ if TYPE_CHECKING:
 class Origin:
     """What a frame was rendered from and how.
 
-    `key` is the same for frames of one file and one set of settings; `layer` is the
-    view layer; `radius` is the temporal radius that the sample subsets are for.
+    Attributes
+    ----------
+    key : str
+        The same for frames of one file and one set of settings.
+    layer : str
+        View layer.
+    radius : int
+        Temporal radius that the sample subsets are for.
     """
 
     key: str
@@ -44,7 +50,22 @@ class Origin:
 
 
 def write_cached_frame(path: Path, frame: Frame, origin: Origin) -> None:
-    """Write a frame, completely or not at all; raises PictureError if it cannot."""
+    """Write a frame, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    frame : Frame
+        A frame with radiance.
+    origin : Origin
+        What it was rendered from.
+
+    Raises
+    ------
+    PictureError
+        If the file cannot be written.
+    """
     height, width = frame.shape
     x, y = frame.camera.window
     right, bottom = (side - 1 for side in frame.camera.size)
@@ -95,7 +116,7 @@ def _noise(frame: Frame) -> Array:
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 
 
-def _half(x: Array) -> NDArray[np.float16]:
-    """As `frame.store` packs it: clipped to the largest half; infinities stay."""
-    cut = np.clip(x, -LARGEST_HALF, LARGEST_HALF)
-    return np.where(np.isfinite(x), cut, x).astype(np.float16)
+def _half(values: Array) -> NDArray[np.float16]:
+    """Clip to the largest half float; infinities stay."""
+    cut = np.clip(values, -LARGEST_HALF, LARGEST_HALF)
+    return np.where(np.isfinite(values), cut, values).astype(np.float16)

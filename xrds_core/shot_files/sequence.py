@@ -46,13 +46,24 @@ Say = Callable[[str], object]
 
 @dataclass(frozen=True)
 class Files:
-    """Inputs and outputs; # stands for digits of the frame number.
+    """Inputs and outputs of a sequence; # stands for digits of the frame number.
 
-    `picture_only`: the output gets R, G, B and A alone; otherwise all other channels of
-    the input as well, unchanged. `others` are files that are read besides the frames,
-    `halves` is the pattern of their second half buffers, `also` those of further files
-    of each frame. `crop` is the part of the picture that is denoised and written, first
-    and last pixel in the coordinates of the files.
+    Attributes
+    ----------
+    source, output : str
+        Patterns of the frames' files and of the finished ones.
+    picture_only : bool
+        Whether the output gets R, G, B and A alone; otherwise all other channels of the
+        input as well, unchanged.
+    others : tuple of Path
+        Files that are read besides the frames.
+    halves : str or None
+        Pattern of the second half buffers.
+    also : tuple of str
+        Patterns of further files of each frame.
+    crop : Window or None
+        The part of the picture to denoise and write: first and last pixel in the
+        coordinates of the files.
     """
 
     source: str
@@ -79,14 +90,36 @@ class Files:
         metadata: Mapping[str, str],
         check: Callable[[], None] = lambda: None,
     ) -> Path:
-        """Write the finished views of a frame, or none; PictureError, as of `check`."""
+        """Write the finished views of a frame, or none.
+
+        Parameters
+        ----------
+        number : int
+            Frame number.
+        views : mapping of str to (FrameFile, Finished)
+            The views as read and as finished, by name.
+        metadata : mapping of str to str
+            Attributes of the header.
+        check : callable
+            Raises PictureError if nothing is to be written.
+
+        Returns
+        -------
+        path : Path
+            The file.
+
+        Raises
+        ------
+        PictureError
+            If the file cannot be written.
+        """
         by_part: dict[int, dict[str, Array]] = {}
         first, _ = next(iter(views.values()))
         for view, (frame, finished) in views.items():
             names, part = frame.channels, frame.part
             if self.picture_only:
                 ahead = f"{view}." if view else ""
-                names, part = [f"{ahead}{x}" for x in "RGBA"], first.part
+                names, part = [f"{ahead}{letter}" for letter in "RGBA"], first.part
             planes = np.moveaxis(finished.picture, 2, 0)
             by_part.setdefault(part, {}).update(zip(names, planes, strict=False))
             if not self.picture_only:
@@ -117,10 +150,22 @@ class Files:
             return is_made_of(output, digest)
         return is_complete(output)
 
-    def check(self, numbers: Sequence[int], there: Sequence[int]) -> None:
-        """Reject impossible outputs; make their folder.
+    def check(self, numbers: Sequence[int], existing: Sequence[int]) -> None:
+        """Reject impossible outputs, and make their folder.
 
-        `there` are all frames that have a file: none may be overwritten.
+        Parameters
+        ----------
+        numbers : sequence of int
+            The frames to denoise.
+        existing : sequence of int
+            All frames that have a file: none may be overwritten.
+
+        Raises
+        ------
+        UsageError
+            If the patterns fit no sequence.
+        PictureError
+            If an output cannot be written or is an input.
         """
         if Path(self.output).suffix.lower() != ".exr":
             raise UsageError(f"output {self.output!r} must end in .exr")
@@ -130,20 +175,20 @@ class Files:
                 "#### for the frame number"
             )
         for pattern in self.patterns[1:]:
-            self._check_beside(pattern, there)
-        inputs = [frame_path(pattern, n) for pattern in self.patterns for n in there]
-        known = set(there)
+            self._check_beside(pattern, existing)
+        inputs = [frame_path(pattern, n) for pattern in self.patterns for n in existing]
+        known = set(existing)
         outputs = (frame_path(self.output, n) for n in numbers if n in known)
         check_places(outputs, [*inputs, *self.others])
         check_folder(Path(self.output).parent)
 
-    def _check_beside(self, pattern: str, there: Sequence[int]) -> None:
+    def _check_beside(self, pattern: str, existing: Sequence[int]) -> None:
         """Reject one file beside many frames, and the frames themselves."""
         if "#" in Path(self.source).name and "#" not in Path(pattern).name:
             raise UsageError(
                 f"{pattern!r} is one file for all frames; add #### for the frame number"
             )
-        for number in there:
+        for number in existing:
             source, path = (frame_path(x, number) for x in (self.source, pattern))
             if path.exists() and source.samefile(path):
                 raise UsageError(
@@ -163,36 +208,51 @@ def denoise_sequence(
 ) -> dict[str, Any]:
     """Denoise the frames of a sequence, each with its neighbours' samples, in order.
 
-    Args:
-        files: inputs and outputs.
-        frames: their numbers; by default all that exist. Samples of other existing
-            frames, between these or next to them, are reused, too.
-        radius: how many frames before and after are neighbours; by default what the
-            files recommend, or 4.
-        resume: skip outputs that are complete and made of these settings and of the
-            inputs as they are now.
-        say: takes a line about a frame that is finished, left out, or not reusable.
+    Parameters
+    ----------
+    files : Files
+        Inputs and outputs.
+    denoiser : Denoiser
+        The denoiser.
+    frames : iterable of int, optional
+        Frame numbers; all that exist by default. Samples of other existing frames,
+        between these or next to them, are reused, too.
+    radius : int, optional
+        How many frames before and after are neighbours; by default what the files
+        recommend, or 4.
+    reading : Reading, optional
+        Options for reading.
+    resume : bool
+        Skip outputs that are complete and made of these settings and of the inputs as
+        they are now.
+    say : callable
+        Takes a line about a frame that is finished, left out, or not reusable.
 
-    Returns:
+    Returns
+    -------
+    result : dict
         What `xrds denoise --json` prints; `left_out` says why frames were not read.
 
-    Raises:
-        UsageError: no frames, or impossible outputs.
-        PictureError: no frame can be read, the first lacks passes, or an output cannot
-            be written; outputs before it are complete.
+    Raises
+    ------
+    UsageError
+        If there are no frames, or outputs are impossible.
+    PictureError
+        If no frame can be read, the first lacks passes, or an output cannot be written;
+        outputs before it are complete.
     """
     numbers = _numbers(files, frames, say)
-    there = _there(files.source, numbers)
-    files.check(numbers, there)
+    existing = _existing_frames(files.source, numbers)
+    files.check(numbers, existing)
     radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
     recipe = _recipe(files, reading or Reading(), denoiser)
     loader = Loader(files.source, recipe, reusable=radius != 0, say=say)
-    loader.look(numbers, set(there))
+    loader.look(numbers, set(existing))
     readable = [n for n in numbers if n not in loader.failed]
     first = loader.first(readable)
     if radius is None:
         radius = RADIUS if first is None or first.radius is None else first.radius
-    beside = (*numbers, *there)
+    beside = (*numbers, *existing)
     shot = Shot((), radius, others=beside)
     done = _done(files, recipe, shot, numbers, say) if resume else set()
     if first is None and not done:
@@ -260,7 +320,9 @@ class _Frames(FrameSource[FrameFile]):
         number, own = frame.number, frame.own
         views, others = {}, {}
         for view, file in {"": own, **own.others}.items():
-            others[view] = self.selection.select(number, file, _of(frame, view))
+            others[view] = self.selection.select(
+                number, file, _neighbours_in_view(frame, view)
+            )
             region, within = _regions(file, self.files.crop)
             done = finish_frame(
                 file.stored,
@@ -302,7 +364,7 @@ def _done(
     files: Files, recipe: Recipe, shot: Shot, numbers: Sequence[int], say: Say
 ) -> set[int]:
     """The frames that are complete; a line tells those that are made anew."""
-    written = set(_there(files.output, numbers))
+    written = set(_existing_frames(files.output, numbers))
     written.intersection_update(numbers)
     near = {n: sorted((n, *shot.neighbours(n))) for n in sorted(written)}
     states = states_of(recipe, {x for numbers in near.values() for x in numbers})
@@ -331,12 +393,16 @@ def _metadata(own: FrameFile, finished: Finished, denoiser: Denoiser) -> dict[st
     }
 
 
-def _of(found: Neighbourhood[FrameFile], view: str) -> dict[int, FrameFile]:
+def _neighbours_in_view(
+    neighbourhood: Neighbourhood[FrameFile], view: str
+) -> dict[int, FrameFile]:
     """The same view of a frame's neighbours, "" for the first one."""
     if not view:
-        return found.neighbours
-    near = found.neighbours.items()
-    return {n: each.others[view] for n, each in near if view in each.others}
+        return neighbourhood.neighbours
+    near = neighbourhood.neighbours.items()
+    return {
+        n: neighbour.others[view] for n, neighbour in near if view in neighbour.others
+    }
 
 
 def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Rectangle]:
@@ -361,7 +427,7 @@ def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Recta
 
 
 def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
-    """The planes of the parts of a frame's light, by full channel name."""
+    """The planes of a frame's AOVs and light passes, by full channel name."""
     passes = passes_of(frame.light, finished.parts)
     return {
         name: plane
@@ -396,7 +462,7 @@ def _all_frames(pattern: str) -> list[int]:
     return numbers
 
 
-def _there(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
+def _existing_frames(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
     """The frames that have a file; without # there is one for every number."""
     if "#" in Path(pattern).name:
         return frame_numbers(pattern)

@@ -16,9 +16,18 @@ _BAND = 64  # low-resolution rows at a time bound the memory of what is in betwe
 
 
 def finish(picture: Array, low: Array, guide_alpha: Array | None, scale: int) -> None:
-    """Fill in the alpha of `picture` (H, W, 4) and free its radiance of fringes.
+    """Fill in the alpha of a picture and free its radiance of fringes, in place.
 
-    `picture` was made from `low` (h, w, 4); `guide_alpha` is (H, W).
+    Parameters
+    ----------
+    picture : (H, W, 4) float32 array
+        The enlarged picture, premultiplied.
+    low : (h, w, 4) float32 array
+        The picture that it was made from.
+    guide_alpha : (H, W) float32 array or None
+        Alpha of the guides' render.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
     """
     height = low.shape[0]
     for top in range(0, height, _BAND):
@@ -47,7 +56,7 @@ def _bounded(radiance: Array, alpha: Array, low: Array, scale: int) -> Array:
     """Clamp the colour behind `alpha` to the range of the 3x3 pixels of `low`.
 
     Only near edges: where all nine are opaque, radiance may be anything. Light that
-    covers nothing (alpha 0), as of fire, sets no upper bound.
+    covers nothing (alpha 0), such as a fire's, sets no upper bound.
     """
     height, width = alpha.shape
     limits = (_expand(x, scale)[:height, :width] for x in _colour_range(low))
@@ -70,10 +79,12 @@ def _colour_range(low: Array) -> tuple[Array, Array]:
     return darkest, brightest
 
 
-def _largest_around(x: Array) -> Array:
-    pooled = functional.max_pool2d(to_planes(x), kernel_size=3, stride=1, padding=1)
+def _largest_around(picture: Array) -> Array:
+    pooled = functional.max_pool2d(
+        to_planes(picture), kernel_size=3, stride=1, padding=1
+    )
     return to_picture(pooled)
 
 
-def _expand(x: Array, scale: int) -> Array:
-    return x.repeat(scale, axis=0).repeat(scale, axis=1)
+def _expand(picture: Array, scale: int) -> Array:
+    return picture.repeat(scale, axis=0).repeat(scale, axis=1)

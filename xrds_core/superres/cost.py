@@ -66,11 +66,21 @@ def leaves(network: nn.Module) -> list[nn.Module]:
 
 
 def measure(network: XRDS) -> Cost:
-    """Run `network` in float32 on two by two windows and return its cost.
+    """Measure what a network costs, on two by two windows in float32.
 
     All costs grow with the number of pixels, so a tiny picture represents a large one:
     except the areas of a `KernelTail`, of which there are many in a large picture. So
     bytes are those of a pass over many small areas.
+
+    Parameters
+    ----------
+    network : XRDS
+        The network.
+
+    Returns
+    -------
+    cost : Cost
+        Per output pixel.
     """
     config = network.config
     device = next(network.parameters()).device

@@ -14,9 +14,21 @@ PRECISIONS = {"fp32": torch.float32, "bf16": torch.bfloat16}
 
 
 def choose_device(name: str = "auto") -> torch.device:
-    """Return the named device; for `auto` the fastest kind there is.
+    """Return a device of torch.
 
-    Raises UsageError if this machine, or this build of torch, has no such device.
+    Parameters
+    ----------
+    name : str
+        `auto` for the fastest kind there is, `cpu`, `metal`, or what torch knows.
+
+    Returns
+    -------
+    device : torch.device
+
+    Raises
+    ------
+    UsageError
+        If this machine, or this build of torch, has no such device.
     """
     if name == "auto":
         kinds = (("cuda", torch.cuda), ("mps", torch.backends.mps))
@@ -43,10 +55,25 @@ def device_name(device: torch.device) -> str:
 
 
 def choose_precision(name: str, device: torch.device) -> torch.dtype:
-    """Return the type that layers compute in; for `auto` the fast one that holds.
+    """Return the type that layers compute in.
 
     On processors bf16 is slower than fp32 unless they have special units for it.
-    Raises UsageError for other names than auto, fp32, bf16.
+
+    Parameters
+    ----------
+    name : {'auto', 'fp32', 'bf16'}
+        `auto` is the fast one of those that the device has.
+    device : torch.device
+        Where the network runs.
+
+    Returns
+    -------
+    precision : torch.dtype
+
+    Raises
+    ------
+    UsageError
+        If the name is another one.
     """
     if name == "auto":
         fast = device.type == "cuda" and torch.cuda.is_bf16_supported(False)

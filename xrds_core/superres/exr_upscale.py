@@ -35,23 +35,47 @@ def upscale_file(
 ) -> dict[str, Any]:
     """Enlarge a low-resolution EXR under full-resolution passes; write an EXR.
 
-    Args:
-        beauty: the low-resolution render, denoised; the noisy picture, where the file
-            has one too, shows what the denoiser took away.
-        guide_file: albedo and normal.
-        output: R, G, B, scene-linear, and A if `beauty` has it; the folder is made.
-        names, encoding: of the passes in both files, and of the output's pixels.
-        threads: of the processor, from now on.
-        network: what `Upscaler` is made of: preset, scale, device, weights.
+    Parameters
+    ----------
+    beauty : str or Path
+        The low-resolution render, denoised. The noisy picture, where the file has one
+        too, shows what the denoiser took away.
+    guide_file : str or Path
+        File with albedo and normal.
+    output : str or Path
+        File for R, G, B, scene-linear, and A if `beauty` has it; the folder is made.
+    guide_samples : int, optional
+        Samples per pixel of the guides; None where they are many, or not known.
+    exposure : float, optional
+        Exposure of a picture that this is a part of; None finds it.
+    memory_limit : int, optional
+        Bytes to aim at.
+    names : Names
+        What passes are called in both files.
+    encoding : Encoding
+        How the output's pixels are stored.
+    threads : int, optional
+        Threads of the processor, from now on.
+    progress : callable, optional
+        Takes fractions from 0 to exactly 1; False as its result cancels.
+    **network
+        What `Upscaler` is made of: preset, scale, device, precision, weights.
 
-    The other arguments are those of a call of `Upscaler`.
+    Returns
+    -------
+    result : dict
+        `output`, `seconds` (wall clock, files included), `bad_pixels` and `tiles`.
 
-    Returns {output, seconds, bad_pixels, tiles}; wall clock, files included.
-
-    Raises:
-        PictureError: a file cannot be read, written, or lacks a pass.
-        UsageError: `output` does not end in .exr.
-        WeightsError, UsageError, Cancelled: as `Upscaler`.
+    Raises
+    ------
+    PictureError
+        If a file cannot be read, written, or lacks a pass.
+    UsageError
+        If `output` does not end in .exr, or the device or precision is not there.
+    WeightsError
+        If the weights are missing, damaged or of another scale.
+    Cancelled
+        If `progress` returned False.
     """
     start = time.perf_counter()
     _check_output(Path(output), (beauty, guide_file))

@@ -40,46 +40,97 @@ _LARGEST_EXPOSED = 1e18
 LARGEST_TRANSFERRED = 88.0  # expm1 of 89 would leave float32
 
 
-def clean_radiance(x: Array) -> tuple[Array, int]:
-    """Return (x, bad pixels): NaN and infinities filled in, negative values 0.
+def clean_radiance(radiance: Array) -> tuple[Array, int]:
+    """Replace pixels that hold no light.
 
-    `x` itself is returned where nothing is wrong with it; else a copy.
+    Parameters
+    ----------
+    radiance : (h, w, C) float32 array
+        Scene-linear radiance, with alpha or without.
+
+    Returns
+    -------
+    cleaned : (h, w, C) float32 array
+        NaN and infinities are filled in, negative values are 0. `radiance` itself where
+        nothing is wrong with it; else a copy.
+    bad_pixels : int
+        How many pixels were replaced.
     """
-    if not x.size or (x.min() >= 0.0 and np.isfinite(x.max())):
-        return x, 0
-    finite = np.isfinite(x)
-    bad = int((~finite | (x < 0.0)).any(axis=-1).sum())
+    if not radiance.size or (radiance.min() >= 0.0 and np.isfinite(radiance.max())):
+        return radiance, 0
+    finite = np.isfinite(radiance)
+    bad = int((~finite | (radiance < 0.0)).any(axis=-1).sum())
     # before the holes are filled, so that none is filled with darkness below black
-    return fill_holes(np.where(finite & (x < 0.0), np.float32(0.0), x))[0], bad
+    return fill_holes(np.where(finite & (radiance < 0.0), np.float32(0.0), radiance))[
+        0
+    ], bad
 
 
-def clean_albedo(x: Array) -> tuple[Array, int]:
-    """Return (x in [0, 1], pixels that held NaN or infinities).
+def clean_albedo(albedo: Array) -> tuple[Array, int]:
+    """Clean an albedo.
 
-    Values above 1 are no fault: Cycles adds emission and background to its
-    denoising albedo.
+    Values above 1 are no fault: Cycles adds emission and background to its denoising
+    albedo.
+
+    Parameters
+    ----------
+    albedo : (H, W, 3) float32 array
+        Albedo.
+
+    Returns
+    -------
+    cleaned : (H, W, 3) float32 array
+        In [0, 1].
+    holes : int
+        How many pixels held NaN or infinities.
     """
-    x, holes = fill_holes(x)
-    return np.clip(x, 0.0, 1.0), holes
+    albedo, holes = fill_holes(albedo)
+    return np.clip(albedo, 0.0, 1.0), holes
 
 
-def clean_normal(x: Array) -> tuple[Array, int]:
-    """Return (x in [-1, 1], pixels that held NaN or infinities); zero stays zero.
+def clean_normal(normal: Array) -> tuple[Array, int]:
+    """Clean a normal; zero stays zero.
 
-    Cycles' denoising normals are means of unit vectors, so shorter than 1 at
-    edges: their length is information and is not normalised away.
+    Cycles' denoising normals are means of unit vectors, so shorter than 1 at edges:
+    their length is information and is not normalised away.
+
+    Parameters
+    ----------
+    normal : (H, W, 3) float32 array
+        Normal.
+
+    Returns
+    -------
+    cleaned : (H, W, 3) float32 array
+        In [-1, 1].
+    holes : int
+        How many pixels held NaN or infinities.
     """
-    x, holes = fill_holes(x)
-    return np.clip(x, -1.0, 1.0), holes
+    normal, holes = fill_holes(normal)
+    return np.clip(normal, -1.0, 1.0), holes
 
 
 def auto_exposure(radiance: Array) -> float:
-    """Return e: the key over the geometric mean luminance of the picture's bins.
+    """Return the exposure e: the key over the geometric mean luminance of bins.
 
-    `radiance` (h, w, 3 or more) is clean and low-resolution. Its bins are at
-    most 16 x 16, whatever its size, so that a tiny render of a frame gives the
-    frame's own exposure. Bins far from the bright ones, in either direction, are left
-    out. After OIDN's auto-exposure (Afra, 2019).
+    The picture is divided into at most 16 x 16 bins, whatever its size, so that a tiny
+    render of a frame gives the frame's own exposure. Bins far from the bright ones, in
+    either direction, are left out. This follows the auto-exposure of OIDN [1]_.
+
+    Parameters
+    ----------
+    radiance : (h, w, 3 or more) float32 array
+        Clean, low-resolution radiance.
+
+    Returns
+    -------
+    exposure : float
+        1 for a black picture.
+
+    References
+    ----------
+    .. [1] Afra, A. T. (2019). Intel Open Image Denoise.
+       https://www.openimagedenoise.org
     """
     luminance = radiance[..., :3].astype(np.float64) @ np.asarray(LUMINANCE)
     for axis in (0, 1):
@@ -94,9 +145,23 @@ def auto_exposure(radiance: Array) -> float:
 
 
 def choose_exposure(exposure: float | None, radiance: Array) -> float:
-    """Return the requested exposure e, or else the one of `radiance`.
+    """Return the requested exposure e, or else the one of the picture.
 
-    Raises UsageError for an exposure beyond the range of float32 arithmetic.
+    Parameters
+    ----------
+    exposure : float or None
+        The requested one.
+    radiance : (h, w, 3 or more) float32 array
+        Clean, low-resolution radiance.
+
+    Returns
+    -------
+    exposure : float
+
+    Raises
+    ------
+    UsageError
+        If the exposure is beyond the range of float32 arithmetic.
     """
     if exposure is None:
         return auto_exposure(radiance)
@@ -106,27 +171,37 @@ def choose_exposure(exposure: float | None, radiance: Array) -> float:
     return float(exposure)
 
 
-def _bin_means(x: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
-    size = x.shape[axis]
+def _bin_means(luminance: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+    size = luminance.shape[axis]
     bins = min(size, _MOST_BINS)
     edges = [i * size // bins for i in range(bins + 1)]
     means = [
-        np.take(x, range(low, high), axis=axis).mean(axis=axis)
+        np.take(luminance, range(low, high), axis=axis).mean(axis=axis)
         for low, high in pairwise(edges)
     ]
-    return np.stack(means, axis=axis) if means else x
+    return np.stack(means, axis=axis) if means else luminance
 
 
 def transfer(x: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTensor:
     """Return t(x) = log(1 + k e x) in float32, for radiance >= 0 of any range.
 
-    `exposure` may be a tensor that broadcasts against `x`, one e a picture.
+    Parameters
+    ----------
+    x : array or Tensor
+        Scene-linear radiance.
+    exposure : float or Tensor
+        e; a tensor that broadcasts against `x` gives each picture its own.
+
+    Returns
+    -------
+    t : array or Tensor
+        Radiance in the transfer domain.
     """
     if isinstance(x, Tensor):
         exposed = x.float() * (TRANSFER_GAIN * exposure)
         return torch.log1p(exposed.clamp(0.0, _LARGEST_EXPOSED))
     with np.errstate(over="ignore"):
-        exposed = x.astype(np.float32, copy=False) * _gain(exposure)
+        exposed = x.astype(np.float32, copy=False) * _exposure_gain(exposure)
     return np.log1p(np.clip(exposed, 0.0, _LARGEST_EXPOSED))
 
 
@@ -138,33 +213,45 @@ def inverse_transfer(t: ArrayOrTensor, exposure: float | Tensor) -> ArrayOrTenso
     with np.errstate(over="ignore"):
         t = t.astype(np.float32, copy=False)
         exposed = np.expm1(np.minimum(t, np.float32(LARGEST_TRANSFERRED)))
-        return np.minimum(exposed / _gain(exposure), _LARGEST)
+        return np.minimum(exposed / _exposure_gain(exposure), _LARGEST)
 
 
-def _gain(exposure: float | Tensor) -> np.float32:
+def _exposure_gain(exposure: float | Tensor) -> np.float32:
     return np.float32(TRANSFER_GAIN * float(exposure))
 
 
-def area_mean(x: Tensor, scale: int) -> Tensor:
+def area_mean(planes: Tensor, scale: int) -> Tensor:
     """Return the means of scale x scale blocks: (B, C, s h, s w) -> (B, C, h, w)."""
-    return functional.avg_pool2d(x, scale)
+    return functional.avg_pool2d(planes, scale)
 
 
-def upsample_bilinear(x: Tensor, scale: int) -> Tensor:
+def upsample_bilinear(planes: Tensor, scale: int) -> Tensor:
     """Interpolate (B, C, h, w) -> (B, C, s h, s w): half-pixel centres, edges held."""
     if scale == 1:
-        return x
+        return planes
     return functional.interpolate(
-        x, scale_factor=float(scale), mode="bilinear", align_corners=False
+        planes, scale_factor=float(scale), mode="bilinear", align_corners=False
     )
 
 
 def demodulated_base(radiance: Array, albedo: Array, scale: int) -> Array:
-    """Return up(L / down(A')) A' with A' = albedo + epsilon, albedo in [0, 1].
+    """Return up(L / down(A')) A' with A' = albedo + epsilon.
 
-    `radiance` (h, w, 3) and `albedo` (s h, s w, 3) are clean; the result is
-    radiance (s h, s w, 3). Lighting is smoother than texture, so it is what is
-    interpolated.
+    Lighting is smoother than texture, so it is what is interpolated.
+
+    Parameters
+    ----------
+    radiance : (h, w, 3) float32 array
+        L: clean, scene-linear.
+    albedo : (s h, s w, 3) float32 array
+        Clean, in [0, 1].
+    scale : int
+        s
+
+    Returns
+    -------
+    base : (s h, s w, 3) float32 array
+        Radiance.
     """
     guide = to_planes(albedo) + ALBEDO_EPSILON
     return to_picture(_modulated(to_planes(radiance), guide, scale))
@@ -175,11 +262,27 @@ def regressed_base(
 ) -> Array:
     """Return up(L / down(E)) E with E what the guides explain of L around every pixel.
 
-    As `demodulated_base`, but the picture itself, with what it was before denoising,
+    Unlike in `demodulated_base` the picture itself, with what it was before denoising,
     decides how much of the albedo and of the normal's shading goes into E, and gets
     back into L what denoising took of these: see `regression.explain`.
+
+    Parameters
+    ----------
+    radiance : (h, w, 3) float32 array
+        L: clean, scene-linear.
+    noisy : (h, w, 3) float32 array
+        The same before denoising.
+    albedo, normal : (s h, s w, 3) float32 array
+        Guides, clean.
+    scale : int
+        s
+
+    Returns
+    -------
+    base : (s h, s w, 3) float32 array
+        Radiance.
     """
-    gain = _gain(auto_exposure(radiance))
+    gain = _exposure_gain(auto_exposure(radiance))
     guides = torch.cat((to_planes(albedo), to_planes(normal)), dim=1)
     low, before = to_planes(radiance * gain), to_planes(noisy * gain)
     explained = explain(low, before, guides, scale)
@@ -192,9 +295,20 @@ def _modulated(low: Tensor, modulator: Tensor, scale: int) -> Tensor:
 
 
 def pad_guide(guide: Array, low: Array, scale: int) -> Array:
-    """Return the guide (H, W, ...) as far as the pixels of `low` (h, w, ...) reach.
+    """Return a guide as far as the low-resolution pixels reach; its edge is repeated.
 
-    The edge is repeated at the bottom and right; H <= s h, W <= s w.
+    Parameters
+    ----------
+    guide : (H, W, ...) array
+        H <= s h, W <= s w.
+    low : (h, w, ...) array
+        The low-resolution picture.
+    scale : int
+        s
+
+    Returns
+    -------
+    padded : (s h, s w, ...) array
     """
     missing = [
         (0, scale * size - have)
@@ -204,10 +318,22 @@ def pad_guide(guide: Array, low: Array, scale: int) -> Array:
 
 
 def upsample_alpha(low_alpha: Array, guide_alpha: Array, scale: int) -> Array:
-    """Return alpha (H, W): the edges of `guide_alpha`, the cover of `low_alpha`.
+    """Return alpha with the edges of the guides and the cover of the picture.
 
-    `low_alpha` (h, w), `guide_alpha` (H, W) with H <= s h, W <= s w. Exactly 0
-    or 1 wherever the low-resolution pixel and the guide both are.
+    It is exactly 0 or 1 wherever the low-resolution pixel and the guide both are.
+
+    Parameters
+    ----------
+    low_alpha : (h, w) float32 array
+        Alpha of the low-resolution picture.
+    guide_alpha : (H, W) float32 array
+        Alpha of the guides' render; H <= s h, W <= s w.
+    scale : int
+        s
+
+    Returns
+    -------
+    alpha : (H, W) float32 array
     """
     height, width = guide_alpha.shape
     low = to_planes(np.clip(low_alpha, 0.0, 1.0)[..., None])

@@ -28,10 +28,23 @@ _BAND = 64  # low-resolution rows that the base is found for at once
 def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
     """Return the rectangle outside which the base is the picture.
 
-    Blocks of `block` low-resolution pixels are idle where nothing but background is
-    seen (normal 0, albedo that holds its radiance), or where every input is even. The
-    rectangle is aligned to blocks and has a margin of at least `margin` pixels around
-    what is busy. None if nothing is busy; the whole picture if too little is idle.
+    Blocks are idle where nothing but background is seen (normal 0, albedo that holds
+    its radiance), or where every input is even.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        The picture and its guides.
+    block : int
+        Side of a block, in low-resolution pixels; the rectangle is aligned to blocks.
+    margin : int
+        Least margin around what is busy, in low-resolution pixels.
+
+    Returns
+    -------
+    area : tuple of slice or None
+        Low-resolution rows and columns. None if nothing is busy; the whole picture if
+        too little is idle.
     """
     height, width = inputs.low.shape[:2]
     whole = slice(0, height), slice(0, width)
@@ -74,7 +87,7 @@ def _idle(inputs: Inputs, block: int) -> NDArray[np.bool_]:
 
 
 def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
-    """Return the blocks whose radiance is their albedo, as of a background."""
+    """Return the blocks whose radiance is their albedo: so a background's is."""
     low, scale = inputs.low[..., :3], inputs.scale
     albedo = np.minimum(inputs.albedo, 2.0)  # above 1 is no background anyway
     for axis in (0, 1):
@@ -88,13 +101,13 @@ def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
     return shines
 
 
-def _sums(x: NDArray[Any], block: int) -> NDArray[np.float64]:
+def _sums(picture: NDArray[Any], block: int) -> NDArray[np.float64]:
     """Return the sum over each block and its channels."""
     for axis in (0, 1):
         # float64: sums of the brightest light would leave float32
-        starts = range(0, x.shape[axis], block)
-        x = np.add.reduceat(x, starts, axis=axis, dtype=np.float64)
-    return np.asarray(x.sum(-1))
+        starts = range(0, picture.shape[axis], block)
+        picture = np.add.reduceat(picture, starts, axis=axis, dtype=np.float64)
+    return np.asarray(picture.sum(-1))
 
 
 def _is_even(extremes: tuple[Array, Array]) -> NDArray[np.bool_]:
@@ -104,11 +117,11 @@ def _is_even(extremes: tuple[Array, Array]) -> NDArray[np.bool_]:
     return spread
 
 
-def _extremes(x: Array, block: int) -> tuple[Array, Array]:
+def _extremes(picture: Array, block: int) -> tuple[Array, Array]:
     """Return the least and the largest value of each block, (rows, columns, C)."""
-    starts = [range(0, size, block) for size in x.shape[:2]]
-    least = np.minimum.reduceat(x, starts[0], axis=0)
-    most = np.maximum.reduceat(x, starts[0], axis=0)
+    starts = [range(0, size, block) for size in picture.shape[:2]]
+    least = np.minimum.reduceat(picture, starts[0], axis=0)
+    most = np.maximum.reduceat(picture, starts[0], axis=0)
     return (
         np.minimum.reduceat(least, starts[1], axis=1),
         np.maximum.reduceat(most, starts[1], axis=1),

@@ -99,10 +99,34 @@ def check(
     noisy: Any = None,
     guide_samples: int | None = None,
 ) -> Inputs:
-    """Return the arrays, cleaned; float32 ones without a fault are not copied.
+    """Check and clean the arrays given to an upscale.
 
-    Raises PictureError, with the sizes and the remedy, for arrays that do not fit, and
-    UsageError for guides of less than a sample.
+    Parameters
+    ----------
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+    radiance : array_like
+        (h, w, 3), or (h, w, 4) premultiplied; scene-linear floats.
+    albedo, normal : array_like
+        (H, W, 3) floats.
+    guide_alpha : array_like, optional
+        (H, W) or (H, W, 1) floats.
+    noisy : array_like, optional
+        (h, w, 3), the radiance before it was denoised.
+    guide_samples : int, optional
+        Samples per pixel of the guides.
+
+    Returns
+    -------
+    inputs : Inputs
+        Float32 arrays without a fault are not copied.
+
+    Raises
+    ------
+    PictureError
+        If arrays do not fit; it states their sizes and the remedy.
+    UsageError
+        If guides have less than a sample.
     """
     if guide_samples is not None and guide_samples < 1:
         raise UsageError(f"guide_samples is {guide_samples}; it must be 1 or more")
@@ -188,5 +212,5 @@ def _fits(scale: int, low: Array, guide: Array) -> bool:
     return low.shape[:2] == tuple(-(-size // scale) for size in guide.shape[:2])
 
 
-def _size(x: Array, scale: int = 1) -> str:
-    return f"{x.shape[1] * scale}x{x.shape[0] * scale}"
+def _size(picture: Array, scale: int = 1) -> str:
+    return f"{picture.shape[1] * scale}x{picture.shape[0] * scale}"

@@ -1,6 +1,7 @@
 """The base of the small presets: predicted kernels over demodulated radiance.
 
-Not from the paper. Shape letters as in `network`.
+Not from the paper. Shape letters: B batch, C channels, h w cells or low-resolution
+pixels, H W output pixels, s scale.
 """
 
 from __future__ import annotations
@@ -49,15 +50,28 @@ FACTS = FEATURES + 1
 def find_sources(
     radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int
 ) -> tuple[Sources, Tensor]:
-    """The radiance as it is and its demodulated variants, and facts (B, 5, h, w).
+    """Return the pictures that kernels gather from, and facts about them.
 
-    By albedo, and last by what albedo and normal explain of it around every pixel; see
-    `regression.explain`, which also restores what denoising took away. The facts are
-    the slopes found there, and the mean over the colours of the grain.
+    The pictures are the radiance as it is, divided by albedo, and divided by what
+    albedo and normal explain of it around every pixel: see `regression.explain`, which
+    also restores what denoising took away. The division is by the area mean of the
+    modulator, so that modulating again keeps the mean of the low-resolution pixel.
 
-    `radiance` and `noisy` (B, 3, h, w) are in the transfer domain. The division is by
-    the area mean of the modulator, so that modulating again keeps the mean of the
-    low-resolution pixel.
+    Parameters
+    ----------
+    radiance, noisy : (B, 3, h, w) Tensor
+        Radiance, denoised and before, in the transfer domain.
+    guides : (B, 6, H, W) Tensor
+        Albedo in [0, 1] and normal.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+
+    Returns
+    -------
+    sources : list of Source
+        Linear radiance, and what then multiplies it.
+    facts : (B, 5, h, w) Tensor
+        The slopes of the regression, and the mean of the grain over the colours.
     """
     guides = guides.float()
     low, grain, explained, slopes = explain(
@@ -118,10 +132,22 @@ class Area(NamedTuple):
     def of(
         self, x: Tensor, unit: int, within: Area | None = None, rim: int = 0
     ) -> Tensor:
-        """What lies in it of `x`, which has `unit` squared pixels for each cell.
+        """Crop planes to the area.
 
-        `x` shows the whole grid or the area `within`, and around it a rim, which the
-        result has as well.
+        Parameters
+        ----------
+        x : (..., H, W) Tensor
+            Planes of the whole grid, or of the area `within`, with a rim around it.
+        unit : int
+            Pixels per cell along one axis.
+        within : Area, optional
+            What `x` shows, if not the whole grid.
+        rim : int
+            Width of the rim, which the result has as well.
+
+        Returns
+        -------
+        cropped : (..., h, w) Tensor
         """
         top, left = (0, 0) if within is None else (within.top, within.left)
         return x[
@@ -172,17 +198,26 @@ class KernelTail(nn.Module):
     """The demodulated base, its kernels predicted.
 
     Every output pixel is a convex combination of its 3x3 low-resolution neighbours in
-    every source of `find_sources`, modulated at the pixel. What bicubic
-    interpolation adds to bilinear is added to each source: a low-resolution pixel is
-    the mean over its area, which is smoother than the picture. A gain, bounded by
-    `GAIN_LIMIT`, scales the result. So nothing turns negative or becomes coloured by
-    itself. At last the picture's area means are brought near the low-resolution
-    radiance. Kernels start from bilinear weights and fall with the distance between
-    guides, as a joint bilateral filter's, as fast as the network predicts; untrained,
-    the result is almost bicubic interpolation of the last source.
+    every source of `find_sources`, modulated at the pixel. What bicubic interpolation
+    adds to bilinear is added to each source: a low-resolution pixel is the mean over
+    its area, which is smoother than the picture. A gain, bounded by `GAIN_LIMIT`,
+    scales the result. So nothing turns negative or becomes coloured by itself. At last
+    the picture's area means are brought near the low-resolution radiance. Kernels start
+    from bilinear weights and fall with the distance between guides, like those of a
+    joint bilateral filter, as fast as the network predicts; untrained, the result is
+    almost bicubic interpolation of the last source.
 
     The kernels of a whole frame are dozens of planes of its size. They are made, used
     and forgotten area by area, small enough for the processor's caches.
+
+    Parameters
+    ----------
+    scale, cell : int
+        Output pixels per low-resolution pixel and per cell, along one axis.
+    channels : int
+        Channels of the features.
+    width : int
+        Full-resolution channels of the kernel predictor.
     """
 
     def __init__(self, scale: int, cell: int, channels: int, width: int) -> None:
@@ -230,11 +265,28 @@ class KernelTail(nn.Module):
     def look(
         self, area: Area, cells: Tensor, guides: Tensor, sources: Sources
     ) -> tuple[Tensor, list[Tensor]]:
-        """What is predicted of every pixel of an area, and each source's sharpening.
+        """Predict the kernels of every pixel of an area.
 
-        (B, 9 * SOURCES + 4, s*s, h, w) and, of every source, (B, 3, s*s, h, w). The
-        last convolution sees a pixel around the area, and replicates those that the
+        The last convolution sees a pixel around the area, and replicates those that the
         picture does not have.
+
+        Parameters
+        ----------
+        area : Area
+            The area, in cells.
+        cells : (B, C, h, w) Tensor
+            Features of all cells, with a rim.
+        guides : (B, 6, H, W) Tensor
+            Albedo and normal.
+        sources : list of Source
+            What kernels gather from.
+
+        Returns
+        -------
+        predicted : (B, 9 * SOURCES + 4, s*s, h, w) Tensor
+            Logits, sharpness by albedo and by normal, gain and trust.
+        sharpening : list of (B, 3, s*s, h, w) Tensor
+            What is added to each source.
         """
         height, width = guides.shape[-2:]
         pixels = area.times(self.cell)
@@ -268,10 +320,26 @@ class KernelTail(nn.Module):
     def kernels(
         self, area: Area, predicted: Tensor, guides: Tensor, means: Tensor
     ) -> Tensor:
-        """Softmax over the neighbours of all sources: (B, SOURCES, 9, s*s, h, w).
+        """Return the weights of the neighbours in all sources.
 
         They fall with the squared distance between the pixel's guides and a neighbour's
         means. The square of the pixel's own is the same for all, and left out.
+
+        Parameters
+        ----------
+        area : Area
+            The area, in cells.
+        predicted : (B, 9 * SOURCES + 4, s*s, h, w) Tensor
+            What `look` predicts.
+        guides : (B, 6, H, W) Tensor
+            Albedo and normal.
+        means : (B, 8, h, w) Tensor
+            Area means of the guides and their squared lengths, with a rim.
+
+        Returns
+        -------
+        kernels : (B, SOURCES, 9, s*s, h, w) Tensor
+            A softmax over sources and neighbours.
         """
         pixels = self.fold(area.of(guides, self.cell)).float()
         albedo, normal = (SHARPNESS_UNIT * predicted[:, -4:-2]).split(1, dim=1)
@@ -312,8 +380,26 @@ class KernelTail(nn.Module):
     def match(self, picture: Tensor, trust: Tensor, low: Tensor) -> Tensor:
         """Bring the area means of the picture near the low-resolution radiance.
 
-        Back-projection (Irani and Peleg, 1991) by factors, so that black stays black;
-        where the radiance is noise rather than picture, `trust` can withhold it.
+        Back-projection [1]_ by factors, so that black stays black; where the radiance
+        is noise rather than picture, `trust` can withhold it.
+
+        Parameters
+        ----------
+        picture : (B, 3, H, W) Tensor
+            Linear radiance.
+        trust : (B, 1, h, w) Tensor
+            Predicted logit of how far a step goes.
+        low : (B, 3, h, w) Tensor
+            Linear low-resolution radiance.
+
+        Returns
+        -------
+        matched : (B, 3, H, W) Tensor
+
+        References
+        ----------
+        .. [1] Irani, M. and Peleg, S. (1991). Improving resolution by image
+           registration.
         """
         power = torch.sigmoid(trust + TRUST)
         most = math.log(MATCHING_LIMIT)

@@ -1,6 +1,5 @@
 """XRDS, the Cross-modality Residual Densely-connected Swin Transformer.
 
-Hou and Liu, "Auxiliary Features-Guided Super Resolution for Monte Carlo Rendering".
 A low-resolution radiance picture and full-resolution guides (albedo, normal) go in, the
 full-resolution picture comes out. `NetworkConfig()` is the paper's network at scale 4.
 What the paper leaves open (the number of guide residual blocks, the deshuffle, where
@@ -11,6 +10,11 @@ Names: a *cell* is one position of the grid that the transformer works on. In th
 it is one low-resolution pixel; the small presets use coarser cells. Shape letters: B
 batch, C channels, h w cells or low-resolution pixels, H W output pixels, N tokens of a
 window, s scale.
+
+References
+----------
+.. [1] Hou, Q. and Liu, F. Auxiliary Features-Guided Super Resolution for Monte Carlo
+   Rendering.
 """
 
 from __future__ import annotations
@@ -105,10 +109,26 @@ PRESETS = ("paper", *SMALL_PRESETS)
 
 
 def preset_config(preset: str, scale: int) -> NetworkConfig:
-    """The configuration of a named preset.
+    """Return the configuration of a named preset.
 
-    `paper` is the published network. `balanced` and `fast` are the same class with
-    smaller numbers, a grid of at most a quarter of the output and the kernel base.
+    `balanced` and `fast` are the same class as the published network with smaller
+    numbers, a grid of at most a quarter of the output, and the kernel base.
+
+    Parameters
+    ----------
+    preset : {'paper', 'balanced', 'fast'}
+        `paper` is the published network.
+    scale : int
+        Output pixels per low-resolution pixel along one axis, a power of two.
+
+    Returns
+    -------
+    config : NetworkConfig
+
+    Raises
+    ------
+    ValueError
+        If the preset is unknown.
     """
     paper = NetworkConfig(scale=scale)
     if preset == "paper":
@@ -465,14 +485,25 @@ class XRDS(nn.Module):
     ) -> Tensor:
         """Enlarge one batch.
 
-        Args:
-            radiance: (B, 3, h, w), scene-linear, in the transfer domain log(1 + k e x).
-            guides: (B, 6, s*h, s*w), albedo in [0, 1] and camera-space normal.
-            noisy: as `radiance`, but before denoising; None where it was not denoised
-                or that is lost. Of use to networks with a base alone.
+        Parameters
+        ----------
+        radiance : (B, 3, h, w) Tensor
+            Scene-linear radiance in the transfer domain log(1 + k e x).
+        guides : (B, 6, s h, s w) Tensor
+            Albedo in [0, 1] and camera-space normal.
+        noisy : (B, 3, h, w) Tensor, optional
+            Radiance before denoising, in the same domain; None where it was not
+            denoised or that is lost. Of use to networks with a base alone.
 
-        Returns:
-            (B, 3, s*h, s*w) radiance in the transfer domain.
+        Returns
+        -------
+        enlarged : (B, 3, s h, s w) Tensor
+            Radiance in the transfer domain.
+
+        Raises
+        ------
+        ValueError
+            If the guides have another size.
         """
         s = self.config.scale
         h, w = radiance.shape[-2:]

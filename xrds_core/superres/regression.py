@@ -2,10 +2,16 @@
 
 How much of the picture the guides explain differs from place to place: nearly all of it
 on textured walls, nothing on car paint. A linear model of the log radiance in the
-guides, fitted around every low-resolution pixel, finds out: He et al., "Guided Image
-Filtering" (2010), and Bitterli et al., "Nonlinearly Weighted First-Order Regression for
-Denoising Monte Carlo Renderings" (2016), in the log domain, where its prediction stays
-positive. Shape letters as in `network`.
+guides, fitted around every low-resolution pixel, finds out [1]_ [2]_; in the log domain
+its prediction stays positive.
+
+Shape letters: B batch, h w low-resolution pixels, H W output pixels.
+
+References
+----------
+.. [1] He, K., Sun, J. and Tang, X. (2010). Guided Image Filtering.
+.. [2] Bitterli, B. et al. (2016). Nonlinearly Weighted First-Order Regression for
+   Denoising Monte Carlo Renderings.
 """
 
 from __future__ import annotations
@@ -64,21 +70,34 @@ class Explained(NamedTuple):
 def explain(radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int) -> Explained:
     """Restore the radiance and regress it on the guides.
 
-    `radiance` and `noisy`, the same before denoising, (B, 3, h, w), are linear, in
-    units of k e x; `guides` (B, 6, H, W).
+    Parameters
+    ----------
+    radiance : (B, 3, h, w) Tensor
+        Linear radiance, in units of k e x.
+    noisy : (B, 3, h, w) Tensor
+        The same before denoising.
+    guides : (B, 6, H, W) Tensor
+        Albedo in [0, 1] and normal.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+
+    Returns
+    -------
+    explained : Explained
+        The restored radiance, and what the guides explain of it.
     """
     height = radiance.shape[-2]
     bands = []
     for top in range(0, height, BAND):
         first, last = max(top - REACH, 0), min(top + BAND + REACH, height)
         rows = slice(first, last)
-        found = explain_band(
+        explained = explain_band(
             radiance[..., rows, :],
             noisy[..., rows, :],
             guides[..., first * scale : last * scale, :],
             scale,
         )
-        bands.append(found.rows(top - first, min(BAND, height - top), scale))
+        bands.append(explained.rows(top - first, min(BAND, height - top), scale))
     return (
         bands[0]
         if len(bands) == 1
@@ -89,7 +108,7 @@ def explain(radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int) -> Expl
 def explain_band(
     radiance: Tensor, noisy: Tensor, guides: Tensor, scale: int
 ) -> Explained:
-    """As `explain`, all at once."""
+    """Restore and regress all rows at once, which `explain` does band by band."""
     features = find_features(guides, scale)
     low = restore(radiance, find_grain(radiance, noisy), features, scale)
     grain = find_grain(low, noisy)
@@ -108,9 +127,16 @@ def find_features(guides: Tensor, scale: int) -> list[Feature]:
 
 
 def find_grain(radiance: Tensor, noisy: Tensor) -> Tensor:
-    """What a denoiser took from `noisy`, relative to what it left, within bounds.
+    """Return what a denoiser took away, relative to what it left, within bounds.
 
-    Both (B, 3, h, w), linear, in units of k e x.
+    Parameters
+    ----------
+    radiance, noisy : (B, 3, h, w) Tensor
+        After and before denoising; linear, in units of k e x.
+
+    Returns
+    -------
+    grain : (B, 3, h, w) Tensor
     """
     ratio = (noisy + RADIANCE_FLOOR) / (radiance + RADIANCE_FLOOR)
     return (ratio - 1).clamp(-1.0, GRAIN_LIMIT)
@@ -119,10 +145,25 @@ def find_grain(radiance: Tensor, noisy: Tensor) -> Tensor:
 def restore(
     radiance: Tensor, grain: Tensor, features: list[Feature], scale: int
 ) -> Tensor:
-    """The radiance (B, 3, h, w) with what the guides explain of its grain.
+    """Restore the texture that a denoiser at low resolution has mistaken for noise.
 
-    A denoiser at low resolution mistakes fine texture for noise; the grain still has
-    that texture. The mean around every pixel stays.
+    The grain still has that texture. The mean around every pixel stays.
+
+    Parameters
+    ----------
+    radiance : (B, 3, h, w) Tensor
+        Linear radiance, in units of k e x.
+    grain : (B, 3, h, w) Tensor
+        What the denoiser took away: see `find_grain`.
+    features : list of Feature
+        The guides.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+
+    Returns
+    -------
+    restored : (B, 3, h, w) Tensor
+        Radiance with what the guides explain of its grain.
     """
     slopes = blur(fit(grain, features, NOISE * scale)).split(1, dim=1)
     terms = (
@@ -137,13 +178,29 @@ def restore(
 def regress(
     radiance: Tensor, grain: Tensor, features: list[Feature], scale: int
 ) -> tuple[Tensor, Tensor]:
-    """What the guides explain of the radiance, as a factor, and the fit's slopes.
+    """Return what the guides explain of the radiance, and the slopes of the fit.
 
-    The factor (B, 3, H, W), positive, is albedo^a exp(n . w) with the slopes a and w of
-    a fit (B, 4, h, w) to `radiance` (B, 3, h, w), which is linear, in units of k e x.
-    The slopes are common to the colour channels, so grey stays grey. To first order
-    log radiance and `grain` add up to the log of the noisy radiance, without the bias
-    of a logarithm of noise.
+    The slopes are common to the colour channels, so grey stays grey. To first order log
+    radiance and grain add up to the log of the noisy radiance, without the bias of a
+    logarithm of noise.
+
+    Parameters
+    ----------
+    radiance : (B, 3, h, w) Tensor
+        Linear radiance, in units of k e x.
+    grain : (B, 3, h, w) Tensor
+        What a denoiser took away: see `find_grain`.
+    features : list of Feature
+        The guides.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+
+    Returns
+    -------
+    factor : (B, 3, H, W) Tensor
+        albedo^a exp(n . w), positive, with the slopes a and w.
+    slopes : (B, 4, h, w) Tensor
+        a and w.
     """
     target = (radiance + RADIANCE_FLOOR).log() + grain
     slopes = blur(fit(target, features, NOISE * scale))
@@ -156,11 +213,23 @@ def regress(
 
 
 def fit(target: Tensor, features: list[Feature], noise: float) -> Tensor:
-    """Slopes of `target` (B, 3, h, w) by each feature: (B, features, h, w).
+    """Fit the slopes of a target by each feature.
 
     Where a feature has three channels, they are samples of one variable: each channel
-    of the target goes with its own. `noise` is the unexplained variance that doubles
-    the ridge.
+    of the target goes with its own.
+
+    Parameters
+    ----------
+    target : (B, 3, h, w) Tensor
+        What is regressed.
+    features : list of Feature
+        What it is regressed on.
+    noise : float
+        Unexplained variance that doubles the ridge.
+
+    Returns
+    -------
+    slopes : (B, features, h, w) Tensor
     """
     count = len(features)
     x = [*(feature.low for feature in features), target]
@@ -215,11 +284,22 @@ def mean(x: Tensor) -> Tensor:
 
 
 def solve(matrix: dict[tuple[int, int], Tensor], size: int) -> list[Tensor]:
-    """Solve a positive definite system of `size` unknowns at every pixel.
+    """Solve a positive definite system at every pixel.
 
-    `matrix` holds the planes [i, j], i <= j, of the system and, as j = `size`, of its
-    right side. Elimination on whole planes: a batched solver would call LAPACK once for
-    each pixel.
+    Elimination works on whole planes: a batched solver would call LAPACK once for each
+    pixel.
+
+    Parameters
+    ----------
+    matrix : dict of (int, int) to Tensor
+        The planes [i, j], i <= j, of the system and, as j = `size`, of its right side.
+    size : int
+        Number of unknowns.
+
+    Returns
+    -------
+    solution : list of Tensor
+        A plane for each unknown.
     """
     rows = dict(matrix)
     for k in range(size):

@@ -81,10 +81,26 @@ class Tile:
 def tiles(
     low_height: int, low_width: int, tile: tuple[int, int], overlap: int, multiple: int
 ) -> list[Tile]:
-    """Cover a picture with tiles of at most `tile` (height, width).
+    """Cover a picture with tiles.
 
-    Every origin is a multiple of `multiple`, so that attention windows lie in a
-    tile as they do in the whole picture; neighbours share at least `overlap`.
+    Every origin is a multiple of `multiple`, so that attention windows lie in a tile as
+    they do in the whole picture.
+
+    Parameters
+    ----------
+    low_height, low_width : int
+        Size of the picture.
+    tile : tuple of int
+        Largest height and width of a tile.
+    overlap : int
+        Least overlap of adjacent tiles.
+    multiple : int
+        What origins are multiples of.
+
+    Returns
+    -------
+    tiles : list of Tile
+        Row by row.
     """
     rows = _spans(low_height, tile[0], overlap, multiple)
     columns = _spans(low_width, tile[1], overlap, multiple)
@@ -118,10 +134,24 @@ def _spans(length: int, tile: int, overlap: int, multiple: int) -> list[Span]:
 def fit(
     low_height: int, low_width: int, pixels: float, overlap: int, multiple: int
 ) -> tuple[int, int]:
-    """Return the tile (height, width) for at most `pixels` low-resolution pixels.
+    """Return the size of tiles for a number of pixels.
 
-    The picture itself if it is small enough; never smaller than two overlaps, below
-    which tiles cannot be blended.
+    Parameters
+    ----------
+    low_height, low_width : int
+        Size of the picture.
+    pixels : float
+        Most low-resolution pixels of a tile.
+    overlap : int
+        Overlap of adjacent tiles.
+    multiple : int
+        What heights and widths are multiples of.
+
+    Returns
+    -------
+    height, width : int
+        Those of the picture if it is small enough; never less than two overlaps, below
+        which tiles cannot be blended.
     """
     least = 2 * _up(overlap, multiple)
     square = max(math.isqrt(int(pixels)) // multiple * multiple, least)

@@ -67,17 +67,25 @@ class Upscaled:
 class Upscaler:
     """A network on a device, ready for any number of pictures.
 
-    Args:
-        preset: `paper`, `balanced` or `fast`.
-        scale: output pixels per low-resolution pixel along one axis.
-        device: `auto`, `cpu`, `metal`, or what torch knows: `cuda`, `cuda:1`.
-        precision: `auto`, `fp32` or `bf16`; only the layers of the network
-            ever run in bf16.
-        weights: a folder of presets, a file, or a network, in place of the shipped.
+    Parameters
+    ----------
+    preset : {'paper', 'balanced', 'fast'}
+        The network.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+    device : str
+        `auto`, `cpu`, `metal`, or what torch knows: `cuda`, `cuda:1`.
+    precision : {'auto', 'fp32', 'bf16'}
+        Only the layers of the network ever run in bf16.
+    weights : str, Path or XRDS, optional
+        A folder of presets, a file, or a network, in place of the shipped ones.
 
-    Raises:
-        WeightsError: the weights are missing, damaged or of another scale.
-        UsageError: the device or precision is not there.
+    Raises
+    ------
+    WeightsError
+        If the weights are missing, damaged or of another scale.
+    UsageError
+        If the device or precision is not there.
     """
 
     def __init__(
@@ -124,27 +132,50 @@ class Upscaler:
     ) -> Upscaled:
         """Enlarge one picture.
 
-        Args:
-            radiance: (h, w, 3), or (h, w, 4) premultiplied; scene-linear.
-            albedo: (H, W, 3), where h = ceil(H / scale) and w = ceil(W / scale).
-            normal: (H, W, 3), in camera space.
-            noisy: (h, w, 3), the radiance before it was denoised: shows how much of
-                the guides' texture is in the light. None where there is none.
-            guide_alpha: (H, W), the alpha of the guides' render; in place of the
-                picture's own, too, where `radiance` has none.
-            guide_samples: per pixel of albedo and normal; the noise of few of them
-                is denoised first. None where they are many, or not known.
-            exposure: of a picture this is a part of; None finds it in `radiance`.
-            memory_limit: bytes to aim at, beside the arrays given and returned. The
-                smallest tiles are taken where it is too small even for them.
-            tile: side of the tiles in low-resolution pixels, in place of a limit.
-            progress: called with fractions from 0 to exactly 1; False cancels.
+        Parameters
+        ----------
+        radiance : (h, w, 3) or (h, w, 4) float32 array
+            Scene-linear, with alpha premultiplied.
+        albedo : (H, W, 3) float32 array
+            h = ceil(H / scale) and w = ceil(W / scale).
+        normal : (H, W, 3) float32 array
+            In camera space.
+        noisy : (h, w, 3) float32 array, optional
+            The radiance before it was denoised: shows how much of the guides' texture
+            is in the light.
+        guide_alpha : (H, W) float32 array, optional
+            Alpha of the guides' render; in place of the picture's own, too, where
+            `radiance` has none.
+        guide_samples : int, optional
+            Samples per pixel of albedo and normal; the noise of few of them is denoised
+            first. None where they are many, or not known.
+        exposure : float, optional
+            Exposure of a picture that this is a part of; None finds it in `radiance`.
+        memory_limit : int, optional
+            Bytes to aim at, beside the arrays given and returned. The smallest tiles
+            are taken where it is too small even for them.
+        tile : int, optional
+            Side of the tiles in low-resolution pixels, in place of a limit.
+        progress : callable, optional
+            Takes fractions from 0 to exactly 1; False as its result cancels.
+        skip_idle : bool
+            Whether the network leaves out areas to which it has nothing to add.
 
-        Raises:
-            PictureError: the arrays do not fit each other or the scale.
-            WeightsError: what the network gives is no picture.
-            OutOfMemory: the device has no room even for the smallest tiles.
-            Cancelled: `progress` returned False.
+        Returns
+        -------
+        upscaled : Upscaled
+            The picture, and the exposure that was used.
+
+        Raises
+        ------
+        PictureError
+            If the arrays do not fit each other or the scale.
+        WeightsError
+            If what the network gives is no picture.
+        OutOfMemory
+            If the device has no room even for the smallest tiles.
+        Cancelled
+            If `progress` returned False.
         """
         scale, given = self.scale, (radiance, albedo, normal, guide_alpha, noisy)
         inputs = check(scale, *given, guide_samples)
@@ -318,13 +349,31 @@ def upscale(
     memory_limit: int | None = None,
     progress: Callback | None = None,
 ) -> Array:
-    """Enlarge one picture with the shipped weights; see `Upscaler` for the arrays.
+    """Enlarge one picture with the shipped weights; the last network used stays loaded.
 
-    `alpha` (H, W) is that of the guides' render; the picture's own is the fourth
-    channel of `radiance`. Returns (H, W, 3), with either alpha (H, W, 4). The last
-    network used stays loaded.
+    Parameters
+    ----------
+    radiance : (h, w, 3) or (h, w, 4) float32 array
+        Scene-linear, with alpha premultiplied.
+    albedo, normal : (H, W, 3) float32 array
+        Guides; h = ceil(H / scale) and w = ceil(W / scale).
+    scale, preset, device
+        Options of `Upscaler`.
+    noisy, guide_samples, exposure, memory_limit, progress
+        Options of a call of `Upscaler`.
+    alpha : (H, W) float32 array, optional
+        Alpha of the guides' render; the picture's own is the fourth channel of
+        `radiance`.
 
-    Raises WeightsError, UsageError, PictureError and Cancelled, as `Upscaler`.
+    Returns
+    -------
+    radiance : (H, W, 3) or (H, W, 4) float32 array
+        With either alpha (H, W, 4).
+
+    Raises
+    ------
+    WeightsError, UsageError, PictureError, Cancelled
+        For the reasons that `Upscaler` has.
     """
     return _upscaler(preset, scale, device)(
         radiance,

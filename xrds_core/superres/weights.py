@@ -31,9 +31,22 @@ def file_name(preset: str, scale: int) -> str:
 
 
 def unpack(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
-    """Whole numbers times their factors, as floats; what is a float already stays.
+    """Multiply whole numbers by their factors; what is a float already stays.
 
-    Raises ValueError where factors are missing or not one per output channel.
+    Parameters
+    ----------
+    tensors : dict of str to Tensor
+        Tensors of a file, by name.
+
+    Returns
+    -------
+    unpacked : dict of str to Tensor
+        Floats.
+
+    Raises
+    ------
+    ValueError
+        If factors are missing or not one per output channel.
     """
     unpacked = {k: v for k, v in tensors.items() if not k.endswith(FACTORS)}
     for name, tensor in unpacked.items():
@@ -47,10 +60,25 @@ def unpack(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
 
 
 def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:
-    """Return (network in float32 on the CPU, metadata) of a weights file.
+    """Load a weights file.
 
-    Raises WeightsError if the file is missing, damaged, or does not hold exactly the
-    tensors of the network that its configuration describes.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+
+    Returns
+    -------
+    network : XRDS
+        In float32 on the CPU.
+    metadata : dict of str to str
+        What the file says of it.
+
+    Raises
+    ------
+    WeightsError
+        If the file is missing, damaged, or does not hold exactly the tensors of the
+        network that its configuration describes.
     """
     path = Path(path)
     tensors, metadata = _read(path)
@@ -129,9 +157,28 @@ def _compare(
 def load_preset(
     preset: str, scale: int, directory: str | Path | None = None
 ) -> tuple[XRDS, dict[str, str]]:
-    """Return (network, metadata) of a shipped preset, or of one in `directory`.
+    """Load a shipped preset, or one of a folder.
 
-    Raises WeightsError, naming what there is, if there is no such file.
+    Parameters
+    ----------
+    preset : str
+        Its name.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+    directory : str or Path, optional
+        The folder.
+
+    Returns
+    -------
+    network : XRDS
+        In float32 on the CPU.
+    metadata : dict of str to str
+        What the file says of it.
+
+    Raises
+    ------
+    WeightsError
+        If there is no such file, naming what there is; or if it cannot be used.
     """
     folder = Path(directory or DIRECTORY)
     path = folder / file_name(preset, scale)
@@ -151,10 +198,25 @@ def load_preset(
 
 
 def choose_network(preset: str, scale: int, weights: str | Path | XRDS | None) -> XRDS:
-    """Return the network that `weights` names: a folder, a file, or the network itself.
+    """Return a network for a scale.
 
-    None means the shipped ones. Raises WeightsError if there is none such, or if it is
-    for another scale.
+    Parameters
+    ----------
+    preset : str
+        Name of the preset, in a folder.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+    weights : str, Path, XRDS or None
+        A folder, a file, or the network itself; None for the shipped ones.
+
+    Returns
+    -------
+    network : XRDS
+
+    Raises
+    ------
+    WeightsError
+        If there is none such, or if it is for another scale.
     """
     if isinstance(weights, XRDS):
         network = weights.eval()

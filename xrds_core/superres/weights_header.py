@@ -26,9 +26,17 @@ _LARGEST_HEADER = 1 << 20  # far above any real one; bounds hostile files
 
 @dataclass(frozen=True)
 class WeightsHeader:
-    """A network's preset, enlargement and the Blender series of its training.
+    """What the header of a weights file says.
 
-    `blender_series` as 4.5; empty where the file does not say.
+    Attributes
+    ----------
+    preset : str
+        Name of the preset.
+    scale : int
+        Output pixels per low-resolution pixel along one axis.
+    blender_series : str
+        Blender's series of the training, such as 4.5; empty where the file does not
+        say.
     """
 
     preset: str
@@ -37,9 +45,22 @@ class WeightsHeader:
 
 
 def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
-    """Return records {preset, scale, file, sha256, blender_series} of a folder.
+    """List the weights files of a folder.
 
-    Raises WeightsError if a file named as a preset's is damaged.
+    Parameters
+    ----------
+    directory : str or Path, optional
+        The folder; the shipped files by default.
+
+    Returns
+    -------
+    records : list of dict
+        With the keys preset, scale, file, sha256 and blender_series.
+
+    Raises
+    ------
+    WeightsError
+        If a file named as a preset's is damaged.
     """
     return [_record(path) for path in network_files(Path(directory or DIRECTORY))]
 
@@ -73,15 +94,15 @@ def headers(folder: Path | None = None) -> list[WeightsHeader]:
     A file that is no network's is left out: loading it will say why.
     """
     paths = sorted((folder or DIRECTORY).glob("*_x*.safetensors"))
-    found = (read_header(path) for path in paths)
-    return [header for header in found if header is not None]
+    headers_or_none = (read_header(path) for path in paths)
+    return [header for header in headers_or_none if header is not None]
 
 
 def read_header(path: Path) -> WeightsHeader | None:
     """That of one file; None where it holds no network, or is cut short."""
     try:
-        told = path.stat()
-        return _read(path, told.st_size, told.st_mtime_ns)
+        status = path.stat()
+        return _read(path, status.st_size, status.st_mtime_ns)
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
 

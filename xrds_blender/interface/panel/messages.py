@@ -108,20 +108,20 @@ def remarks(scene: Any, request: Request, here: Capabilities) -> list[Remark]:
     """Icon and sentence: what is missing first, then what is otherwise than usual."""
     chosen = request.settings.mode
     lacks = {m: missing(replace(request.settings, mode=m), here) for m in MODES}
-    found: list[Remark] = []
+    shown: list[Remark] = []
     if lacks[chosen]:
-        found.append(("ERROR", lacks[chosen]))
+        shown.append(("ERROR", lacks[chosen]))
     else:
-        found += [("ERROR", sentence) for sentence in _wrong(scene, chosen, here)]
+        shown += [("ERROR", sentence) for sentence in _wrong(scene, chosen, here)]
     not_offered = {text for mode, text in lacks.items() if text and mode is not chosen}
-    found += [
-        ("INFO", text) for text in sorted(not_offered) if ("ERROR", text) not in found
+    shown += [
+        ("INFO", text) for text in sorted(not_offered) if ("ERROR", text) not in shown
     ]
     if request.settings.is_enlarged:
         if not _knows_passes(request):
-            found.append(("ERROR", OTHER_PASSES))
-        found += [("INFO", sentence) for sentence in notes_of(scene)]
-    return found
+            shown.append(("ERROR", OTHER_PASSES))
+        shown += [("INFO", sentence) for sentence in notes_of(scene)]
+    return shown
 
 
 def _wrong(scene: Any, mode: Mode, here: Capabilities) -> list[str]:
@@ -137,8 +137,8 @@ def _wrong(scene: Any, mode: Mode, here: Capabilities) -> list[str]:
 def _knows_passes(request: Request) -> bool:
     """Whether the weights were trained on denoising passes as this Blender has them."""
     series = {
-        (each.preset, each.scale): each.blender_series
-        for each in weights_headers(request.machine.weights)
+        (header.preset, header.scale): header.blender_series
+        for header in weights_headers(request.machine.weights)
     }.get(request.settings.network, "")
     if not series:
         return True

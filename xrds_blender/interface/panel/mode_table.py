@@ -38,8 +38,8 @@ def word_for(
 
 def _above(mode: Mode, estimates: Sequence[Estimate]) -> float | None:
     """How far above Cycles' picture a mode's is expected; None where unknown."""
-    found = {each.mode: each.decibels for each in estimates}
-    ours, cycles = found.get(mode), found.get(Mode.CYCLES_ONLY)
+    decibels = {estimate.mode: estimate.decibels for estimate in estimates}
+    ours, cycles = decibels.get(mode), decibels.get(Mode.CYCLES_ONLY)
     return None if ours is None or cycles is None else ours - cycles
 
 
@@ -61,22 +61,24 @@ def draw(
     column = layout.column(align=True)
     text = f"{translated('Automatic')} ({_automatic(settings, best)})"
     column.prop_enum(settings, "mode", Mode.AUTOMATIC.value, text=text, translate=False)
-    timed = any(each.seconds is not None for each in estimates)
+    timed = any(estimate.seconds is not None for estimate in estimates)
     mode, seconds, quality = _cells(column, timed)
     mode.label(text="")
     if timed:
         seconds.label(text="Estimated Time", text_ctxt=CONTEXT)
     quality.label(text="Picture", text_ctxt=CONTEXT)
-    found = {each.mode: each for each in estimates}
-    shown = [mode for mode in MODES if mode in found or settings.mode == mode]
+    by_mode = {estimate.mode: estimate for estimate in estimates}
+    shown = [mode for mode in MODES if mode in by_mode or settings.mode == mode]
     enlarged = [mode for mode in shown if mode.is_enlarged]
-    for each in shown:
-        if each is Mode.CYCLES_ONLY:
+    for shown_mode in shown:
+        if shown_mode is Mode.CYCLES_ONLY:
             column.separator(factor=0.5)
-        if each in enlarged[:1]:
+        if shown_mode in enlarged[:1]:
             column.label(text="Super-Resolution", text_ctxt=CONTEXT)
-        word = word_for(each, estimates, scene, here)
-        _draw_mode(column, settings, found.get(each, Estimate(each)), word, timed)
+        word = word_for(shown_mode, estimates, scene, here)
+        _draw_mode(
+            column, settings, by_mode.get(shown_mode, Estimate(shown_mode)), word, timed
+        )
 
 
 def _draw_mode(

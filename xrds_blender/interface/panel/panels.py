@@ -54,12 +54,12 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
         request = request_of(scene.xrds)
         here = capabilities(request.machine.weights)
         shot = summary.is_shot(scene, request)
-        found = estimates(scene, request.settings, here, shot)
+        estimated = estimates(scene, request.settings, here, shot)
         if summary.is_animation(scene):
-            expected = summary.expected(scene, request, here, found)
+            expected = summary.expected(scene, request, here, estimated)
             summary.draw(layout, context, expected)
             layout.separator()
-        mode_table.draw(layout, scene, here, automatic(here), found)
+        mode_table.draw(layout, scene, here, automatic(here), estimated)
         layout.use_property_split = True
         layout.use_property_decorate = False
         _draw_choices(layout, scene, request, here)
@@ -118,8 +118,8 @@ class XRDS_PT_under_cycles(bpy.types.Panel):
             request = request_of(scene.xrds)
             here = capabilities(request.machine.weights)
             shot = summary.is_shot(scene, request)
-            found = estimates(scene, request.settings, here, shot)
-            expected = summary.expected(scene, request, here, found)
+            estimated = estimates(scene, request.settings, here, shot)
+            expected = summary.expected(scene, request, here, estimated)
             summary.draw(layout, context, expected)
         operators.draw(layout.column(align=True))
 

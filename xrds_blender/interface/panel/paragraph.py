@@ -24,13 +24,13 @@ def draw(layout: Any, context: Any, text: str, icon: str = "NONE") -> None:
 
 def lines(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
     """The text in lines of at most `width`, by `measure`; a long word alone."""
-    found, line = [], ""
+    finished, line = [], ""
     for part in _parts(text):
         if line and measure((line + part).rstrip()) > width:
-            found.append(line.rstrip())
+            finished.append(line.rstrip())
             line = ""
         line += part
-    return [*found, line.rstrip()] if line.strip() else found
+    return [*finished, line.rstrip()] if line.strip() else finished
 
 
 def _parts(text: str) -> Iterator[str]:
@@ -60,5 +60,5 @@ def translated(text: str, **values: object) -> str:
     """A text of the panel in the interface's language, with values put in."""
     from ..translations import CONTEXT
 
-    found = bpy.app.translations.pgettext_iface(text, CONTEXT)
-    return found.format(**values) if values else found
+    translation = bpy.app.translations.pgettext_iface(text, CONTEXT)
+    return translation.format(**values) if values else translation

@@ -123,7 +123,7 @@ def _enlarged(scene: Any, request: Request) -> list[Row]:
         ("Memory", f"≤ {_amount(taken)}"),
         *_neighbours(scene, request),
     ]
-    skipped = ", ".join(translated(each) for each in _skipped(chosen))
+    skipped = ", ".join(translated(name) for name in _skipped(chosen))
     return [*rows, ("Skipped", skipped)] if skipped else rows
 
 
@@ -134,8 +134,8 @@ def _skipped(chosen: Plan) -> list[str]:
         "mirrors in the guides": chosen.render_guides and not chosen.guides.bounces,
         "the denoiser": not chosen.denoise,
         "motion blur": any(
-            each.decision == "motion blur" and each.value == "skipped"
-            for each in chosen.decisions
+            decision.decision == "motion blur" and decision.value == "skipped"
+            for decision in chosen.decisions
         ),
     }
     return [name for name, is_skipped in parts.items() if is_skipped]
@@ -212,7 +212,7 @@ def expected(
     here: Capabilities,
     estimated: Sequence[Estimate],
 ) -> Expected:
-    """What to expect of the scene's range, in modes as `estimated` for a shot."""
+    """What to expect of the scene's range, from the modes `estimated` for a shot."""
     frames = len(frame_range(scene))
     is_shot = has_neighbours(scene, request)
     known = history.scene_settings(scene)
@@ -234,23 +234,23 @@ def expected(
     )
 
 
-def draw(layout: Any, context: Any, found: Expected) -> None:
+def draw(layout: Any, context: Any, times: Expected) -> None:
     """Draw what it takes in Cycles and in XRDS, and where that is from."""
     column = layout.column(align=True)
-    title = translated("Animation, {count} frames", count=found.frames)
+    title = translated("Animation, {count} frames", count=times.frames)
     column.label(text=title, translate=False)
-    limit = "≤ " if found.at_most else ""
+    limit = "≤ " if times.at_most else ""
     rows = [
-        ("Cycles", _both(found.cycles, found.frames)),
-        ("XRDS", _both(found.ours, found.frames, limit)),
-        (translated("Picture"), found.picture),
+        ("Cycles", _both(times.cycles, times.frames)),
+        ("XRDS", _both(times.ours, times.frames, limit)),
+        (translated("Picture"), times.picture),
     ]
     for name, value in rows:
         split = column.split(factor=0.3)
         split.label(text=name, translate=False)
         split.label(text=value, translate=False)
-    known = None not in (found.cycles, found.ours)
-    notes = [EXPECTED if known else UNKNOWN, STILLS if found.is_shot else ALONE]
+    known = None not in (times.cycles, times.ours)
+    notes = [EXPECTED if known else UNKNOWN, STILLS if times.is_shot else ALONE]
     for note in notes:
         paragraph.draw(layout, context, translated(note))
 
@@ -259,5 +259,5 @@ def _both(seconds: float | None, frames: int, limit: str = "") -> str:
     """The time of all frames, and of one."""
     if seconds is None:
         return "?"
-    whole, each = limit + duration(seconds * frames), duration(seconds)
-    return translated("{whole}, a frame {each}", whole=whole, each=each)
+    whole, per_frame = limit + duration(seconds * frames), duration(seconds)
+    return translated("{whole}, a frame {each}", whole=whole, each=per_frame)
