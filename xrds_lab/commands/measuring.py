@@ -42,11 +42,8 @@ def add_evaluate(commands: Any) -> argparse.ArgumentParser:
         default=("fast",),
         help="as fast,balanced",
     )
-    add("--timing", action="store_true", help="also time whole frames")
-    add("--timing-scenes", type=arguments.words, help="of these alone, as bmw27,house")
     add("--weights", type=Path, help="folder of weights files")
     add("-o", "--out", type=arguments.folder, help="folder for results.json")
-    add("--sheets", type=Path, help="folder for a JPEG of crops for each scene")
     command.set_defaults(work=_evaluate, lines=no_lines)
     return command
 
@@ -62,10 +59,7 @@ def _evaluate(options: argparse.Namespace) -> dict[str, Any]:
         cache=options.cache,
         scales=options.scale,
         presets=options.preset,
-        timing=options.timing,
-        timing_scenes=options.timing_scenes,
         out=options.out,
-        sheets=options.sheets,
         weights=options.weights,
         progress=report_line,
     )
