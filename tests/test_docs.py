@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 import shlex
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -100,10 +101,23 @@ OTHERS = """
 
 
 def options_of_all_commands() -> set[str]:
-    parser = main._parser([])
-    found = [x for x in parser._actions if isinstance(x, argparse._SubParsersAction)]
-    each = [x for parsers in found for x in parsers.choices.values()]
-    return {name for x in each for y in x._actions for name in y.option_strings}
+    return {
+        name
+        for command in commands_below(main._parser([]))
+        for action in command._actions
+        for name in action.option_strings
+    }
+
+
+def commands_below(
+    parser: argparse.ArgumentParser,
+) -> Iterator[argparse.ArgumentParser]:
+    """The commands of a parser, and theirs."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for command in action.choices.values():
+                yield command
+                yield from commands_below(command)
 
 
 @pytest.mark.parametrize("folder", ["xrds_core", "xrds_blender", "docs"])

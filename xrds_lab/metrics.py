@@ -7,9 +7,6 @@ transform is the plain sRGB curve, so that no figure depends on a tone mapper.
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
 
 from xrds_core.arrays import Array
@@ -62,21 +59,6 @@ def flip(picture: Array, reference: Array, exposure: float = 0.0) -> float:
     return float(flip_evaluator.evaluate(*shown, "LDR", applyMagma=False)[1])
 
 
-def lpips(picture: Array, reference: Array, exposure: float = 0.0) -> float:
-    """LPIPS (Zhang et al. 2018, AlexNet) of the display values, 0 is equal.
-
-    Raises PictureError for bad arrays, ImportError without `lpips`.
-    """
-    import torch
-
-    from xrds_core.superres.front_end import to_planes
-
-    _check(picture, reference)
-    shown = [to_planes(to_srgb(x, exposure) * 2 - 1) for x in (picture, reference)]
-    with torch.inference_mode():
-        return float(_lpips_network()(*shown))
-
-
 def all_metrics(
     picture: Array, reference: Array, exposure: float = 0.0
 ) -> dict[str, float]:
@@ -87,13 +69,6 @@ def all_metrics(
         "relmse_trimmed": relmse(picture, reference, TRIMMED_FRACTION),
         "flip": flip(picture, reference, exposure),
     }
-
-
-@lru_cache(maxsize=1)
-def _lpips_network() -> Any:
-    import lpips as package
-
-    return package.LPIPS(net="alex", verbose=False).eval()
 
 
 def _check(picture: Array, reference: Array) -> None:

@@ -18,6 +18,7 @@ from xrds_blender import run_job
 from xrds_blender.planning import budget
 from xrds_blender.planning.settings import Denoising, Mode, Network, Settings
 from xrds_core.errors import UsageError
+from xrds_lab import metrics
 from xrds_lab.bench import inputs, measure, pictures, sweep, tasks
 from xrds_lab.bench.bench import bench
 from xrds_lab.bench.crops import SHOWN
@@ -93,7 +94,7 @@ def test_report_is_whole_and_a_second_run_measures_nothing(
         raise AssertionError("measured again")
 
     with monkeypatch.context() as patch:
-        patch.setattr(pictures, "measured", refuse)
+        patch.setattr(metrics, "all_metrics", refuse)
         patch.setattr(pictures.Pictures, "render", lambda *_: None)
         patch.setattr(tasks, "frame", refuse)
         again = world.run(picker=True, budgets=(3.0,))
@@ -186,9 +187,9 @@ def test_another_denoiser_is_measured_anew(
 ) -> None:
     world.run(timing=False)
     judged: list[float] = []
-    measured = pictures.measured
+    measured = metrics.all_metrics
     monkeypatch.setattr(
-        pictures, "measured", lambda *given: judged.append(1) or measured(*given)
+        metrics, "all_metrics", lambda *given: judged.append(1) or measured(*given)
     )
     world.run(timing=False)
     assert not judged

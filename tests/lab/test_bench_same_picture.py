@@ -13,7 +13,7 @@ import pytest
 from xrds_core.errors import UsageError
 from xrds_lab.bench.windows import Window, find_shots
 from xrds_lab.cards import cycles
-from xrds_lab.commands import measuring
+from xrds_lab.commands import bench_shots
 from xrds_lab.shots import motions, sooner
 from xrds_lab.shots.sooner import CYCLES, SAME_PICTURE, SAME_SAMPLES, Case
 
@@ -104,9 +104,9 @@ def test_a_larger_window_ends_where_the_frame_does(
 
 def test_a_card_that_is_not_here_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cycles, "find_card", lambda: cycles.CPU)
-    options = Namespace(card=True, motions=None, samples=(8,), noise_thresholds=None)
+    options = Namespace(card=True, motions=(), samples=(8,), noise_thresholds=None)
     with pytest.raises(UsageError, match="no graphics card"):
-        measuring._bench_same_picture(options)
+        bench_shots._same_picture(options)
 
 
 def test_a_shot_that_is_too_short_is_refused(blend: Path) -> None:

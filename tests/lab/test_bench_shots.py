@@ -195,7 +195,7 @@ def test_the_command_passes_on_what_is_measured(
         return {"shots": [], "failures": {}}
 
     monkeypatch.setattr(bench, "bench_shots", note)
-    given = ["bench", str(blend), "--shots", "-o", str(tmp_path), "--samples", "4"]
+    given = ["bench", "shots", str(blend), "-o", str(tmp_path), "--samples", "4"]
     assert main.main([*given, "--seeds", "3"]) == 0
     assert main.main(given) == 0
     assert [(m.samples, m.seeds) for m in asked] == [((4,), 3), ((4,), 1)]

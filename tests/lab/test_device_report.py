@@ -1,4 +1,4 @@
-"""`xrds bench --device-report`, without a card: its rows, its files, going on."""
+"""`xrds bench device-report`, without a card: its rows, its files, going on."""
 
 from __future__ import annotations
 

@@ -10,10 +10,8 @@ from typing import Any
 import bpy
 import numpy as np
 import pytest
-from PIL import Image
 
 from xrds_core import exr
-from xrds_core.errors import UsageError
 from xrds_core.superres.network import XRDS, preset_config
 from xrds_lab import metrics
 from xrds_lab.bench.evaluate import evaluate
@@ -109,7 +107,6 @@ def test_every_rival_is_measured(report: dict[str, Any]) -> None:
             assert 10 < row["psnr"] < 60
             assert 0 < row["relmse_trimmed"] <= row["relmse"] < 1
             assert 0 < row["flip"] < 1
-            assert row["seconds"] is None
         assert record["reference_psnr_floor"] == 42.0
 
 
@@ -158,39 +155,17 @@ def test_a_spoilt_file_is_rendered_again(world: World, report: dict[str, Any]) -
     assert file.stat().st_size > 5000
 
 
-def test_weights_and_whole_frames(world: World) -> None:
+def test_the_product_comes_first(world: World) -> None:
     network = XRDS(preset_config("fast", 2))
     save_network(network, world.folder / "fast_x2.safetensors", {})
-    report = world.run(
-        weights=world.folder,
-        timing=True,
-        timing_rounds=1,
-        timing_scenes=["floor"],
-        sheets=world.folder / "sheets",
-    )
+    report = world.run(weights=world.folder)
     (record,) = report["scenes"]
     assert next(iter(record["methods"])) == "xrds"
     assert record["gain"] == report["worst"]["2"]["fast"]["gain"]
-    assert "oidn_equal_time" in record["methods"]
-    stages = record["frame_seconds"]["xrds"]
-    parts = sum(stages[p] for p in ("sync", "beauty", "denoise", "guides", "network"))
-    assert 0 < parts <= stages["total"]
-    assert record["methods"]["xrds"]["seconds"] == stages["total"]
-    assert record["frame_seconds"]["oidn_equal_time"]["samples"] >= 1
-    with Image.open(world.folder / "sheets" / "floor.jpg") as sheet:
-        assert sheet.width == 5 * (WINDOW[2] * 4 + 2)
-        assert sheet.height == 2 * (WINDOW[3] * 4 + 2 * 18)
 
 
-def test_rivals_are_timed_without_weights(world: World) -> None:
+def test_rivals_are_measured_without_weights(world: World) -> None:
     folder = world.folder / "empty"
     folder.mkdir()
-    report = world.run(weights=folder, timing=True, timing_rounds=1)
-    (record,) = report["scenes"]
+    (record,) = world.run(weights=folder)["scenes"]
     assert set(record["methods"]) == set(ENLARGEMENTS) | {"oidn_equal_spp"}
-    assert all(row["seconds"] > 0 for row in record["methods"].values())
-
-
-def test_unknown_names_are_refused(world: World) -> None:
-    with pytest.raises(UsageError, match="boat"):
-        world.run(timing=True, timing_scenes=["floor", "boat"])

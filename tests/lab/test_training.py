@@ -24,7 +24,6 @@ from xrds_lab.training.config import TrainingConfig, read_config, to_toml
 from xrds_lab.training.data import Variation
 from xrds_lab.training.interruption import Interruption
 from xrds_lab.training.losses import LOSSES
-from xrds_lab.training.rivals import EDSR, RIVALS, build_rival
 from xrds_lab.training.train import Run, train
 from xrds_lab.training.validation import Score, Validation, in_order, summary
 from xrds_lab.training.windows import WindowSet
@@ -144,28 +143,6 @@ def test_weights_start_another_scale(
     assert (
         ours["radiance_head.1.weight"].shape != theirs["radiance_head.1.weight"].shape
     )
-
-
-@undrawn
-def test_rivals_learn_without_guides_and_leave_no_weights(
-    config: TrainingConfig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setitem(RIVALS, "edsr", lambda scale: EDSR(scale, channels=8, blocks=2))
-    figures = train(replace(config, rival="edsr"), tmp_path / "edsr")
-    assert figures is not None
-    assert figures["step"] == config.steps
-    assert not (tmp_path / "edsr" / "weights.safetensors").exists()
-    low, guides = torch.rand(1, 3, 5, 6), torch.rand(1, 6, 20, 24)
-    network = build_rival("edsr", 4)
-    enlarged = network(low, guides)
-    assert enlarged.shape == (1, 3, 20, 24)
-    assert torch.equal(network(low, 1 - guides), enlarged)
-
-
-def test_rivals_of_a_library_say_which_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "spandrel", None)
-    with pytest.raises(UsageError, match="pip install spandrel"):
-        build_rival("swinir", 4)
 
 
 def test_divergence_is_said_and_not_kept(

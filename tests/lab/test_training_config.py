@@ -26,7 +26,6 @@ CONFIGS = sorted((Path(xrds_lab.training.__file__).parent / "configs").glob("*.t
         ("data = '.'\n[variation]\nnoise = 1.0", "noise"),
         ("data = '.'\ncrop = 33", "crop 33"),
         ("data = '.'\nworkers = 0", "workers is 0"),
-        ("data = '.'\nrival = 'x'", "rival 'x' is none of"),
         ("data = '.'\npreset = 'best'", "best"),
         ("data = '.'\n[network]\nwidth = 3", "width"),
         ("data = '.'\nscale = 3\ncrop = 33", "scale is 3"),

@@ -109,18 +109,6 @@ def test_light_of_our_own_keeps_the_noise_of_what_was_rendered() -> None:
     np.testing.assert_allclose(dark, reference)
 
 
-def test_hidden_guides_are_not_seen() -> None:
-    guides = torch.rand(1, 6, 2, 2)
-    batch = Batch(guides, guides, guides, guides)
-    hidden = {name: batch.seen(name) for name in ("", "albedo", "normal", "guides")}
-    assert torch.equal(hidden[""], guides)
-    assert torch.equal(hidden["albedo"][:, 3:], guides[:, 3:])
-    assert torch.equal(hidden["normal"][:, :3], guides[:, :3])
-    assert not hidden["albedo"][:, :3].any()
-    assert not hidden["normal"][:, 3:].any()
-    assert not hidden["guides"].any()
-
-
 def test_rotations_are_rotations() -> None:
     rotation = random_rotation(np.random.default_rng(3))
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-6)

@@ -1,7 +1,7 @@
 """What fits into the seconds of a still: the least error expected in them.
 
 Seconds come from a cost model of the scene at hand (what the probes found), errors
-from a table that `xrds bench` measured on other scenes. Pure functions: neither
+from a table that `xrds bench stills` measured on other scenes. Pure functions: neither
 Blender nor torch is needed here.
 """
 
@@ -151,7 +151,7 @@ class ErrorModel:
 
 @dataclass(frozen=True)
 class Model:
-    """What `xrds bench` has learnt about all scenes and all machines.
+    """What `xrds bench stills` has learnt about all scenes and all machines.
 
     `denoiser_speed` and `network_speed` are seconds at one size over those of
     DEFAULT_DENOISING, which a probe measures; `other_per_megapixel` seconds of reading,
@@ -166,7 +166,7 @@ class Model:
 
     @classmethod
     def read(cls, path: Path = MODEL) -> Model:
-        """From the file that `xrds bench --model` writes."""
+        """From the file that `xrds bench stills --model` writes."""
         content = json.loads(path.read_text("utf-8"))
         curves = {
             _family(entry["settings"]): Curve(

@@ -1,4 +1,4 @@
-"""`xrds bench`: error against run time of every method, on this machine.
+"""`xrds bench stills`: error against run time of every method, on this machine.
 
 One call measures, resumes and reports: whatever an earlier call with the same output
 folder has measured is kept, and the report is written anew after every scene.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 from functools import lru_cache, partial
 from pathlib import Path
@@ -218,7 +217,7 @@ class Pictures:
         """Error measures, computed once for these weights."""
         key = self._key(config)
         if key not in self._errors:
-            self._errors[key] = measured(
+            self._errors[key] = metrics.all_metrics(
                 self.picture(config), self.reference(), self.exposure(config)
             )
         return dict(self._errors[key])
@@ -254,28 +253,9 @@ def _cleaned(arrays: Arrays) -> Arrays:
     return {n: _CLEAN[n](array)[0] for n, array in arrays.items() if n in _CLEAN}
 
 
-def measured(picture: Array, reference: Array, stops: float) -> dict[str, float]:
-    """All error measures; LPIPS where its package and weights are installed."""
-    errors = metrics.all_metrics(picture, reference, stops)
-    if has_lpips():
-        errors["lpips"] = metrics.lpips(picture, reference, stops)
-    return errors
-
-
 @lru_cache(maxsize=1)
 def _denoisers_code() -> str:
     return checksum(Path(denoising.__file__).parent.glob("*.py"))
-
-
-@lru_cache(maxsize=1)
-def has_lpips() -> bool:
-    """Whether LPIPS can be computed without fetching anything."""
-    if importlib.util.find_spec("lpips") is None:
-        return False
-    import torch
-
-    folder = Path(torch.hub.get_dir()) / "checkpoints"
-    return any(folder.glob("alexnet-*.pth"))
 
 
 @lru_cache(maxsize=2)

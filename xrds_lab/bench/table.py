@@ -17,10 +17,9 @@ COLUMNS = {
     "joint_bilateral": "joint b.",
     "regressed": "regressed",
     "oidn_equal_spp": "OIDN=spp",
-    "oidn_equal_time": "OIDN=time",
 }
-FIGURES = ("psnr", "relmse", "relmse_trimmed", "flip", "seconds")
-_DIGITS = {"psnr": 2, "relmse": 4, "relmse_trimmed": 4, "flip": 4, "seconds": 1}
+FIGURES = ("psnr", "relmse", "relmse_trimmed", "flip")
+_DIGITS = {"psnr": 2, "relmse": 4, "relmse_trimmed": 4, "flip": 4}
 
 
 def case(network: Network) -> str:
@@ -70,8 +69,7 @@ def _block(records: list[Record], report: dict[str, Any]) -> str:
         lines.append(_row(record["scene"], [_cell(x, 2) for x in figures]))
     mean = report["mean"][scale][preset]
     gains = report["worst"].get(scale, {}).get(preset)
-    timed = any(row["seconds"] is not None for row in mean.values())
-    for figure in FIGURES if timed else FIGURES[:-1]:
+    for figure in FIGURES:
         cells = [mean.get(name, {}).get(figure) for name in COLUMNS]
         cells += [gains["mean"]] if gains and figure == "psnr" else []
         shown = [_cell(x, _DIGITS[figure]) for x in cells]
@@ -112,19 +110,16 @@ def _by_case(records: list[Record], summary: Any) -> dict[str, dict[str, Any]]:
     return result
 
 
-def _mean_methods(records: list[Record]) -> dict[str, dict[str, float | None]]:
-    result: dict[str, dict[str, float | None]] = {}
+def _mean_methods(records: list[Record]) -> dict[str, dict[str, float]]:
+    result: dict[str, dict[str, float]] = {}
     for name in COLUMNS:
         rows = [r["methods"][name] for r in records if name in r["methods"]]
         if rows:
-            figures = {key: _mean([row[key] for row in rows]) for key in FIGURES}
+            figures = {
+                key: statistics.fmean(row[key] for row in rows) for key in FIGURES
+            }
             result[name] = {"windows": len(rows)} | figures
     return result
-
-
-def _mean(values: list[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return statistics.fmean(known) if known else None
 
 
 def _worst_gain(records: list[Record]) -> dict[str, Any]:

@@ -83,7 +83,7 @@ class Window:
 class Shot:
     """A scene file seen through a window, with the reference to compare with.
 
-    Without one, `xrds bench` renders its own. Cycles renders on a `device`: the
+    Without one, a bench renders its own. Cycles renders on a `device`: the
     processor, or a kind of card as `find_card` names it. Of shots that are timed
     pictures of a `size` are rendered, width and height, and judged in the window.
     """

@@ -1,1 +1,1 @@
-"""What a graphics card saves: `xrds bench --device-report`."""
+"""What a graphics card saves: `xrds bench device-report`."""

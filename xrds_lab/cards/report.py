@@ -1,4 +1,4 @@
-"""`xrds bench --device-report`: every stage on the card of this machine and beside it.
+"""`xrds bench device-report`: every stage on the card of this machine and beside it.
 
 Three shots of the gallery, which the project makes itself. Cases are kept as they are
 done, so a run that was stopped, or ran out of minutes, goes on where it was.

@@ -1,4 +1,4 @@
-"""`xrds bench --gallery`: renders what is missing, judges, and writes the report.
+"""`xrds bench gallery`: renders what is missing, judges, and writes the report.
 
 Whatever earlier calls with the same cache have measured is in the report too, so that
 a long measure can be made in parts.

@@ -85,7 +85,7 @@ def page(results: dict[str, Any]) -> str:
 
 def _introduction(settings: Point) -> str:
     return (
-        "Written by <code>xrds bench --gallery</code>. Each shot has nine frames; the "
+        "Written by <code>xrds bench gallery</code>. Each shot has nine frames; the "
         "middle one and the first are finished with their neighbours' samples and "
         "alone, at the same samples, and judged against two references of "
         f"{settings['reference_samples']} samples and independent noise, as the mean "

@@ -1,6 +1,6 @@
 """`python -m xrds_lab.held_out ASSETS OUT` builds the held-out scenes as .blend files.
 
-They are measured by `xrds bench OUT/*.blend --shots --motions file`.
+They are measured by `xrds bench shots OUT/*.blend --motions file`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`xrds bench --shots`: the standard measure for shots, on this machine.
+"""`xrds bench shots`: the standard measure for shots, on this machine.
 
 One call measures, resumes and reports. Whatever earlier calls with the same cache have
 measured is in the report too, so that a long measure can be made in parts.

@@ -1,4 +1,4 @@
-"""`xrds bench --light-parts`: the parts of the light, denoised with the picture.
+"""`xrds bench light-parts`: the parts of the light, denoised with the picture.
 
 Each scene is made a shot. Its middle frame's parts are judged: as rendered, each
 denoised by itself, and finished with the picture, by themselves and in the shot. A lamp

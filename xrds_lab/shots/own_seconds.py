@@ -1,4 +1,4 @@
-"""`xrds bench --own-seconds`: what finishing a frame of a shot costs, part by part.
+"""`xrds bench own-seconds`: what finishing a frame of a shot costs, part by part.
 
 Frames of synthetic samples, without a renderer. All parts run once per round, on as
 many cores as asked for, so that a slow minute of the machine hits all; told are
@@ -277,7 +277,7 @@ def page(results: Row) -> str:
     lines = [
         "# Our own seconds",
         "",
-        "Written by `xrds bench --own-seconds`: a frame of synthetic samples, "
+        "Written by `xrds bench own-seconds`: a frame of synthetic samples, "
         f"{width}x{height}, radius {RADIUS}, by the clock and of the processors; least "
         "is what the bytes that a part has to move take at the "
         f"{results['bandwidth'] / 1e9:.1f} GB/s of one core.",

@@ -26,7 +26,7 @@ _NAMES = {
 }
 _INTRODUCTION = """# Shots
 
-Written by `xrds bench --shots`. Each scene is made a shot of nine frames (17 for a
+Written by `xrds bench shots`. Each scene is made a shot of nine frames (17 for a
 temporal radius of 8), whose middle frame is the file's own view, so that the scene's
 reference judges it. All methods get the same samples. PSNR in dB and FLIP are of the
 middle frame, in sRGB at the scene's exposure. A *gain* is in dB over Cycles + OIDN's

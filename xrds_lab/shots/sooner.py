@@ -1,4 +1,4 @@
-"""`xrds bench --same-picture`: in how many seconds the picture of a file's settings.
+"""`xrds bench same-picture`: in how many seconds the picture of a file's settings.
 
 Each scene is made a shot, or moves as its file says. Cycles + OIDN renders frames of it
 with all samples, XRDS the whole shot with as few as it chooses, and nine frames with
@@ -361,7 +361,7 @@ def _write(parts: Sequence[_Scene], journal: Journal, out: Path) -> dict[str, An
     write_table(out / "results.csv", rows)
     lines = [
         "# The same picture, sooner",
-        "Written by `xrds bench --same-picture`. *Gain* is in dB over Cycles + OIDN of "
+        "Written by `xrds bench same-picture`. *Gain* is in dB over Cycles + OIDN of "
         "all samples, blocks of 32x32 pixels against those of that picture.",
         "\n".join(_table(rows)),
     ]

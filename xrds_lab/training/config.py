@@ -17,10 +17,8 @@ from xrds_core.errors import UsageError
 from xrds_core.superres.devices import choose_precision
 from xrds_core.superres.network import NetworkConfig, preset_config
 
-from .crop import HIDDEN
 from .data import Variation
 from .losses import LOSSES
-from .rivals import RIVALS
 
 _LEAST = {
     "scale": 1,
@@ -45,10 +43,6 @@ class TrainingConfig:
     scale: int = 2
     network: dict[str, Any] = field(default_factory=dict)
     """Changes to the preset's `NetworkConfig`."""
-    rival: str = ""
-    """One of `rivals.RIVALS`, trained in the preset's place for comparison."""
-    hidden: str = ""
-    """One of `crop.HIDDEN`, black to the network, for comparison."""
     start: str = ""
     """Weights file to start from: tensors of the same name and shape are taken."""
     seed: int = 0
@@ -84,10 +78,6 @@ class TrainingConfig:
         unknown = set(self.loss) - set(LOSSES)
         if unknown:
             raise UsageError(f"loss {sorted(unknown)} is none of {sorted(LOSSES)}")
-        if self.rival and self.rival not in RIVALS:
-            raise UsageError(f"rival {self.rival!r} is none of {sorted(RIVALS)}")
-        if self.hidden and self.hidden not in HIDDEN:
-            raise UsageError(f"hidden {self.hidden!r} is none of {sorted(HIDDEN)}")
         for name, least in _LEAST.items():
             if getattr(self, name) < least:
                 raise UsageError(f"{name} is {getattr(self, name)}, less than {least}")

@@ -12,9 +12,6 @@ from torch import Tensor
 from xrds_core.arrays import Array
 from xrds_core.superres.front_end import transfer
 
-# Channels of guides that a network can be kept from seeing, to find what they bring.
-HIDDEN = {"albedo": slice(3), "normal": slice(3, 6), "guides": slice(6)}
-
 
 @dataclass(frozen=True)
 class Crop:
@@ -73,14 +70,6 @@ class Batch:
                 for field in fields(Batch)
             )
         )
-
-    def seen(self, hidden: str) -> Tensor:
-        """The guides, 0 where they are `hidden`."""
-        if not hidden:
-            return self.guides
-        guides = self.guides.clone()
-        guides[:, HIDDEN[hidden]] = 0.0
-        return guides
 
     def to(self, device: torch.device) -> Batch:
         """The same on a device."""

@@ -20,16 +20,8 @@ from .config import TrainingConfig
 from .crop import Batch
 from .losses import weighted
 from .processes import Processes
-from .rivals import build_rival
 
 AVERAGE_WARMUP = 10  # steps: a young average follows the weights closely
-
-
-def build_network(config: TrainingConfig) -> torch.nn.Module:
-    """The network that a configuration trains, untrained."""
-    if config.rival:
-        return build_rival(config.rival, config.scale)
-    return XRDS(config.network_config)
 
 
 class Recorded(torch.nn.Module):
@@ -50,7 +42,7 @@ class Learner:
         self.config, self.device = config, processes.device
         self.precision = choose_precision(config.precision, self.device)
         torch.manual_seed(config.seed)
-        network = build_network(config).to(self.device)
+        network = XRDS(config.network_config).to(self.device)
         if self.device.type == "cuda":  # tensor cores take channels last
             network = network.to(memory_format=torch.channels_last)
         self.network = network
@@ -89,8 +81,7 @@ class Learner:
         """
         whole = batch.reference.shape[-1] == self.config.crop
         alone = self.shared is self.network
-        # rivals are other people's code, some of which no recording bears
-        if self.device.type != "cuda" or not alone or not whole or self.config.rival:
+        if self.device.type != "cuda" or not alone or not whole:
             return self.shared
         if self.recorded is None:
             # a cache of converted weights would be recorded, and never follow them
@@ -109,7 +100,7 @@ class Learner:
     def _inputs(self, batch: Batch) -> tuple[Tensor, ...]:
         """What the network takes of a batch."""
         batch = batch.to(self.device)
-        return batch.radiance, batch.seen(self.config.hidden), batch.noisy
+        return batch.radiance, batch.guides, batch.noisy
 
     def _copy(self) -> dict[str, Tensor]:
         return {k: v.clone() for k, v in self.network.state_dict().items()}
@@ -132,9 +123,7 @@ class Learner:
             self.network.load_state_dict(learnt)
 
     def save_average(self, path: Path, record: dict[str, str]) -> None:
-        """Write the averaged weights; nothing of a rival or where guides are hidden."""
-        if self.config.rival or self.config.hidden:
-            return  # a figure in a table, never a preset
+        """Write the averaged weights."""
         network = XRDS(self.config.network_config)
         network.load_state_dict({k: v.cpu() for k, v in self.average.items()})
         save_network(network, path, record)
