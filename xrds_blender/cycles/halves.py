@@ -98,11 +98,14 @@ def sample_halves(
             clocks.append(clock)
         shares = subset.shares()
         by_view = {
-            view: _joined(first, parts[1][view], shares)
+            view: _join_halves(first, parts[1][view], shares)
             for view, first in parts[0].items()
         }
         first, second = passes
-        layer.put_back(_merged(first, second, shares, by_view) | _light(light, by_view))
+        layer.put_back(
+            _merge_passes(first, second, shares, by_view)
+            | _light_passes(light, by_view)
+        )
     return by_view, seconds_of(clocks)
 
 
@@ -144,7 +147,7 @@ def seconds_of(clocks: Sequence[StageClock]) -> dict[str, float]:
     }
 
 
-def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Half:
+def _join_halves(first: Samples, second: Samples, shares: tuple[float, float]) -> Half:
     pictures = np.stack((first.picture, second.picture))
     counts = None
     if first.counts is not None and second.counts is not None:
@@ -160,9 +163,9 @@ def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Hal
     share = halves.share()
     whole = replace(
         first,
-        picture=_mean(first.picture, second.picture, share[..., None]),
-        albedo=_mean(first.albedo, second.albedo, share[..., None]),
-        normal=_mean(first.normal, second.normal, share[..., None]),
+        picture=_weighted_mean(first.picture, second.picture, share[..., None]),
+        albedo=_weighted_mean(first.albedo, second.albedo, share[..., None]),
+        normal=_weighted_mean(first.normal, second.normal, share[..., None]),
         counts=None if counts is None else counts.sum(axis=0),
         path_length=_mean_length(first, second, share),
         parts=_mean_parts(first, second, share[..., None]),
@@ -170,7 +173,7 @@ def _joined(first: Samples, second: Samples, shares: tuple[float, float]) -> Hal
     return Half(whole, halves)
 
 
-def _mean(first: Array, second: Array, share: Array) -> Array:
+def _weighted_mean(first: Array, second: Array, share: Array) -> Array:
     return np.asarray(first * share + second * (np.float32(1.0) - share))
 
 
@@ -178,14 +181,16 @@ def _mean_length(first: Samples, second: Samples, share: Array) -> Array | None:
     first_length, second_length = first.path_length, second.path_length
     if first_length is None or second_length is None:
         return None
-    return _mean(first_length, second_length, share)
+    return _weighted_mean(first_length, second_length, share)
 
 
 def _mean_parts(first: Samples, second: Samples, share: Array) -> dict[str, Array]:
-    return {k: _mean(x, second.parts[k], share) for k, x in first.parts.items()}
+    return {
+        k: _weighted_mean(x, second.parts[k], share) for k, x in first.parts.items()
+    }
 
 
-def _light(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Passes:
+def _light_passes(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Passes:
     """The light passes: those that are divided by a colour have no plain means."""
     return {
         (view, name): pixels
@@ -194,7 +199,7 @@ def _light(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Passes:
     }
 
 
-def _merged(
+def _merge_passes(
     first: _Passes,
     second: _Passes,
     shares: tuple[float, float],
@@ -209,7 +214,7 @@ def _merged(
         share = by_view[view].halves.share()[..., None]
         if name == SAMPLE_COUNT:  # itself a share, of the most samples
             share = np.asarray(shares[0], np.float32)
-        merged[view, name] = _mean(pixels, second[view, name], share)
+        merged[view, name] = _weighted_mean(pixels, second[view, name], share)
     return merged
 
 
@@ -270,13 +275,13 @@ def more_samples(
                 )
                 clocks.append(clock)
                 rendered_parts.append(
-                    {v: _counted(x, part, clock) for v, x in rendered.items()}
+                    {v: _add_counts(x, part, clock) for v, x in rendered.items()}
                 )
         passes.put_back(before)
     return rendered_parts, seconds_of(clocks)
 
 
-def _counted(
+def _add_counts(
     samples: Samples, part: SampleSubset, clock: session.StageClock
 ) -> Samples:
     """With the number of each pixel's samples, even ones as well."""

@@ -83,7 +83,7 @@ def enriched(frame: Stored, alone: Accumulated, extra: ExtraSamples) -> Stored:
     enriched : Stored
     """
     combined = with_extra(alone, alone, extra)
-    rows = _rows(extra.samples)
+    rows = _find_rows(extra.samples)
     width = frame.shape[1]
     place = slice(rows.start * width, rows.stop * width)
     picture = frame.picture.copy()
@@ -132,7 +132,7 @@ def with_extra(
     -------
     combined : Accumulated
     """
-    rows = _rows(extra.samples)  # often few of many
+    rows = _find_rows(extra.samples)  # often few of many
     usable = np.isfinite(extra.alpha[rows]) & (extra.samples[rows] > 0.0)
     for part in (extra.radiance, extra.albedo, extra.normal):
         usable &= np.isfinite(part[rows]).all(axis=-1)
@@ -153,7 +153,7 @@ def with_extra(
             if share.any():
                 # NaN where there are no samples
                 mixed += np.where(share[wide] > 0.0, plane[rows], 0.0) * share[wide]
-        return _with_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
+        return _replace_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
 
     def mean_pass(name: str) -> Array | None:
         whole = getattr(frame, name)
@@ -178,17 +178,17 @@ def with_extra(
             name: mean(part, alone.parts[name], extra.parts[name])
             for name, part in frame.parts.items()
         },
-        samples=_with_rows(frame.samples, rows, counted),
+        samples=_replace_rows(frame.samples, rows, counted),
     )
 
 
-def _rows(samples: Array) -> slice:
+def _find_rows(samples: Array) -> slice:
     """Return the rows from the first to the last one with samples."""
     rows = np.flatnonzero(samples.any(axis=1))
     return slice(rows[0], rows[-1] + 1) if len(rows) else slice(0, 0)
 
 
-def _with_rows(whole: Array, rows: slice, values: Array) -> Array:
+def _replace_rows(whole: Array, rows: slice, values: Array) -> Array:
     result = whole.copy()
     result[rows] = values
     return result

@@ -112,24 +112,26 @@ def find_passes(channels: Channels, names: PassNames) -> PassChannels:
     PictureError
         If several layers hold a pass.
     """
-    beauty = _pass(channels, names, "beauty")
+    beauty = _find_pass(channels, names, "beauty")
     prefix = "" if beauty is None else beauty
     radiance = channels.of(prefix)
     if not radiance:
-        raise _missing(channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB")
-    target = _target(channels, prefix)
+        raise _missing_error(
+            channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB"
+        )
+    target = _find_target(channels, prefix)
     alphas = [f"{x}.A" if x else "A" for x in (prefix, target)]
-    normal, depth = _pass(channels, names, "normal"), _depth(channels, names)
+    normal, depth = _find_pass(channels, names, "normal"), _find_depth(channels, names)
     return PassChannels(
         beauty=radiance,
-        albedo=_needed(channels, names, "albedo"),
-        normal=_needed(channels, names, "normal"),
-        position=_channels(channels, names, "position"),
+        albedo=_require_channels(channels, names, "albedo"),
+        normal=_require_channels(channels, names, "normal"),
+        position=_find_channels(channels, names, "position"),
         depth=depth,
-        path_length=_path_length(channels, names),
-        vector=_channels(channels, names, "vector", _MOTION),
-        noise=_ours(channels, NOISE, "XYZ"),
-        counts=_ours(channels, COUNTS, "X"),
+        path_length=_find_path_length(channels, names),
+        vector=_find_channels(channels, names, "vector", _MOTION),
+        noise=_find_stored(channels, NOISE, "XYZ"),
+        counts=_find_stored(channels, COUNTS, "X"),
         picture=channels.of(target) or ["R", "G", "B"],
         alpha=next((x for x in alphas if x in channels.names), None),
         has_camera_normal=(normal or "").endswith(CAMERA_NORMAL),
@@ -137,13 +139,13 @@ def find_passes(channels: Channels, names: PassNames) -> PassChannels:
     )
 
 
-def _ours(channels: Channels, name: str, letters: str) -> list[str]:
-    """The channels of a pass of stored samples."""
+def _find_stored(channels: Channels, name: str, letters: str) -> list[str]:
+    """Return the channels of a pass that XRDS has stored."""
     full_name = channels.find(name, (letters,))
     return [] if full_name is None else channels.of(full_name, (letters,))
 
 
-def _target(channels: Channels, prefix: str) -> str:
+def _find_target(channels: Channels, prefix: str) -> str:
     """The pass that the denoised picture is written to: Cycles has two of them."""
     layer, _, name = prefix.rpartition(".")
     if name != NOISY:
@@ -152,7 +154,7 @@ def _target(channels: Channels, prefix: str) -> str:
     return combined if channels.of(combined) else ""
 
 
-def _pass(
+def _find_pass(
     channels: Channels,
     names: PassNames,
     kind: str,
@@ -163,7 +165,7 @@ def _pass(
     if requested is not None:
         full_name = channels.find(requested, letters)
         if full_name is None:
-            raise _missing(channels, kind, requested)
+            raise _missing_error(channels, kind, requested)
         return full_name
     if kind == "beauty" and channels.of("") and not channels.find(NOISY):
         return None  # plain R, G, B
@@ -174,39 +176,39 @@ def _pass(
     return None
 
 
-def _channels(
+def _find_channels(
     channels: Channels,
     names: PassNames,
     kind: str,
     letters: Sequence[str] = COMPONENTS,
 ) -> list[str]:
-    full_name = _pass(channels, names, kind, letters)
+    full_name = _find_pass(channels, names, kind, letters)
     return [] if full_name is None else channels.of(full_name, letters)
 
 
-def _depth(channels: Channels, names: PassNames) -> list[str]:
+def _find_depth(channels: Channels, names: PassNames) -> list[str]:
     """Depth is one channel: `Depth.Z`, or without a pass `Z`."""
     wanted = (names.depth,) if names.depth else _USUAL["depth"]
     usual = [x.lower() for x in wanted]
     plain = [name for name in channels.names if name.lower() in usual]
-    return plain[:1] or _channels(channels, names, "depth", _SINGLE)
+    return plain[:1] or _find_channels(channels, names, "depth", _SINGLE)
 
 
-def _path_length(channels: Channels, names: PassNames) -> list[str]:
-    """Cycles' Denoising Depth, where it is not the only depth."""
+def _find_path_length(channels: Channels, names: PassNames) -> list[str]:
+    """Return the channels of Cycles' Denoising Depth, unless it is the only depth."""
     full_name = channels.find(PATH_LENGTH, _SINGLE)
     path = [] if full_name is None else channels.of(full_name, _SINGLE)
-    return [] if path == _depth(channels, names) else path
+    return [] if path == _find_depth(channels, names) else path
 
 
-def _needed(channels: Channels, names: PassNames, kind: str) -> list[str]:
-    channel_names = _channels(channels, names, kind)
+def _require_channels(channels: Channels, names: PassNames, kind: str) -> list[str]:
+    channel_names = _find_channels(channels, names, kind)
     if not channel_names:
-        raise _missing(channels, kind, getattr(names, kind) or _USUAL[kind][0])
+        raise _missing_error(channels, kind, getattr(names, kind) or _USUAL[kind][0])
     return channel_names
 
 
-def _missing(channels: Channels, kind: str, name: str) -> Unfit:
+def _missing_error(channels: Channels, kind: str, name: str) -> Unfit:
     return Unfit(
         f"{channels.path} has no {kind} ({name}); it holds {channels.contents()}; "
         f"render it too, or name the pass with --{kind}"

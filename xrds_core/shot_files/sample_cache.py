@@ -83,20 +83,20 @@ def write_cached_frame(path: Path, frame: Frame, origin: Origin) -> None:
         "",
         ((x, y), (x + width - 1, y + height - 1)),
         ((0, 0), (right, bottom)),
-        _channels(frame, f"{origin.layer}." if origin.layer else ""),
+        _make_channels(frame, f"{origin.layer}." if origin.layer else ""),
         attributes,
     )
     exr.write_part(path, part)
 
 
-def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
+def _make_channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
     assert frame.radiance is not None
     passes: list[tuple[str, str, NDArray[Any]]] = [
         (NOISY, "RGB", frame.radiance),
         ("Denoising Albedo", "RGB", frame.albedo),
         (CAMERA_NORMAL, "XYZ", frame.normal),
         # always: noise computed from the half floats of the rest would differ
-        (NOISE, "XYZ", _noise(frame)),
+        (NOISE, "XYZ", _stack_noise(frame)),
     ]
     if frame.alpha is not None:
         passes.append((NOISY, "A", frame.alpha[..., None]))
@@ -106,7 +106,7 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
     if frame.vector is not None:
         passes.append(("Vector", "XYZW", frame.vector))
     channels: dict[str, NDArray[Any]] = {
-        f"{layer}{name}.{letter}": _half(array[..., i])
+        f"{layer}{name}.{letter}": _to_half(array[..., i])
         for name, letters, array in passes
         for i, letter in enumerate(letters)
     }
@@ -116,7 +116,7 @@ def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
     return channels
 
 
-def _noise(frame: Frame) -> Array:
+def _stack_noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
     noise = pack_frame(frame)[2]
     assert noise is not None
@@ -124,7 +124,7 @@ def _noise(frame: Frame) -> Array:
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 
 
-def _half(values: Array) -> NDArray[np.float16]:
+def _to_half(values: Array) -> NDArray[np.float16]:
     """Clip to the largest half float; infinities stay."""
     cut = np.clip(values, -LARGEST_HALF, LARGEST_HALF)
     return np.where(np.isfinite(values), cut, values).astype(np.float16)
