@@ -123,7 +123,7 @@ def sweep(folder: Path | None = None) -> None:
 @contextmanager
 def _registered(folder: Path) -> Iterator[Path]:
     """Yield a new path in `folder`; what lies there at the end is removed."""
-    mark = f"{_machine()}-{os.getpid()}-{secrets.token_hex(4)}"
+    mark = f"{_identify_machine()}-{os.getpid()}-{secrets.token_hex(4)}"
     path = folder / f".xrds-{mark}.unfinished"
     link = Path(tempfile.gettempdir(), path.name)
     with _beginning:
@@ -146,13 +146,15 @@ def _is_left(path: Path) -> bool:
     match = _NAME.fullmatch(path.name)
     if match is None:
         return False
-    if match["machine"] == _machine() and not _is_running(int(match["process"])):
+    if match["machine"] == _identify_machine() and not _is_running(
+        int(match["process"])
+    ):
         return True
     return time.time() - path.lstat().st_mtime > _DEAD
 
 
 @cache
-def _machine() -> str:
+def _identify_machine() -> str:
     """The processes whose numbers can be compared: of one system since its start."""
     try:
         started = Path("/proc/sys/kernel/random/boot_id").read_text("utf-8")

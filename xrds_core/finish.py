@@ -1,4 +1,4 @@
-"""A frame with the samples of its neighbours, denoised: every still and every shot.
+"""Finishes a frame, of a still or of a shot: accumulates samples and denoises them.
 
 A still is a frame without neighbours.
 """
@@ -53,9 +53,9 @@ def rectangles(
     rectangles : list of Rectangle
         Rows and columns of blocks; all marked blocks lie in one of them.
     """
-    areas = [bounds for bounds in (_bounds(blocks),) if bounds is not None]
+    areas = [bounds for bounds in (_find_bounds(blocks),) if bounds is not None]
     while areas and len(areas) < most:
-        splits = [(_split(blocks, area), area) for area in areas]
+        splits = [(_split_in_two(blocks, area), area) for area in areas]
         (parts, gain), divided = max(splits, key=lambda split: split[0][1])
         if not parts or gain < max(0.25 * _blocks_in(divided), call):
             break
@@ -64,14 +64,16 @@ def rectangles(
     return areas
 
 
-def _bounds(blocks: NDArray[np.bool_]) -> Rectangle | None:
+def _find_bounds(blocks: NDArray[np.bool_]) -> Rectangle | None:
     rows, columns = (np.flatnonzero(blocks.any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return None
     return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
 
-def _split(blocks: NDArray[np.bool_], area: Rectangle) -> tuple[list[Rectangle], float]:
+def _split_in_two(
+    blocks: NDArray[np.bool_], area: Rectangle
+) -> tuple[list[Rectangle], float]:
     """Return the two bounds that cover the least, and how much they leave out."""
     best: list[Rectangle] = []
     gain = 0.0
@@ -80,16 +82,16 @@ def _split(blocks: NDArray[np.bool_], area: Rectangle) -> tuple[list[Rectangle],
             parts = []
             for part in (slice(area[axis].start, place), slice(place, area[axis].stop)):
                 cut = (part, area[1]) if axis == 0 else (area[0], part)
-                inside = _bounds(blocks[cut])
+                inside = _find_bounds(blocks[cut])
                 if inside is not None:
-                    parts.append(_moved(inside, cut))
+                    parts.append(_shift(inside, cut))
             left_out = _blocks_in(area) - sum(map(_blocks_in, parts))
             if len(parts) == 2 and left_out > gain:
                 best, gain = parts, left_out
     return best, gain
 
 
-def _moved(inside: Rectangle, start: Rectangle) -> Rectangle:
+def _shift(inside: Rectangle, start: Rectangle) -> Rectangle:
     rows, columns = (
         slice(x.start + s.start, x.stop + s.start)
         for x, s in zip(inside, start, strict=True)
@@ -160,7 +162,7 @@ class Finished:
     def within(self, region: Rectangle) -> Finished:
         """Return the same of a part of what was denoised."""
         picture = replace(self.denoised, radiance=self.picture[region])
-        return replace(self, denoised=picture, parts=_cropped(self.parts, region))
+        return replace(self, denoised=picture, parts=_crop(self.parts, region))
 
 
 def finish_frame(
@@ -217,15 +219,15 @@ def finish_frame(
     region = region or (slice(None), slice(None))
     areas: list[_Area] = []
     if neighbours:
-        share = _share(accumulated, own)[region]
-        areas = _lacking(share)
+        share = _find_weights(accumulated, own)[region]
+        areas = _find_lacking_areas(share)
     denoise_started = time.perf_counter()
     parts = 1 + len(areas)
     passes = _Passes.of(accumulated, light, region)
-    callbacks = [_part(progress, number, parts) for number in range(parts)]
+    callbacks = [_progress_of_part(progress, number, parts) for number in range(parts)]
     denoised = passes.denoised(denoiser, callbacks[0])
     if areas:
-        alone = _filled(accumulate(own, []), accumulated)
+        alone = _fill_holes(accumulate(own, []), accumulated)
         lacking = _Passes.of(alone, light, region, like=denoised.parts)
         mixed = denoised.radiance.copy()
         for area, done in zip(areas, callbacks[1:], strict=True):
@@ -251,7 +253,7 @@ def finish_frame(
     return Finished(denoised, accumulated, seconds, finished_light)
 
 
-def _share(accumulated: Accumulated, own: Stored) -> Array:
+def _find_weights(accumulated: Accumulated, own: Stored) -> Array:
     """Return (H, W) in [0, 1]: the weight of the accumulated picture.
 
     It depends on how many samples are reused for each of the frame's `own`.
@@ -272,20 +274,20 @@ def _share(accumulated: Accumulated, own: Stored) -> Array:
     around = 1.0 - factor * (1.0 - box(reused, _SMOOTH))
     share = np.clip(np.minimum(reused, around), 0.0, 1.0)
     share = np.clip(box(share, _SMOOTH), 0.0, 1.0)
-    share = _closed(share, max(round(np.log2(samples / _THICK)), 0))
-    return _where_much_lacks(share)
+    share = _close_gaps(share, max(round(np.log2(samples / _THICK)), 0))
+    return _limit_to_lacking_blocks(share)
 
 
-def _closed(share: Array, reach: int) -> Array:
-    """Return a share (H, W) without low values that reach less far to each side."""
+def _close_gaps(share: Array, reach: int) -> Array:
+    """Return a weight (H, W) without thin low values, `reach` pixels to each side."""
     for smaller in (np.fmax, np.fmin):
         for _ in range(reach):
             share = extreme(share, smaller)
     return share
 
 
-def _where_much_lacks(share: Array) -> Array:
-    """Return a share (H, W), 1 in blocks that lack little."""
+def _limit_to_lacking_blocks(share: Array) -> Array:
+    """Return a weight (H, W) that is 1 in blocks which lack few samples."""
     lacking = block_means(1.0 - share) > _BEARABLE
     if not lacking.any():
         return np.ones_like(share)
@@ -306,19 +308,19 @@ class _Area(NamedTuple):
     within: Rectangle
 
 
-def _lacking(share: Array) -> list[_Area]:
-    """Where the frame alone is needed as well; nowhere if either picture is enough."""
+def _find_lacking_areas(share: Array) -> list[_Area]:
+    """Return where the frame alone is needed, too; nowhere if one picture is enough."""
     if (share == share.flat[0]).all() and float(share.flat[0]) in (0.0, 1.0):
         return []
     blocks = rectangles(block_means(np.less(share, 1.0)) > 0.0)
-    areas = [_area(rectangle, share.shape) for rectangle in blocks]
+    areas = [_make_area(rectangle, share.shape) for rectangle in blocks]
     if sum(share[area.around].size for area in areas) < _PART * share.size:
         return areas
     whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
     return [_Area(whole, whole, whole)]
 
 
-def _area(blocks: Rectangle, shape: tuple[int, ...]) -> _Area:
+def _make_area(blocks: Rectangle, shape: tuple[int, ...]) -> _Area:
     place, around, within = [], [], []
     for part, side in zip(blocks, shape, strict=True):
         first, last = part.start * BLOCK, min(part.stop * BLOCK, side)
@@ -329,7 +331,7 @@ def _area(blocks: Rectangle, shape: tuple[int, ...]) -> _Area:
     return _Area(*((x[0], x[1]) for x in (place, around, within)))
 
 
-def _filled(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
+def _fill_holes(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
     """Return the frame alone, its pixels without samples filled by reused ones."""
     holes = alone.samples == 0.0
     if not holes.any():
@@ -384,7 +386,7 @@ class _Passes(NamedTuple):
     def within(self, region: tuple[slice, slice]) -> _Passes:
         """Those of a region."""
         noisy, albedo, normal = (np.ascontiguousarray(x[region]) for x in self[:3])
-        return _Passes(noisy, albedo, normal, _cropped(self.parts, region))
+        return _Passes(noisy, albedo, normal, _crop(self.parts, region))
 
     def denoised(
         self, denoiser: Denoiser, progress: Callable[[float], bool] | None
@@ -392,13 +394,11 @@ class _Passes(NamedTuple):
         return denoiser(*self[:3], parts=self.parts, progress=progress)
 
 
-def _cropped(
-    passes: Mapping[str, Array], region: tuple[slice, slice]
-) -> dict[str, Array]:
+def _crop(passes: Mapping[str, Array], region: tuple[slice, slice]) -> dict[str, Array]:
     return {name: np.ascontiguousarray(x[region]) for name, x in passes.items()}
 
 
-def _part(
+def _progress_of_part(
     progress: Callable[[float], bool] | None, number: int, parts: int
 ) -> Callable[[float], bool] | None:
     """Return a callback that reports the progress of one of equal parts."""

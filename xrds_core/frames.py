@@ -21,7 +21,7 @@ _MOST_RUNS = 50  # of frame numbers that a line has room for
 
 
 def frame_path(pattern: str, frame: int) -> Path:
-    """Put the frame number in place of the last run of #: so Blender names its files.
+    """Put the frame number in place of the last run of #, which is Blender's way.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def frame_path(pattern: str, frame: int) -> Path:
         For a frame below zero, a file named C's way, where the sign counts as a digit,
         if only that exists.
     """
-    parts = _split(pattern)
+    parts = _split_pattern(pattern)
     if parts is None:
         return Path(pattern)
     before, digits, after = parts
@@ -64,7 +64,7 @@ def frame_numbers(pattern: str) -> list[int]:
     [] where there are none, also of a pattern without #. Such a name may belong to a
     folder: reading it reports that.
     """
-    numbered = _numbered(pattern)
+    numbered = _find_numbered(pattern)
     names = {name for name, _ in numbered}
     return sorted(
         n for n in {n for _, n in numbered} if frame_path(pattern, n).name in names
@@ -73,12 +73,14 @@ def frame_numbers(pattern: str) -> list[int]:
 
 def misnamed(pattern: str) -> list[str]:
     """Return files of a pattern whose numbers have other digits than it asks for."""
-    return sorted(x for x, n in _numbered(pattern) if frame_path(pattern, n).name != x)
+    return sorted(
+        x for x, n in _find_numbered(pattern) if frame_path(pattern, n).name != x
+    )
 
 
-def _numbered(pattern: str) -> list[tuple[str, int]]:
+def _find_numbered(pattern: str) -> list[tuple[str, int]]:
     """Return files with a number, of any digits, where a pattern has it."""
-    parts = _split(pattern)
+    parts = _split_pattern(pattern)
     folder = Path(pattern).parent
     if parts is None or not folder.is_dir():
         return []
@@ -101,7 +103,7 @@ def in_words(numbers: Sequence[int]) -> str:
     return ", ".join(text) + (f" and {more} more" if more else "")
 
 
-def _split(pattern: str) -> tuple[str, int, str] | None:
+def _split_pattern(pattern: str) -> tuple[str, int, str] | None:
     """Return what stands before the last run of #, its length, and what follows."""
     name = Path(pattern).name
     runs = list(re.finditer("#+", name))

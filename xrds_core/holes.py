@@ -108,15 +108,15 @@ def _pull_push(picture: Array, known: NDArray[np.bool_]) -> Array:
     blocks = np.pad(picture, (*even, (0, 0))) * np.float32(0.25)  # sums stay in range
     counts = np.pad(known, even).astype(np.float32) * np.float32(0.25)
     for axis in (0, 1):
-        blocks = _pair_sums(blocks, axis)
-        counts = _pair_sums(counts, axis)
+        blocks = _sum_pairs(blocks, axis)
+        counts = _sum_pairs(counts, axis)
     means = blocks / np.maximum(counts, np.float32(0.25))[..., None]
     coarse = _pull_push(np.clip(means, -_LARGEST, _LARGEST), counts > 0.0)
     fine = coarse.repeat(2, axis=0).repeat(2, axis=1)[:height, :width]
     return np.where(known[..., None], picture, fine)
 
 
-def _pair_sums(blocks: Array, axis: int) -> Array:
+def _sum_pairs(blocks: Array, axis: int) -> Array:
     even, odd = (
         np.take(blocks, range(i, blocks.shape[axis], 2), axis=axis) for i in (0, 1)
     )

@@ -188,15 +188,15 @@ def test_the_cache_may_be_anywhere(
     (tmp_path / "file").touch()  # where no folder can be, whoever asks
     for name in ("HOME", "LOCALAPPDATA", "XDG_CACHE_HOME"):
         monkeypatch.setenv(name, str(tmp_path / "file"))
-    assert native._cache(tmp_path / "work") == tmp_path / "work" / "zig"
+    assert native._find_cache(tmp_path / "work") == tmp_path / "work" / "zig"
     for name in ("HOME", "LOCALAPPDATA", "XDG_CACHE_HOME"):
         monkeypatch.setenv(name, str(tmp_path))
-    assert native._cache(tmp_path / "work") == tmp_path / "zig"
+    assert native._find_cache(tmp_path / "work") == tmp_path / "zig"
 
 
 def test_options_of_zig_are_put_in_other_compilers_words() -> None:
     words = ["-target", "x86_64-linux-gnu.2.28", "-mcpu=x86_64_v3", "-c", "a_b.c"]
-    assert native._for_others(words) == ["-march=x86-64-v3", "-c", "a_b.c"]
+    assert native._translate_flags(words) == ["-march=x86-64-v3", "-c", "a_b.c"]
 
 
 def held(wheel: Path) -> set[str]:

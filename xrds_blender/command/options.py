@@ -243,7 +243,9 @@ def resolve_paths(options: argparse.Namespace) -> None:
 def choice_of(options: argparse.Namespace) -> SceneChoice:
     """What of the file is rendered."""
     # `scene` is the file there
-    given = _named(options, {field.name for field in fields(SceneChoice)} - {"scene"})
+    given = _pick_options(
+        options, {field.name for field in fields(SceneChoice)} - {"scene"}
+    )
     return SceneChoice(options.scene_name, **given)
 
 
@@ -251,14 +253,16 @@ def request_of(options: argparse.Namespace) -> Request:
     """Build a request from the options of `add_request`; raises UsageError."""
     _check_pace(options)
     _check_light(options)
-    given = _named(options, CHOICES)
+    given = _pick_options(options, CHOICES)
     given["temporal_radius"] = _temporal_radius(options)
     if options.noise_threshold is not None:  # the most, as `SceneChoice` has it
         del given["samples"]
     return render_request(**given)
 
 
-def _named(options: argparse.Namespace, names: Collection[str]) -> dict[str, Any]:
+def _pick_options(
+    options: argparse.Namespace, names: Collection[str]
+) -> dict[str, Any]:
     """Those options that have one of these names."""
     return {name: value for name, value in vars(options).items() if name in names}
 

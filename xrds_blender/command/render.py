@@ -108,13 +108,13 @@ def _plan(options: argparse.Namespace) -> dict[str, Any]:
 
 def _plan_lines(result: dict[str, Any]) -> list[str]:
     lines = [
-        f"{_decision(decision)}: {decision['reason']}"
+        f"{_decision_line(decision)}: {decision['reason']}"
         for decision in result["decisions"]
     ]
-    return [_expected(result), *lines, *(f"note: {x}" for x in result["remarks"])]
+    return [_expected_line(result), *lines, *(f"note: {x}" for x in result["remarks"])]
 
 
-def _expected(plan: dict[str, Any]) -> str:
+def _expected_line(plan: dict[str, Any]) -> str:
     """Frames, memory and seconds in a line."""
     memory, seconds = plan["memory"], plan["seconds"]
     window = f", {memory / 1e6:.0f} MB for neighbours beside Cycles" if memory else ""
@@ -124,7 +124,7 @@ def _expected(plan: dict[str, Any]) -> str:
     return f"{counted(plan['frames'], 'frame')}{window}; {time}"
 
 
-def _decision(decision: dict[str, Any]) -> str:
+def _decision_line(decision: dict[str, Any]) -> str:
     saving = decision["saving_seconds"]
     estimate = f" (saves about {saving:.1f} s)" if saving else ""
     return f"{decision['decision']}: {decision['value']}{estimate}"
@@ -143,11 +143,11 @@ def _lines(result: dict[str, Any]) -> list[str]:
         f"{frame['output']}: {frame['seconds']['total']:.1f} s"
         for frame in result["frames"]
     ]
-    return lines + [f"  {_outcome(decision)}" for decision in result["plan"]]
+    return lines + [f"  {_outcome_line(decision)}" for decision in result["plan"]]
 
 
-def _outcome(decision: dict[str, Any]) -> str:
+def _outcome_line(decision: dict[str, Any]) -> str:
     """A decision after a render: with its reason where this says what was found."""
-    line = _decision(decision)
+    line = _decision_line(decision)
     explains = decision["decision"] in (GUIDE_CACHE, SAME_PICTURE, DEADLINE)
     return f"{line}: {decision['reason']}" if explains else line

@@ -87,26 +87,28 @@ def render_file(
         picture_file.check_output(output, frames or [0], has_passes=bool(request.light))
     scene = open_scene(path, choice)
     _check_parts(request)
-    numbers = _numbers(scene, frames, animation, output)
-    notes = _notes(scene, request, output)
+    numbers = _choose_numbers(scene, frames, animation, output)
+    notes = _make_notes(scene, request, output)
     size = picture_size(scene.render)
     cache = None
     if sample_cache is not None:
-        cache = _cache(scene, request, sample_cache, numbers, choice)
+        cache = _open_cache(scene, request, sample_cache, numbers, choice)
 
     def is_done(number: int) -> bool:  # anew: others may be writing the same frames
         return resume and is_whole(frame_path(str(output), number), size)
 
     written, last = [], None
     if output is not None:
-        for number, last in _pictures(scene, request, output, numbers, is_done, cache):
+        for number, last in _render_pictures(
+            scene, request, output, numbers, is_done, cache
+        ):
             written.append(_write(scene, output, number, last, request, encoding))
     if cache:
         _cache_others(scene, request, numbers, cache)
     return {
         "output": output,
         "resolution": list(size),
-        **_described(last, request),
+        **_describe(last, request),
         "frames": written,
         "kept": _kept(numbers, written) if output else [],
         "samples": cache and cache.report(numbers),
@@ -114,7 +116,7 @@ def render_file(
     }
 
 
-def _notes(scene: Any, request: Request, output: str | None) -> list[str]:
+def _make_notes(scene: Any, request: Request, output: str | None) -> list[str]:
     """Print and return what the pictures, or the samples alone, will lack."""
     notes = [*missing()] if output is None else remarks(scene, request)
     for line in notes:
@@ -128,7 +130,7 @@ def _kept(numbers: Sequence[int], written: Sequence[dict[str, Any]]) -> list[int
     return [number for number in numbers if number not in rendered]
 
 
-def _numbers(
+def _choose_numbers(
     scene: Any, frames: Sequence[int] | None, animation: bool, output: str | None
 ) -> list[int]:
     """Numbers of the frames to render; says so where the file holds more."""
@@ -146,7 +148,7 @@ def _numbers(
     return [current]
 
 
-def _described(last: Picture | None, request: Request) -> dict[str, Any]:
+def _describe(last: Picture | None, request: Request) -> dict[str, Any]:
     """What the pictures were rendered by, as the last one says."""
     settings = (last and last.settings) or request.settings
     return {
@@ -170,7 +172,7 @@ def _check_parts(request: Request) -> None:
         load_denoiser(settings.quality, machine)
 
 
-def _pictures(
+def _render_pictures(
     scene: Any,
     request: Request,
     output: str,
@@ -207,7 +209,7 @@ def _check_cache(request: Request) -> None:
         )
 
 
-def _cache(
+def _open_cache(
     scene: Any,
     request: Request,
     folder: Path,
@@ -273,7 +275,7 @@ def _write(
     try:
         for view, pixels in picture.views.items():
             if view != first:  # the first comes last: a file of it says all are there
-                path = target.with_stem(target.stem + _suffix(scene, view))
+                path = target.with_stem(target.stem + _view_suffix(scene, view))
                 light = pixels[..., :3], pixels[..., 3]
                 parts = picture.view_parts[view]
                 picture_file.save(path, *light, scene, encoding, metadata, parts)
@@ -299,7 +301,7 @@ def _write(
     return entry
 
 
-def _suffix(scene: Any, view: str) -> str:
+def _view_suffix(scene: Any, view: str) -> str:
     """What the file of a view has after its name: that of Blender's own output."""
     return str(scene.render.views[view].file_suffix)
 

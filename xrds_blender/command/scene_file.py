@@ -57,7 +57,7 @@ def open_scene(path: Path, choice: SceneChoice = AS_SAVED) -> Any:
         raise SceneError(f"Blender cannot open {path}: {reason}") from error
     scene = bpy.context.scene
     if choice.scene is not None:
-        scene = _named("scene", choice.scene, bpy.data.scenes, path)
+        scene = _find_named("scene", choice.scene, bpy.data.scenes, path)
     _apply(choice, scene, path)
     _check_cameras(scene, path)
     _report_what_did_not_run(scene, path)
@@ -97,12 +97,12 @@ def frames_of(
 
 def _apply(choice: SceneChoice, scene: Any, path: Path) -> None:
     if choice.view_layer is not None:
-        wanted = _named("view layer", choice.view_layer, scene.view_layers, path)
+        wanted = _find_named("view layer", choice.view_layer, scene.view_layers, path)
         for layer in scene.view_layers:
             layer.use = layer == wanted
     if choice.camera is not None:
         cameras = {item.name: item for item in scene.objects if item.type == "CAMERA"}
-        scene.camera = _named("camera", choice.camera, cameras, path)
+        scene.camera = _find_named("camera", choice.camera, cameras, path)
         for marker in scene.timeline_markers:  # they would switch back
             marker.camera = None
     if choice.resolution:
@@ -117,7 +117,7 @@ def _apply(choice: SceneChoice, scene: Any, path: Path) -> None:
         scene.render.threads_mode, scene.render.threads = "FIXED", choice.threads
 
 
-def _named(kind: str, name: str, known: Any, path: Path) -> Any:
+def _find_named(kind: str, name: str, known: Any, path: Path) -> Any:
     """The entry of that name; raises SceneError, with the names that there are."""
     if name not in known:
         names = ", ".join(known.keys()) or "none"

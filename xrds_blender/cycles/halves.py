@@ -99,11 +99,14 @@ def sample_halves(
             clocks.append(clock)
         shares = subset.shares()
         by_view = {
-            view: _joined(first, parts[1][view], shares)
+            view: _join_halves(first, parts[1][view], shares)
             for view, first in parts[0].items()
         }
         first, second = passes
-        layer.put_back(_merged(first, second, shares, by_view) | _light(light, by_view))
+        layer.put_back(
+            _merge_passes(first, second, shares, by_view)
+            | _light_passes(light, by_view)
+        )
     return by_view, seconds_of(clocks)
 
 
@@ -145,16 +148,16 @@ def seconds_of(clocks: Sequence[StageClock]) -> dict[str, float]:
     }
 
 
-def _joined(first: Passes, second: Passes, shares: tuple[float, float]) -> Half:
+def _join_halves(first: Passes, second: Passes, shares: tuple[float, float]) -> Half:
     halves = Halves.of(first, second, shares)
     return Half(first.joined(second, halves.share()), halves)
 
 
-def _mean(first: Array, second: Array, share: Array) -> Array:
+def _weighted_mean(first: Array, second: Array, share: Array) -> Array:
     return np.asarray(first * share + second * (np.float32(1.0) - share))
 
 
-def _light(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Named:
+def _light_passes(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Named:
     """The light passes: those that are divided by a colour have no plain means."""
     return {
         (view, name): pixels
@@ -163,7 +166,7 @@ def _light(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Named:
     }
 
 
-def _merged(
+def _merge_passes(
     first: _Named,
     second: _Named,
     shares: tuple[float, float],
@@ -178,7 +181,7 @@ def _merged(
         share = by_view[view].halves.share()[..., None]
         if name == SAMPLE_COUNT:  # itself a share, of the most samples
             share = np.asarray(shares[0], np.float32)
-        merged[view, name] = _mean(pixels, second[view, name], share)
+        merged[view, name] = _weighted_mean(pixels, second[view, name], share)
     return merged
 
 
@@ -239,13 +242,15 @@ def more_samples(
                 )
                 clocks.append(clock)
                 rendered_parts.append(
-                    {v: _counted(x, part, clock) for v, x in rendered.items()}
+                    {v: _add_counts(x, part, clock) for v, x in rendered.items()}
                 )
         passes.put_back(before)
     return rendered_parts, seconds_of(clocks)
 
 
-def _counted(samples: Passes, part: SampleSubset, clock: session.StageClock) -> Passes:
+def _add_counts(
+    samples: Passes, part: SampleSubset, clock: session.StageClock
+) -> Passes:
     """With the number of each pixel's samples, even ones as well."""
     with_counts = counted(samples, part, clock)
     if with_counts.counts is not None:

@@ -52,9 +52,9 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
     surface = Closures(scatters=bool(solid))  # what has no material is white
     for closures in by_material.values():
         surface |= closures
-    if solid and by_material and not _bare(solid):
+    if solid and by_material and not _has_bare_slot(solid):
         surface = _unite_closures(by_material.values())
-    kind, air = _world(scene.world)
+    kind, air = _look_at_world(scene.world)
     lamps = [item for item in objects if item.type == "LIGHT"]
     return SceneFacts(
         surfaces=bool(solid),
@@ -75,7 +75,7 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
         hair=any(item.type in _HAIR or _has_hair(item) for item in objects),
         depth_of_field=scene.camera is None or _has_blur(scene.camera.data),
         motion_blur=scene.render.use_motion_blur,
-        moving=tuple(islice(_moving(ids, objects), _NAMED)),
+        moving=tuple(islice(_find_moving(ids, objects), _NAMED)),
         film_transparent=scene.render.film_transparent,
         shadow_catchers=any(item.is_shadow_catcher for item in solid),
         passes=requested_passes(depsgraph.view_layer_eval),
@@ -118,13 +118,13 @@ def _unite_closures(all_closures: Iterable[Closures]) -> Closures:
     return merged
 
 
-def _bare(objects: list[Any]) -> bool:
+def _has_bare_slot(objects: list[Any]) -> bool:
     """Whether an object has a slot without a material, or no slot."""
     slots = [[slot.material for slot in item.material_slots] for item in objects]
     return any(not materials or None in materials for materials in slots)
 
 
-def _world(world: Any) -> tuple[str, Closures]:
+def _look_at_world(world: Any) -> tuple[str, Closures]:
     if world is None:
         return "none", Closures()
     if not _uses_nodes(world):
@@ -164,7 +164,7 @@ def _has_blur(camera: Any) -> bool:
     return camera.type == "PANO" or (camera.type != "ORTHO" and camera.dof.use_dof)
 
 
-def _moving(ids: list[Any], objects: list[Any]) -> Iterator[str]:
+def _find_moving(ids: list[Any], objects: list[Any]) -> Iterator[str]:
     """Names of what may differ in the next frame."""
     import bpy
 
@@ -229,7 +229,7 @@ def shapes_move(depsgraph: Any) -> bool:
         parent.name_full
         for item in depsgraph.ids
         if isinstance(item, bpy.types.Object) and item.type not in unseen
-        for parent in _parents(item)
+        for parent in _find_parents(item)
     }
 
     def is_shape(item: Any) -> bool:
@@ -239,10 +239,10 @@ def shapes_move(depsgraph: Any) -> bool:
 
     ids = [item for item in depsgraph.ids if is_shape(item)]
     objects = [item for item in ids if isinstance(item, bpy.types.Object)]
-    return any(True for _ in _moving(ids, objects))
+    return any(True for _ in _find_moving(ids, objects))
 
 
-def _parents(item: Any) -> Iterator[Any]:
+def _find_parents(item: Any) -> Iterator[Any]:
     while (item := item.parent) is not None:
         yield item
 

@@ -58,11 +58,11 @@ def outer_files() -> list[OuterFile]:
         for kind in _KINDS.split()
         for item in getattr(bpy.data, kind)
         if not _is_inside(item)
-        for file in _of(item)
+        for file in _find_files_of(item)
     ]
     known = {file.path for file in files}
     files += [
-        OuterFile("", "the file", path, _files(path))
+        OuterFile("", "the file", path, _list_files(path))
         for path in map(Path, bpy.utils.blend_paths(absolute=True))
         if path not in known and path.exists()
     ]
@@ -82,16 +82,16 @@ def _is_inside(item: Any) -> bool:
     return bool(getattr(item, "packed_file", None))
 
 
-def _of(item: Any) -> Iterator[OuterFile]:
+def _find_files_of(item: Any) -> Iterator[OuterFile]:
     kind = item.bl_rna.name.lower()
     owner = f"{kind} {item.name!r}"
     for text in dict.fromkeys(_paths_in(item)):
-        path = _place(item, text)
+        path = _resolve_path(item, text)
         if not text.startswith("<") and not _is_around(path):
-            yield OuterFile(kind, owner, path, _files(path, item))
+            yield OuterFile(kind, owner, path, _list_files(path, item))
 
 
-def _files(path: Path, item: Any = None) -> tuple[Path, ...]:
+def _list_files(path: Path, item: Any = None) -> tuple[Path, ...]:
     if path.is_dir():
         return tuple(sorted(file for file in path.rglob("*") if file.is_file()))
     is_sequence = getattr(item, "is_sequence", False)
@@ -114,25 +114,25 @@ def _paths_in(item: Any) -> Iterator[str]:
     """The paths that a data-block, its settings and its own nodes hold."""
     import bpy
 
-    yield from _texts(item)
+    yield from _find_texts(item)
     if isinstance(item, bpy.types.Object):
         for name in _SETTINGS:
             value = getattr(item, name, None)
             values: Any = value if hasattr(value, "keys") else [value]
             for setting in values:
-                yield from _inner(setting, set())
+                yield from _find_paths_inside(setting, set())
     if isinstance(item, bpy.types.CacheFile):
         for layer in item.layers:
-            yield from _texts(layer)
+            yield from _find_texts(layer)
     tree = item if isinstance(item, bpy.types.NodeTree) else None
     tree = tree or getattr(item, "node_tree", None)
     for node in tree.nodes if tree else ():
-        yield from _texts(node)
+        yield from _find_texts(node)
         for socket in node.inputs:
-            yield from _texts(socket)
+            yield from _find_texts(socket)
 
 
-def _inner(struct: Any, seen: set[tuple[type, int]]) -> Iterator[str]:
+def _find_paths_inside(struct: Any, seen: set[tuple[type, int]]) -> Iterator[str]:
     """The same of a struct and of the structs inside."""
     import bpy
 
@@ -142,15 +142,15 @@ def _inner(struct: Any, seen: set[tuple[type, int]]) -> Iterator[str]:
     if place in seen or _is_in_flux(struct):
         return
     seen.add(place)
-    yield from _texts(struct)
+    yield from _find_texts(struct)
     for member in struct.bl_rna.properties:
         if member.identifier in _LEFT_OUT:
             continue
         if member.type == "POINTER" and member.identifier != "rna_type":
-            yield from _inner(getattr(struct, member.identifier), seen)
+            yield from _find_paths_inside(getattr(struct, member.identifier), seen)
         if member.type == "COLLECTION":
             for inner in getattr(struct, member.identifier):
-                yield from _inner(inner, seen)
+                yield from _find_paths_inside(inner, seen)
 
 
 def _is_in_flux(struct: Any) -> bool:
@@ -161,7 +161,7 @@ def _is_in_flux(struct: Any) -> bool:
     return is_output or getattr(struct, "cache_type", "") == "REPLAY"
 
 
-def _texts(struct: Any) -> Iterator[str]:
+def _find_texts(struct: Any) -> Iterator[str]:
     """The paths among the values of a struct, not of those inside."""
     import bpy
 
@@ -170,7 +170,7 @@ def _texts(struct: Any) -> Iterator[str]:
             text = getattr(struct, member.identifier)
             # one that is not there was not baked
             is_folder = member.subtype == "DIR_PATH"
-            if text and not (is_folder and not _place(struct, text).is_dir()):
+            if text and not (is_folder and not _resolve_path(struct, text).is_dir()):
                 yield text
     if _is_disk_cache(struct):
         blend = Path(bpy.data.filepath)
@@ -184,11 +184,11 @@ def _texts(struct: Any) -> Iterator[str]:
     yield from (
         text
         for text in texts
-        if {"/", "\\"} & {*text} and _place(struct, text).is_file()
+        if {"/", "\\"} & {*text} and _resolve_path(struct, text).is_file()
     )
 
 
-def _place(struct: Any, text: str) -> Path:
+def _resolve_path(struct: Any, text: str) -> Path:
     import bpy
 
     library = getattr(struct.id_data, "library", None)
@@ -203,7 +203,7 @@ def image_digest(image: Any) -> tuple[Any, ...]:
     """What identifies an image's pixels."""
     image = image.original or image
     if image.is_dirty or image.source == "VIEWER":
-        return "painted", _pixels(image)
+        return "painted", _hash_pixels(image)
     if image.packed_files:
         packed = [file.packed_file for file in image.packed_files]
         return "packed", *(
@@ -269,7 +269,7 @@ def _stat(file: Path) -> tuple[str, int, int, int]:
     return str(file), status.st_size, status.st_mtime_ns, status.st_ctime_ns
 
 
-def _pixels(image: Any) -> str:
+def _hash_pixels(image: Any) -> str:
     pixels = np.empty(len(image.pixels), np.float32)
     image.pixels.foreach_get(pixels)
     return _hash(pixels.data)

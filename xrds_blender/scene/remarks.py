@@ -17,10 +17,10 @@ _MOST_NAMED = 3
 
 def remarks(scene: Any, request: Request) -> list[str]:
     """A line for each thing that the pictures will not show though the file asks."""
-    return [*_left_out(scene), *_without_light(scene, request), *missing()]
+    return [*_find_left_out(scene), *_without_light(scene, request), *missing()]
 
 
-def _left_out(scene: Any) -> Iterator[str]:
+def _find_left_out(scene: Any) -> Iterator[str]:
     render = scene.render
     tree = compositor_of(scene)
     if tree and any(node.type not in _PLAIN and not node.mute for node in tree.nodes):
@@ -35,7 +35,7 @@ def _left_out(scene: Any) -> Iterator[str]:
     used = [layer.name for layer in scene.view_layers if layer.use]
     if used[1:]:
         yield (
-            f"view layer {used[0]!r} alone is rendered, not {_listed(used[1:])}; "
+            f"view layer {used[0]!r} alone is rendered, not {_join_names(used[1:])}; "
             "--view-layer chooses"
         )
     if "MULTILAYER" in render.image_settings.file_format:
@@ -67,13 +67,13 @@ def missing() -> Iterator[str]:
             file for file in gone if (file.kind if file.kind in kinds else "") == kind
         ]
         if files:
-            yield f"missing {kinds.get(kind, 'files')}: {_named(files)}"
+            yield f"missing {kinds.get(kind, 'files')}: {_name_files(files)}"
 
 
-def _named(files: list[OuterFile]) -> str:
-    return _listed([f"{file.missing} ({file.owner})" for file in files])
+def _name_files(files: list[OuterFile]) -> str:
+    return _join_names([f"{file.missing} ({file.owner})" for file in files])
 
 
-def _listed(names: list[str]) -> str:
+def _join_names(names: list[str]) -> str:
     more = len(names) - _MOST_NAMED
     return ", ".join(names[:_MOST_NAMED]) + (f" and {more} more" if more > 0 else "")

@@ -111,7 +111,7 @@ def accumulate(
         If the frames hold different passes.
     """
     others = same_shot(target, others)
-    groups = _neighbours(target, others, movement or Movement(), threads)
+    groups = _prepare_neighbours(target, others, movement or Movement(), threads)
     usual = light_for_albedo(target) if others and target.has_light else 0.0
     pairs = [
         neighbour.pair
@@ -120,7 +120,7 @@ def accumulate(
         if neighbour.pair and neighbour.is_reused
     ]
     images = find_images(target, pairs, partial(in_threads, threads=threads))
-    lit = _lit(target, others)
+    lit = _find_lit_parts(target, others)
     work = Work(target, images, usual, lit, threads)
     # the guess's own noise counts more than texture where samples are few
     registers = any(x.leads for x in pairs)
@@ -130,11 +130,11 @@ def accumulate(
     requested = sum(frame.samples for frame in others) * height * width
     rejected = 1.0 - means.reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(frame.number for frame in others)}))
-    return _unpacked(target, means, lit, rejected, frames)
+    return _unpack_means(target, means, lit, rejected, frames)
 
 
-def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
-    """Return the names of the parts that any of the frames has light in."""
+def _find_lit_parts(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
+    """Return the names of the parts that have light in any of the frames."""
     frames = (target, *others)
     return tuple(
         name
@@ -143,7 +143,7 @@ def _lit(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:
     )
 
 
-def _neighbours(
+def _prepare_neighbours(
     target: Stored,
     others: Sequence[Stored],
     movement: Movement,
@@ -156,10 +156,10 @@ def _neighbours(
     )
     extent = find_ranges(target.inverse_depth, target.shape) if rest else None
     fall = -0.5 * target.samples ** (2 / 3) / _SOFTNESS**2
-    near = _nearest(target, others)
+    near = _nearest_numbers(target, others)
 
     def prepare(other: Stored) -> Aligned | Reprojected:
-        _check(target, other)
+        _check_same_passes(target, other)
         if id(other) not in motions:
             return Aligned(other)
         both = pair(target, other, motions[id(other)], extent)
@@ -171,7 +171,7 @@ def _neighbours(
     return groups
 
 
-def _check(target: Stored, other: Stored) -> None:
+def _check_same_passes(target: Stored, other: Stored) -> None:
     kinds = [(frame.picture.shape[1], frame.parts.keys()) for frame in (target, other)]
     if kinds[0] != kinds[1]:
         raise PictureError(
@@ -180,7 +180,7 @@ def _check(target: Stored, other: Stored) -> None:
         )
 
 
-def _nearest(target: Stored, others: Sequence[Stored]) -> set[int]:
+def _nearest_numbers(target: Stored, others: Sequence[Stored]) -> set[int]:
     """Return the numbers of the frames just before and after, and the frame's own."""
     before = [frame.number for frame in others if frame.number < target.number]
     after = [frame.number for frame in others if frame.number > target.number]
@@ -194,7 +194,7 @@ def sample_counts(frame: Stored) -> Array:
     return floats(frame.counts)
 
 
-def _unpacked(
+def _unpack_means(
     target: Stored,
     means: Means,
     lit: tuple[str, ...],

@@ -133,8 +133,8 @@ class Camera:
         Parameters
         ----------
         position : (H, W, 3) float32 array
-            World positions. Points of exactly 0 are no hits: so Cycles writes its
-            Position pass.
+            World positions. Points of exactly 0 are no hits, which is how Cycles'
+            Position pass marks them.
 
         Returns
         -------

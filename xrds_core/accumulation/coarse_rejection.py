@@ -53,7 +53,7 @@ def tile_weights(pair: Pair) -> Array:
     comparison = compare_spots(pair, step)
     if _is_shot_cut(pair, step, comparison):
         return np.zeros(tiles, np.float32)
-    return _weights(comparison.tiles)
+    return _weigh_tiles(comparison.tiles)
 
 
 def _is_shot_cut(pair: Pair, step: int, comparison: Compared) -> bool:
@@ -61,7 +61,7 @@ def _is_shot_cut(pair: Pair, step: int, comparison: Compared) -> bool:
 
     The sky is left out if there is anything else: it looks the same in every view.
     """
-    moved, followed = _moving(pair, step)
+    moved, followed = _count_moving(pair, step)
     if comparison.surfaces:
         compared, matching = comparison.compared_surfaces, comparison.matching_surfaces
     else:
@@ -70,7 +70,7 @@ def _is_shot_cut(pair: Pair, step: int, comparison: Compared) -> bool:
     return most == 0 or matching + followed < _LEAST_SHARE * most
 
 
-def _moving(pair: Pair, step: int) -> tuple[float, float]:
+def _count_moving(pair: Pair, step: int) -> tuple[float, float]:
     """Return how many pixels show moving objects, and how many could be followed."""
     if pair.object_motion is None:
         return 0.0, 0.0
@@ -78,11 +78,11 @@ def _moving(pair: Pair, step: int) -> tuple[float, float]:
     return len(pair.object_motion.pixels) / step**2, followed / step**2
 
 
-def _weights(sums: NDArray[np.float64]) -> Array:
+def _weigh_tiles(sums: NDArray[np.float64]) -> Array:
     """Return weights from the sums of tiles."""
     weights = np.ones(sums.shape[1:])
     for reach in _REACHES:
-        count, total, squares, bright = (_around(x, reach) for x in sums)
+        count, total, squares, bright = (_sum_around(x, reach) for x in sums)
         count = np.maximum(count, 1.0)
         mean = total / count
         noise = np.maximum(squares / count - mean**2, 0.0) / count
@@ -92,7 +92,7 @@ def _weights(sums: NDArray[np.float64]) -> Array:
     return weights.astype(np.float32)
 
 
-def _around(sums: NDArray[np.float64], reach: int | None) -> NDArray[np.float64]:
+def _sum_around(sums: NDArray[np.float64], reach: int | None) -> NDArray[np.float64]:
     """Return the sums over tiles up to `reach` away; over all of them for None."""
     if reach is None:
         return np.full(sums.shape, sums.sum())

@@ -1,10 +1,10 @@
 """Finds frames that were rendered with one seed: their noise is equal, pixel by pixel.
 
-Such samples are no new ones. Where the camera moves, reprojection lays them beside each
-other, and a denoiser takes the streaks for texture. What shows them are residuals, of
-which little is texture: where pixels have moved, equal noise agrees at the same place
-of the picture, and texture where the surface was. Where they have not, both do; but of
-equal noise the difference is far below what each frame has by itself.
+Such samples add nothing new. Where the camera moves, reprojection lays them beside each
+other, and a denoiser takes the streaks for texture. They are detected by residuals, of
+which little is texture. Where pixels have moved, equal noise agrees at the same place
+of the picture, and texture where the surface was. Where pixels have not moved, both
+agree; but with equal noise the difference is far below the noise of each frame.
 """
 
 from __future__ import annotations
@@ -126,7 +126,7 @@ def have_equal_noise(frame: Stored, other: Stored) -> bool:
     """
     if frame.noise is None or other.noise is None or frame.shape != other.shape:
         return False
-    first, second = _spots_of(frame), _spots_of(other)
+    first, second = _get_spots(frame), _get_spots(other)
     spots, residual, other_residual = first.pixels, first.residual, second.residual
     x, y = centres(spots, frame.shape[1])
     transform = reprojection(frame.camera, other.camera)
@@ -138,10 +138,10 @@ def have_equal_noise(frame: Stored, other: Stored) -> bool:
     )
     even = noisy & first.is_even
     moved = places.pixel != spots
-    if (at := _chosen(even & moved, noisy & moved)) is not None:
-        beside = _residual(other, _inner(places.pixel[at], frame.shape))
+    if (at := _first_sufficient(even & moved, noisy & moved)) is not None:
+        beside = _find_residual(other, _keep_inside(places.pixel[at], frame.shape))
         return _agree(residual[at], other_residual[at], beside)
-    if (at := _chosen(even & ~moved)) is None:
+    if (at := _first_sufficient(even & ~moved)) is None:
         return False
     is_still = frame.camera.same(other.camera)
     return _differ_little(
@@ -149,14 +149,14 @@ def have_equal_noise(frame: Stored, other: Stored) -> bool:
     )
 
 
-def _spots(shape: tuple[int, int]) -> Pixels:
+def _choose_spots(shape: tuple[int, int]) -> Pixels:
     """Return pixels (n,) that are spread over a picture, but for its edge."""
     height, width = shape
     rows, columns = np.arange(1, height - 1), np.arange(1, width - 1)
     return spread((rows[:, None] * width + columns).ravel(), _SPOTS)
 
 
-def _inner(pixels: Pixels, shape: tuple[int, int]) -> Pixels:
+def _keep_inside(pixels: Pixels, shape: tuple[int, int]) -> Pixels:
     """Return the nearest pixels that are not at the picture's edge."""
     height, width = shape
     row, column = np.divmod(pixels, width)
@@ -167,18 +167,18 @@ class _Spots:
     """What some pixels of a frame show; a frame is compared with many others."""
 
     def __init__(self, frame: Stored) -> None:
-        self.pixels = _spots(frame.shape)
-        self.residual = _residual(frame, self.pixels)
+        self.pixels = _choose_spots(frame.shape)
+        self.residual = _find_residual(frame, self.pixels)
         self.is_even = _is_even(frame, self.pixels)
 
 
-def _spots_of(frame: Stored) -> _Spots:
+def _get_spots(frame: Stored) -> _Spots:
     if frame not in _SEEN:
         _SEEN[frame] = _Spots(frame)
     return _SEEN[frame]
 
 
-def _residual(frame: Stored, pixels: Pixels) -> Array:
+def _find_residual(frame: Stored, pixels: Pixels) -> Array:
     """Return the noise of brightness (n,), relative to that of 3x3 pixels."""
     assert frame.noise is not None
     width = frame.shape[1]
@@ -197,8 +197,8 @@ def _is_even(frame: Stored, pixels: Pixels) -> Mask:
     return np.asarray((np.ptp(around, axis=0) < _EVEN).all(axis=-1))
 
 
-def _chosen(*places: Mask) -> Mask | None:
-    """Return the first places that are enough; None if none are."""
+def _first_sufficient(*places: Mask) -> Mask | None:
+    """Return the first mask with enough places; None if none has."""
     return next((x for x in places if x.sum() >= _FEWEST), None)
 
 

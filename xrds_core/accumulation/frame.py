@@ -151,10 +151,10 @@ def pack_parts(parts: Mapping[str, Array]) -> dict[str, NDArray[np.float16] | No
     packed : dict of str to (H W, 3) float16 array or None
         None for a part that is dark everywhere.
     """
-    return {name: _packed_part(part) for name, part in parts.items()}
+    return {name: _pack_part(part) for name, part in parts.items()}
 
 
-def _packed_part(part: Array) -> NDArray[np.float16] | None:
+def _pack_part(part: Array) -> NDArray[np.float16] | None:
     packed, has_any = _to_halves(part, keeps_infinities=False)
     return packed if has_any else None
 
@@ -194,7 +194,9 @@ class _Packing:
             picture=self.picture.ctypes.data,
             invalid=self.invalid.ctypes.data,
         )
-        self._packing.passes[: len(given)] = [_pass(self._arrays, x) for x in given]
+        self._packing.passes[: len(given)] = [
+            _make_pass(self._arrays, x) for x in given
+        ]
 
     def run_with_noise(self, samples: float, halves: Halves | None) -> Noise:
         """Pack, and return the noise: of halves, or of the pixels around each one."""
@@ -204,7 +206,9 @@ class _Packing:
         self._packing.noise = noise.light.ctypes.data
         self._packing.guide_noise = noise.guides.ctypes.data
         if halves is not None:
-            self._packing.halves[:] = [_pass(self._arrays, x) for x in halves.radiance]
+            self._packing.halves[:] = [
+                _make_pass(self._arrays, x) for x in halves.radiance
+            ]
             share = halves.share()
             if share.ndim:
                 self._packing.shares = self._arrays.at(share, np.float32, count)
@@ -236,7 +240,7 @@ def _to_halves(
     height, width, channels = picture.shape
     packed = np.empty((height * width, channels), np.float16)
     arrays = Arrays()
-    given = _pass(arrays, picture)
+    given = _make_pass(arrays, picture)
 
     def work(rows: tuple[int, int]) -> int:
         return int(
@@ -248,7 +252,7 @@ def _to_halves(
     return packed, any(in_threads(work, bands(height)))
 
 
-def _pass(arrays: Arrays, picture: Array) -> structures.Pass:
+def _make_pass(arrays: Arrays, picture: Array) -> structures.Pass:
     """A picture (H, W, C) as the library takes it, whatever its strides."""
     first, strides = arrays.strided(picture)
     return structures.Pass(first, *strides, picture.shape[2])
@@ -438,18 +442,18 @@ def store(frame: Frame) -> Stored:
         shape=frame.shape,
         samples=frame.samples,
         picture=picture,
-        inverse_depth=_inverse_depth(frame),
+        inverse_depth=_invert_depth(frame),
         invalid=invalid if invalid.any() else None,
         vector=None if frame.vector is None else pack_vectors(frame.vector),
         still=frame.still,
         counts=None if frame.counts is None else pack_counts(frame.counts),
         noise=noise,
-        image=_image(frame),
+        image=_find_virtual_image(frame),
         parts=pack_parts(frame.parts),
     )
 
 
-def _inverse_depth(frame: Frame) -> Array:
+def _invert_depth(frame: Frame) -> Array:
     """Return `Stored.inverse_depth`; NaN for a depth of NaN or below 0."""
     depth = frame.depth.ravel().astype(np.float32)
     sky = depth > SKY_DEPTH
@@ -464,7 +468,7 @@ def _inverse_depth(frame: Frame) -> Array:
     return inverse_depth
 
 
-def _image(frame: Frame) -> Array | None:
+def _find_virtual_image(frame: Frame) -> Array | None:
     """Return `Stored.image`: where paths end well behind the surface they start at."""
     if frame.path_length is None:
         return None

@@ -54,25 +54,25 @@ def box(plane: Array, size: int) -> Array:
     means : (H, W) float32 array
     """
     wide = np.pad(plane, size // 2)
-    rows = _sums(wide, plane.shape[0], size)
-    sums = _sums(rows.T, plane.shape[1], size).T
-    sums *= _shares(plane.shape[0], size)[:, None]
-    sums *= _shares(plane.shape[1], size)
+    rows = _sum_rows(wide, plane.shape[0], size)
+    sums = _sum_rows(rows.T, plane.shape[1], size).T
+    sums *= _inverse_counts(plane.shape[0], size)[:, None]
+    sums *= _inverse_counts(plane.shape[1], size)
     return np.asarray(sums)
 
 
-def _shares(side: int, size: int) -> Array:
+def _inverse_counts(side: int, size: int) -> Array:
     """Return 1 / how many of the `size` pixels around each one are in the picture."""
     inside = np.arange(side)
     first, last = np.maximum(inside - size // 2, 0), inside + size // 2
     return (1.0 / (np.minimum(last, side - 1) - first + 1)).astype(np.float32)
 
 
-def _sums(plane: Array, count: int, size: int) -> Array:
+def _sum_rows(plane: Array, count: int, size: int) -> Array:
     """Return the sums of `size` consecutive rows, in thirds where possible."""
     if size > 3 and size % 3 == 0:
         third = size // 3
-        part = _sums(plane, count + 2 * third, third)
+        part = _sum_rows(plane, count + 2 * third, third)
         return np.asarray(
             part[:count] + part[third : third + count] + part[2 * third :]
         )

@@ -56,8 +56,8 @@ class Noise:
     def of(cls, brightness: Array, difference: Array, guides: Array) -> Noise:
         """Pack these, each of as many pixels; what is not finite becomes it."""
         light = np.empty((brightness.size, 2), np.float16)
-        light[:, 0], light[:, 1] = _packed(brightness), _packed(difference)
-        return cls(light, _packed(guides))
+        light[:, 0], light[:, 1] = _pack(brightness), _pack(difference)
+        return cls(light, _pack(guides))
 
     @property
     def brightness(self) -> NDArray[np.float16]:
@@ -95,9 +95,9 @@ class Noise:
         light, guides = self.light.copy(), self.guides.copy()
         old = light[place].astype(np.float32)
         root = np.sqrt(share)
-        light[place, 0] = _packed(rest + (old[:, 0] - rest) * share)
-        light[place, 1] = _packed(old[:, 1] * root)
-        guides[place] = _packed(guides[place].astype(np.float32) * root)
+        light[place, 0] = _pack(rest + (old[:, 0] - rest) * share)
+        light[place, 1] = _pack(old[:, 1] * root)
+        guides[place] = _pack(guides[place].astype(np.float32) * root)
         return Noise(light, guides)
 
 
@@ -147,7 +147,7 @@ def light_factor(samples: float) -> float:
     return (9 / 8 * (1.0 + _HALVES_EXCESS / samples)) ** 0.5
 
 
-def _packed(values: Array) -> NDArray[np.float16]:
+def _pack(values: Array) -> NDArray[np.float16]:
     """Return half floats (n,), the largest ones for infinities, 0 for NaN."""
     finite = np.nan_to_num(values.ravel(), nan=0.0)
     return np.clip(finite, -LARGEST_HALF, LARGEST_HALF).astype(np.float16)

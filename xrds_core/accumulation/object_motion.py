@@ -77,15 +77,15 @@ class Movement:
         chains: dict[int, VectorChain] = {}
         if here.vector is not None:
             for step in (-1, 1):
-                chains |= self._chain(here, frames, step)
+                chains |= self._chain_vectors(here, frames, step)
         return [
             None
             if other.number == here.number
-            else self._object_motion(here, other, frames, chains)
+            else self._find_object_motion(here, other, frames, chains)
             for other in others
         ]
 
-    def _object_motion(
+    def _find_object_motion(
         self,
         here: Stored,
         there: Stored,
@@ -97,18 +97,18 @@ class Movement:
         x, y = chains.get(there.number, nowhere)
         return ObjectMotion(pixels, x, y, self.moving(there, frames))
 
-    def _chain(
+    def _chain_vectors(
         self, here: Stored, frames: Mapping[int, Stored], step: int
     ) -> dict[int, VectorChain]:
         """Follow the moving pixels of `here` frame by frame; number -> positions."""
         x, y = centres(np.flatnonzero(self.moving(here, frames)), here.shape[1])
         chain, frame = {}, here
-        while (after := _beside(frame, frames, step)) is not None:
-            x, y = self._step(frame, after, frames, x, y)
+        while (after := _find_adjacent(frame, frames, step)) is not None:
+            x, y = self._follow_vectors(frame, after, frames, x, y)
             chain[after.number], frame = (x, y), after
         return chain
 
-    def _step(
+    def _follow_vectors(
         self,
         here: Stored,
         there: Stored,
@@ -119,9 +119,9 @@ class Movement:
         """Move positions (NaN: lost) to the frame before or after."""
         steps = there.number - here.number
         start = nearest(x, y, here.shape)
-        flow_x, flow_y = _flow(here, start.pixel, steps)
+        flow_x, flow_y = _read_flow(here, start.pixel, steps)
         end = nearest(x + flow_x, y + flow_y, there.shape)
-        back_x, back_y = _flow(there, end.pixel, -steps)
+        back_x, back_y = _read_flow(there, end.pixel, -steps)
         with np.errstate(invalid="ignore"):  # infinite motion is never consistent
             left = (flow_x + back_x) ** 2 + (flow_y + back_y) ** 2
         was, near = here.inverse_depth[start.pixel], there.inverse_depth[end.pixel]
@@ -150,22 +150,24 @@ class Movement:
         """
         masks = self._moving.setdefault(frame, {})
         for step in (1, -1):
-            beside = _beside(frame, frames, step)
+            beside = _find_adjacent(frame, frames, step)
             if beside is not None and frame.vector is not None:
                 steps = beside.number - frame.number
                 if steps not in masks:
-                    masks[steps] = _unexplained(frame, beside.camera, steps)
+                    masks[steps] = _find_unexplained(frame, beside.camera, steps)
                 return masks[steps]
         return np.full(frame.inverse_depth.shape, frame.vector is not None)
 
 
-def _beside(frame: Stored, frames: Mapping[int, Stored], step: int) -> Stored | None:
+def _find_adjacent(
+    frame: Stored, frames: Mapping[int, Stored], step: int
+) -> Stored | None:
     """Return the nearest of `frames` after a frame, or before it (`step` -1)."""
     numbers = [n for n in frames if (n - frame.number) * step > 0]
     return frames[min(numbers, key=lambda n: n * step)] if numbers else None
 
 
-def _unexplained(frame: Stored, beside: Camera, steps: int) -> Mask:
+def _find_unexplained(frame: Stored, beside: Camera, steps: int) -> Mask:
     """Return (H W): where the Vector pass differs from the camera's own motion.
 
     The pass is a mean over the pixel's samples, so it may have any value between the
@@ -190,7 +192,7 @@ def _unexplained(frame: Stored, beside: Camera, steps: int) -> Mask:
     return moving
 
 
-def _flow(
+def _read_flow(
     frame: Stored, pixels: NDArray[np.int32] | slice, steps: int
 ) -> tuple[Array, Array]:
     """Return (x, y downwards) in pixels to the frame `steps` later, or before.

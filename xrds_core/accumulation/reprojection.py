@@ -63,12 +63,12 @@ class PanoramaReprojection:
         x, y, inverse_depth : (n,) float32 array
             The same there.
         """
-        ray = _directions(self.here, x, y)
+        ray = _find_directions(self.here, x, y)
         turn = self.turn.astype(np.float32)
         seen = turn[:3, :3] @ ray + turn[:3, 3:] * inverse_depth
         length = np.sqrt(np.square(seen).sum(0))
         with np.errstate(divide="ignore", invalid="ignore"):
-            across, down = _pixels(self.there, seen / length)
+            across, down = _find_pixels(self.there, seen / length)
             return across, down, inverse_depth / length
 
     def directions(self, shape: tuple[int, int]) -> tuple[Array, Array]:
@@ -88,7 +88,7 @@ class PanoramaReprojection:
         """
         half = np.float32(0.5)
         x, y = (np.arange(n, dtype=np.float32) + half for n in shape[::-1])
-        longitude, latitude = _angles(self.here, x, y)
+        longitude, latitude = _find_angles(self.here, x, y)
         columns, rows = (
             np.stack([np.sin(angle), np.cos(angle)], axis=-1)
             for angle in (longitude, latitude)
@@ -116,15 +116,15 @@ def panorama_reprojection(here: Camera, there: Camera) -> PanoramaReprojection:
     return PanoramaReprojection(here, there, there.view @ np.linalg.inv(here.view))
 
 
-def _directions(camera: Camera, x: Array, y: Array) -> Array:
+def _find_directions(camera: Camera, x: Array, y: Array) -> Array:
     """Return unit vectors (3, n) in camera space."""
-    longitude, latitude = _angles(camera, x, y)
+    longitude, latitude = _find_angles(camera, x, y)
     level = np.cos(latitude)
     ahead = -level * np.cos(longitude)
     return np.stack([level * np.sin(longitude), np.sin(latitude), ahead])
 
 
-def _angles(camera: Camera, x: Array, y: Array) -> tuple[Array, Array]:
+def _find_angles(camera: Camera, x: Array, y: Array) -> tuple[Array, Array]:
     """Return longitude and latitude of columns and rows of pixels."""
     sphere, (width, height) = camera.sphere, camera.size
     assert sphere is not None
@@ -134,7 +134,7 @@ def _angles(camera: Camera, x: Array, y: Array) -> tuple[Array, Array]:
     return longitude, latitude
 
 
-def _pixels(camera: Camera, ray: Array) -> tuple[Array, Array]:
+def _find_pixels(camera: Camera, ray: Array) -> tuple[Array, Array]:
     """Return the pixels (x, y) that show unit vectors (3, n)."""
     sphere, (width, height) = camera.sphere, camera.size
     assert sphere is not None
@@ -244,7 +244,7 @@ class Pair:
         """(3, 3): normals of `there` in the axes of `here`; None if identical."""
         here, there = self.here.camera, self.there.camera
         turn = here.view[:3, :3] @ np.linalg.inv(there.view[:3, :3])
-        turn = _axes(here) @ turn @ _axes(there).T
+        turn = _normal_axes(here) @ turn @ _normal_axes(there).T
         same = np.allclose(turn, np.eye(3), atol=1e-7)
         return None if same else turn.astype(np.float32)
 
@@ -270,7 +270,7 @@ class Pair:
         return (_WHOLE * abs(self.there.number - self.here.number)) ** 2
 
 
-def _axes(camera: Camera) -> Matrix:
+def _normal_axes(camera: Camera) -> Matrix:
     """Return (3, 3): from the axes of view matrices to those of Cycles' normals.
 
     In the latter Z points away from the viewer; in panoramas X does, and Z upwards.
@@ -371,12 +371,12 @@ def pair(
     if object_motion is not None and object_motion.is_empty:
         object_motion = None
     if object_motion is not None:
-        object_motion = _with_edges(object_motion, here, there)
+        object_motion = _add_edges(object_motion, here, there)
     extent = extent or find_ranges(here.inverse_depth, here.shape)
     return Pair(here, there, forth, back, extent, object_motion)
 
 
-def _with_edges(
+def _add_edges(
     object_motion: ObjectMotion, here: Stored, there: Stored
 ) -> ObjectMotion:
     """Return object motion that includes the edges of moving objects.
@@ -385,7 +385,7 @@ def _with_edges(
     """
     own = np.zeros(here.inverse_depth.size, bool)
     own[object_motion.pixels] = True
-    edges, leading = _edges(own, here)
+    edges, leading = _find_edges(own, here)
     place = np.searchsorted(object_motion.pixels, leading)
     (row, column), (down, across) = (
         np.divmod(x, here.shape[1]) for x in (edges, leading)
@@ -395,7 +395,7 @@ def _with_edges(
     pixels = np.concatenate((object_motion.pixels, edges))
     order = np.argsort(pixels, kind="stable")
     moving = object_motion.moving.copy()
-    moving[_edges(moving, there)[0]] = True
+    moving[_find_edges(moving, there)[0]] = True
     return ObjectMotion(
         pixels[order],
         np.concatenate((object_motion.x, x))[order],
@@ -404,7 +404,7 @@ def _with_edges(
     )
 
 
-def _edges(
+def _find_edges(
     mask: NDArray[np.bool_], frame: Stored
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Return the pixels (n,) whose leading surface is in a mask (H W), and its pixels.

@@ -4,7 +4,7 @@ A plane mirror shows things at the depth of their virtual image behind it, a pan
 is beyond it; a curved mirror shows them somewhere between its surface and the length of
 the path. And a virtual image may move by itself: in curved mirrors and thick glass, or
 with what it shows. For a lattice of spots each candidate is reprojected into all
-neighbours, and the one whose guides match best is taken: a plane sweep.
+neighbours, and the one whose guides match best is taken: a plane sweep [1]_.
 
 References
 ----------
@@ -82,7 +82,7 @@ class Images:
         shows = ~np.isnan(images[:, 0])
         pixels, images = pixels[shows], images[shows]
         spots = Grid(pixels, *centres(pixels, self.frame.shape[1]))
-        return spots, _depth_of(self.frame, spots, images[:, 0]), images[:, 1:]
+        return spots, _interpolate_depth(self.frame, spots, images[:, 0]), images[:, 1:]
 
     def positions(self, pair: Pair) -> tuple[NDArray[np.intp], Array, Array]:
         """Return where the virtual images were in another frame.
@@ -101,7 +101,7 @@ class Images:
         """
         spots, depth, motion = self._shown
         assert not isinstance(spots.pixels, slice)
-        return spots.pixels, *_positions(pair, spots, depth, motion)
+        return spots.pixels, *_find_positions(pair, spots, depth, motion)
 
 
 def reach(shape: tuple[int, int]) -> int:
@@ -155,66 +155,66 @@ class _Sweep:
         self._at = np.flatnonzero(shows)
         pixels = pixels[self._at]
         self._spots = Grid(pixels, *centres(pixels, width))
-        self._own = _guides(target, pixels)
+        self._own = _read_guides(target, pixels)
         all_seen = np.full(len(pixels), len(pairs), np.float32)
-        self._enough = np.float32(_SEEN) * self._mean(all_seen)
+        self._enough = np.float32(_SEEN) * self._mean_around(all_seen)
         self._surface = np.zeros((len(pixels), 3), np.float32)
-        self._cost_of_surface, self._error_of_surface = self._cost(self._surface)
+        self._cost_of_surface, self._error_of_surface = self._find_cost(self._surface)
 
     def images(self) -> Array:
         """Return `Images.lattice`."""
         limit = self._cost_of_surface * np.float32(_BETTER)
         images = _Best(self._surface, limit)
         for share in _SHARES:
-            self._try(images, self._surface, (share, 0.0, 0.0), _SURE)
+            self._try_candidates(images, self._surface, (share, 0.0, 0.0), _SURE)
         for step in _STEPS:
             centre = images.candidates.copy()
             for x, y in product((-step, 0.0, step), repeat=2):
                 if x or y:
-                    self._try(images, centre, (0.0, x, y), _SURE_IF_MOVED)
+                    self._try_candidates(images, centre, (0.0, x, y), _SURE_IF_MOVED)
         lattice = np.full((self._shape[0] * self._shape[1], 3), np.nan, np.float32)
         is_better = images.cost < limit
         lattice[self._at[is_better]] = images.candidates[is_better]
-        return _filled(lattice.reshape(*self._shape, 3))
+        return _fill_lattice(lattice.reshape(*self._shape, 3))
 
-    def _try(
+    def _try_candidates(
         self, images: _Best, start: Array, further: tuple[float, ...], sure: float
     ) -> None:
         candidates = start + np.array(further, np.float32)
-        cost, error = self._cost(candidates)
+        cost, error = self._find_cost(candidates)
         images.offer(candidates, np.where(self._is_sure(error, sure), cost, np.inf))
 
     def _is_sure(self, error: Array, sure: float) -> NDArray[np.bool_]:
         """Whether errors (n,) are less than the surface's by `sure` standard errors."""
         less = self._error_of_surface - error
-        mean, square = self._mean(less), self._mean(np.square(less))
+        mean, square = self._mean_around(less), self._mean_around(np.square(less))
         # of all spots, those outside included: they differ by 0
         chance = np.maximum(square - np.square(mean), 0.0) / _AREA**2
         return np.asarray(mean > np.float32(sure) * np.sqrt(chance))
 
-    def _cost(self, candidate: Array) -> tuple[Array, Array]:
+    def _find_cost(self, candidate: Array) -> tuple[Array, Array]:
         """Return squared differences of guides (n,): around each spot, and at it.
 
         The former are infinite where too little is seen.
         """
-        depth = _depth_of(self._target, self._spots, candidate[:, 0])
+        depth = _interpolate_depth(self._target, self._spots, candidate[:, 0])
 
         def compare(pair: Pair) -> Array:
-            positions = _positions(pair, self._spots, depth, candidate[:, 1:])
+            positions = _find_positions(pair, self._spots, depth, candidate[:, 1:])
             places = nearest(*positions, pair.there.shape)
-            apart = _guides(pair.there, places.pixel, pair.turn) - self._own
+            apart = _read_guides(pair.there, places.pixel, pair.turn) - self._own
             seen = places.seen.astype(np.float32)
             if pair.there.invalid is not None:
                 seen[pair.there.invalid.take(places.pixel)] = 0.0
             return np.stack([np.einsum("ij,ij->i", apart, apart) * seen, seen])
 
         error, seen = np.sum(list(self._each(compare, self._pairs)), axis=0)
-        around, known = self._mean(error), self._mean(seen)
+        around, known = self._mean_around(error), self._mean_around(seen)
         around /= np.maximum(known, _TINY)
         around[known < self._enough] = np.inf
         return around, error / np.maximum(seen, np.float32(1.0))
 
-    def _mean(self, values: Array) -> Array:
+    def _mean_around(self, values: Array) -> Array:
         """Return the mean over the spots around each (n,), 0 outside."""
         plane = np.zeros(self._shape[0] * self._shape[1], np.float32)
         plane[self._at] = values
@@ -234,7 +234,7 @@ class _Best:
         self.cost[better] = cost[better]
 
 
-def _filled(lattice: Array) -> Array:
+def _fill_lattice(lattice: Array) -> Array:
     """Return a lattice whose holes are filled from the spots beside them.
 
     Spots at the edge of a mirror may lie just outside of it.
@@ -247,7 +247,7 @@ def _filled(lattice: Array) -> Array:
     return result
 
 
-def _positions(
+def _find_positions(
     pair: Pair, spots: Grid, depth: Array, motion: Array
 ) -> tuple[Array, Array]:
     x, y, _ = reproject(pair.forth, spots.x, spots.y, depth)
@@ -255,7 +255,7 @@ def _positions(
     return x + motion[:, 0] * frames, y + motion[:, 1] * frames
 
 
-def _depth_of(frame: Stored, spots: Grid, share: Array) -> Array:
+def _interpolate_depth(frame: Stored, spots: Grid, share: Array) -> Array:
     """Return inverse depths between surface (0) and the end of the path (1)."""
     assert frame.image is not None
     near, far = frame.inverse_depth[spots.pixels], frame.image[spots.pixels]
@@ -265,7 +265,7 @@ def _depth_of(frame: Stored, spots: Grid, share: Array) -> Array:
     return np.asarray(near * (far / (far + share * (near - far))))
 
 
-def _guides(
+def _read_guides(
     frame: Stored, pixels: NDArray[np.integer], turn: Array | None = None
 ) -> Array:
     # a slice of the picture would be copied whole before anything is taken of it

@@ -1,4 +1,4 @@
-"""Has the compiled library weigh and sum the samples of neighbours.
+"""Weights and sums the samples of neighbours, in the compiled library.
 
 The steps, for each pixel of each neighbour: where it was, what it weighs there, the
 offset of the nearest pixel; then for all neighbours together the similarity weight, and
@@ -10,8 +10,8 @@ averaged over a few pixels, is the squared error E of L, whatever its cause: no 
 what may move or change is needed. Against V, the variance of the frame's own light,
 V / (V + E) minimises the squared error. E is multiplied by a penalty, since a denoiser
 removes most of V and nothing of E. Guides have little noise and show errors at once.
-Light that changes where guides do not, as a moving shadow, is hidden by the frame's own
-noise; there the neighbours are compared with each other.
+Light that changes where guides do not, such as a moving shadow, is hidden by the
+frame's own noise; there the neighbours are compared with each other.
 """
 
 from __future__ import annotations
@@ -339,7 +339,7 @@ def find_spots(pair: Pair, step: int) -> Spots:
     -------
     spots : Spots
     """
-    return _spots(_spot_call(pair), pair, step)
+    return _call_for_spots(_make_spot_call(pair), pair, step)
 
 
 def compare_spots(pair: Pair, step: int) -> Compared:
@@ -358,8 +358,8 @@ def compare_spots(pair: Pair, step: int) -> Compared:
     -------
     comparison : Compared
     """
-    call = _spot_call(pair)
-    spots = _spots(call, pair, step)
+    call = _make_spot_call(pair)
+    spots = _call_for_spots(call, pair, step)
     tiles = np.zeros((4, *tile_grid(pair.here.shape)))
     counts = np.zeros(5, np.int64)
     library().compare_spots(
@@ -372,12 +372,12 @@ def compare_spots(pair: Pair, step: int) -> Compared:
     return Compared(tiles, *counts.tolist())
 
 
-def _spot_call(pair: Pair) -> _Call:
+def _make_spot_call(pair: Pair) -> _Call:
     whole = Reprojected(pair, np.ones((1, 1), np.float32), 0.0)
     return _Call(Work(pair.here, None, 0.0, (), 1), [(whole, 0)])
 
 
-def _spots(call: _Call, pair: Pair, step: int) -> Spots:
+def _call_for_spots(call: _Call, pair: Pair, step: int) -> Spots:
     height, width = pair.here.shape
     start = step // 2
     across = len(range(start, width, step))
@@ -406,7 +406,7 @@ class _Call:
         frame, pixels = work.target, work.target.picture.shape[0]
         guide_penalty, change_penalty = penalties(frame.samples)
         self.target = structures.Target(
-            frame=self._frame(frame, bool(pairs)),
+            frame=self._make_frame(frame, bool(pairs)),
             channels=frame.picture.shape[1],
             parts=len(work.lit),
             neighbours=len(used),
@@ -420,9 +420,9 @@ class _Call:
             noise = frame.noise.guides
             self.target.guide_noise = self._arrays.at(noise, np.float16, pixels)
         if pairs:
-            self._extent(pairs[0])
+            self._add_extent(pairs[0])
         self._all = (structures.Neighbour * max(len(used), 1))(
-            *(self._neighbour(x, group) for x, group in used)
+            *(self._make_neighbour(x, group) for x, group in used)
         )
         self.target.all = ctypes.cast(self._all, ctypes.POINTER(structures.Neighbour))
 
@@ -445,11 +445,11 @@ class _Call:
 
         return sum(in_threads(work, areas, self._work.threads))
 
-    def _reprojected(self, pair: Pair) -> structures.Neighbour:
+    def _make_reprojected(self, pair: Pair) -> structures.Neighbour:
         """The structure of a neighbour without motion of its own."""
         turn = np.eye(3) if pair.turn is None else pair.turn
         result = structures.Neighbour(
-            frame=self._frame(pair.there, True),
+            frame=self._make_frame(pair.there, True),
             forth=for_library(pair.forth, pair.here.shape, self._arrays),
             back=for_library(pair.back, pair.there.shape, self._arrays),
             jitters=pair.jitters,
@@ -458,17 +458,17 @@ class _Call:
         result.turn[:] = turn.ravel().tolist()
         return result
 
-    def _neighbour(
+    def _make_neighbour(
         self, neighbour: Aligned | Reprojected, group: int
     ) -> structures.Neighbour:
         if isinstance(neighbour, Aligned):
             result = structures.Neighbour(aligned=True)
-            result.frame = self._frame(neighbour.other, False)
+            result.frame = self._make_frame(neighbour.other, False)
             result.turn[:] = np.eye(3).ravel().tolist()
         else:
             pair = neighbour.pair
-            result = self._reprojected(pair)
-            self._moving(result, pair)
+            result = self._make_reprojected(pair)
+            self._add_moving(result, pair)
             result.fall, result.most = neighbour.fall, neighbour.tiles.max()
             at_rims = _AT_RIMS if pair.leads else _AT_RIMS_OF_FEW
             result.at_rims = -at_rims / neighbour.fall if neighbour.fall else 0.0
@@ -478,19 +478,19 @@ class _Call:
                     neighbour.tiles, np.float32, neighbour.tiles.size
                 )
             if self._work.images is not None:
-                result.images = self._places(*self._work.images.positions(pair))
+                result.images = self._make_places(*self._work.images.positions(pair))
         result.group = group
         return result
 
-    def _moving(self, result: structures.Neighbour, pair: Pair) -> None:
+    def _add_moving(self, result: structures.Neighbour, pair: Pair) -> None:
         motion = pair.object_motion
         if motion is None:
             return
         count = len(pair.there.picture)
         result.moving = self._arrays.at(motion.moving, np.bool_, count)
-        result.moved = self._places(motion.pixels, motion.x, motion.y)
+        result.moved = self._make_places(motion.pixels, motion.x, motion.y)
 
-    def _places(
+    def _make_places(
         self, pixels: NDArray[np.integer], x: Array, y: Array
     ) -> structures.Places:
         count, at = len(pixels), self._arrays.at
@@ -502,13 +502,13 @@ class _Call:
             count,
         )
 
-    def _extent(self, pair: Pair) -> None:
+    def _add_extent(self, pair: Pair) -> None:
         least, most = (
             self._arrays.at(x, np.float32, len(pair.here.picture)) for x in pair.extent
         )
         self.target.least, self.target.most = least, most
 
-    def _frame(self, frame: Stored, is_reprojected: bool) -> structures.Frame:
+    def _make_frame(self, frame: Stored, is_reprojected: bool) -> structures.Frame:
         (height, width), at = frame.shape, self._arrays.at
         count = height * width
         channels = frame.picture.shape[1]
@@ -517,7 +517,7 @@ class _Call:
             depth=at(frame.inverse_depth, np.float32, count),
             counts=at(frame.counts, np.float16, count),
             invalid=at(frame.invalid, np.bool_, count),
-            parts=self._parts(frame),
+            parts=self._make_parts(frame),
             width=width,
             height=height,
             number=frame.number % (1 << 32),
@@ -529,7 +529,7 @@ class _Call:
             structure.rims = at(frame.rims, np.uint8, count)
         return structure
 
-    def _parts(self, frame: Stored) -> Any:
+    def _make_parts(self, frame: Stored) -> Any:
         parts = [frame.parts[name] for name in self._work.lit]
         count = 3 * len(frame.picture)
         at = self._arrays.at

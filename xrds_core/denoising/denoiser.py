@@ -194,7 +194,8 @@ class Denoiser:
             Scene-linear, with alpha premultiplied. Its noise must not be correlated
             between pixels, which interpolation would cause.
         albedo : (H, W, 3) float32 array, optional
-            Values above 1, such as those of lamps, count as 1: so Blender treats them.
+            Values above 1, such as those of lamps, count as 1, which is what Blender
+            does.
         normal : (H, W, 3) float32 array, optional
             Means of unit vectors of any space, 0 where nothing is.
         parts : mapping of str to (H, W, 3) float32 array, optional
@@ -320,12 +321,12 @@ class Denoiser:
         images: dict[str, Image] = {}
         turn = self._has_room(pictures)
         pictures_made = ("picture", "second picture")[: 1 + (self.quality == "best")]
-        networks = {name: self._network(name) for name in prefiltered}
-        for_part = self._for_parts(len(pictures.lit))
+        networks = {name: self._choose_network(name) for name in prefiltered}
+        for_part = self._choose_part_network(len(pictures.lit))
         total = sum(_SECONDS[stage] for stage in (*networks.values(), *pictures_made))
         total += for_part.seconds * len(pictures.lit)
         for name, guide in pictures.guides.items():
-            images[name] = _rows(guide, turn)
+            images[name] = _order_rows(guide, turn)
             if name in networks:
                 work.begin_stage(_SECONDS[networks[name]] / total)
                 images[name] = self._prefilter(name, images[name], name, work)
@@ -339,20 +340,20 @@ class Denoiser:
             for name in pictures.lit
         ]
         for use, noisy, denoised, seconds in light:
-            images["color"] = _rows(noisy, turn)
+            images["color"] = _order_rows(noisy, turn)
             work.begin_stage(seconds / total)
             task = self._filters[use]
-            self._limit(task, held_bytes + turn * noisy.nbytes)
+            self._limit_memory(task, held_bytes + turn * noisy.nbytes)
             self._execute(task, images, denoised, work)
             if turn:
-                _turn(denoised)
+                _turn_over(denoised)
         if self.quality == "best":
             work.begin_stage(_SECONDS["second picture"] / total)
             other = np.empty(output.shape, np.float32)
-            images["color"] = _rows(pictures.radiance, turn)
-            images = {name: _rows(image, True) for name, image in images.items()}
+            images["color"] = _order_rows(pictures.radiance, turn)
+            images = {name: _order_rows(image, True) for name, image in images.items()}
             self._execute(self._filters["picture"], images, other, work)
-            _mix(output, other if turn else other[::-1])
+            _average_into(output, other if turn else other[::-1])
 
     def _has_room(self, pictures: Pictures) -> bool:
         """Whether there is memory for copies with the rows in Blender's order."""
@@ -365,36 +366,36 @@ class Denoiser:
         self, name: str, guide: Image, use: str, work: Progress | None = None
     ) -> Image:
         result = np.empty(guide.shape, np.float16)  # exact enough, for half the memory
-        task = self._filter(use, self._network(name))
-        self._limit(task, guide.nbytes + 2 * result.nbytes)
+        task = self._get_filter(use, self._choose_network(name))
+        self._limit_memory(task, guide.nbytes + 2 * result.nbytes)
         self._execute(task, {name: guide}, result, work or Progress(None))
         return result
 
-    def _network(self, name: str) -> str:
+    def _choose_network(self, name: str) -> str:
         """Return OIDN's quality for prefiltering a guide."""
         return _LARGE if (self.quality, name) == ("best", "albedo") else _SMALL
 
-    def _for_parts(self, count: int) -> _ForParts:
+    def _choose_part_network(self, count: int) -> _ForParts:
         """Return the network for so many parts, none better than the picture's."""
         own = [choice.network for choice in _FOR_PARTS].index(QUALITIES[self.quality])
         return next(choice for choice in _FOR_PARTS[own:] if count <= choice.most)
 
     def _light_filters(self, parts: int) -> list[Any]:
         """Return the filters of the picture and of so many parts."""
-        filters = [self._filter("picture", QUALITIES[self.quality])]
+        filters = [self._get_filter("picture", QUALITIES[self.quality])]
         if parts:
-            how = self._for_parts(parts)
-            filters.append(self._filter(how.use, how.network))
+            how = self._choose_part_network(parts)
+            filters.append(self._get_filter(how.use, how.network))
         return filters
 
-    def _filter(self, use: str, quality: str) -> Any:
+    def _get_filter(self, use: str, quality: str) -> Any:
         """Return the filter of one use; a change of its sizes would cost time."""
         if use not in self._filters:
             task = self._filters[use] = self._device.new_filter("RT")
             task.quality = getattr(self._oidn.Quality, quality)
         return self._filters[use]
 
-    def _limit(self, task: Any, held: int) -> None:
+    def _limit_memory(self, task: Any, held: int) -> None:
         """Limit a filter to the memory left beside the `held` bytes of guides."""
         if self._memory_limit is not None:
             left = max(0, self._memory_limit - held) // _MEBIBYTE
@@ -413,7 +414,7 @@ class Denoiser:
             buffer = self._set_image(task, "output", output)
             task.execute()
             if buffer is not None:
-                _read(buffer, output)
+                _read_buffer(buffer, output)
         except self._oidn.Error:
             work.check()
             raise
@@ -437,13 +438,13 @@ class Denoiser:
         return buffer
 
 
-def _read(buffer: Any, output: Image) -> None:
+def _read_buffer(buffer: Any, output: Image) -> None:
     pixels = np.empty(output.shape, output.dtype)
     buffer.read(pixels)
     output[...] = pixels
 
 
-def _rows(image: Array, turn: bool) -> Array:
+def _order_rows(image: Array, turn: bool) -> Array:
     """Return rows as OIDN takes them, for `turn` in Blender's order, bottom first.
 
     Its networks are not symmetric: the order changes the picture, by 0.1 dB at times.
@@ -453,7 +454,7 @@ def _rows(image: Array, turn: bool) -> Array:
     return image if plain else np.ascontiguousarray(image)
 
 
-def _turn(image: Array) -> None:
+def _turn_over(image: Array) -> None:
     """Exchange top and bottom, in place."""
     half = image.shape[0] // 2
     top = image[:half].copy()
@@ -461,7 +462,7 @@ def _turn(image: Array) -> None:
     image[image.shape[0] - half :] = top[::-1]
 
 
-def _mix(image: Array, other: Array) -> None:
+def _average_into(image: Array, other: Array) -> None:
     """Make `image` the mean of both."""
     image += other
     image *= 0.5
@@ -512,11 +513,11 @@ def denoise(
     OutOfMemory
         If the device has too little memory.
     """
-    return _denoiser(quality, device, memory_limit)(
+    return _get_denoiser(quality, device, memory_limit)(
         radiance, albedo, normal, guides_are_clean=guides_are_clean, progress=progress
     ).radiance
 
 
 @lru_cache(maxsize=1)
-def _denoiser(quality: str, device: str, memory_limit: int | None) -> Denoiser:
+def _get_denoiser(quality: str, device: str, memory_limit: int | None) -> Denoiser:
     return Denoiser(quality, device, memory_limit=memory_limit)

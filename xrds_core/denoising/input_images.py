@@ -78,8 +78,8 @@ def check(
     for name, other in [*guides.items(), *lights.items()]:
         if other.shape[:2] != whole.shape[:2]:
             raise PictureError(
-                f"{name} is {_size(other)} pixels, but radiance is {_size(whole)}: "
-                "give both of one render"
+                f"{name} is {_size_text(other)} pixels, but radiance is "
+                f"{_size_text(whole)}: give both of one render"
             )
     light, bad_pixels = clean_radiance(whole[..., :3])
     alpha, holes = clean_alpha(whole[..., 3:])
@@ -112,24 +112,24 @@ def sample(guide: Array) -> Array | None:
     count = _SIDE**2
     if rows * columns < _WORTH * count:
         return None
-    blocks = _split(guide[: rows * _BLOCK, : columns * _BLOCK], rows, columns)
-    order = np.argsort(-_busy(blocks), kind="stable")
+    blocks = _split_blocks(guide[: rows * _BLOCK, : columns * _BLOCK], rows, columns)
+    order = np.argsort(-_measure_detail(blocks), kind="stable")
     rest = np.linspace(count // 2, order.size - 1, count - count // 2)
     chosen = blocks[order[[*range(count // 2), *rest.astype(int)]]]
     grid = chosen.reshape(_SIDE, _SIDE, _BLOCK, _BLOCK, 3).swapaxes(1, 2)
     return grid.reshape(_SIDE * _BLOCK, _SIDE * _BLOCK, 3)
 
 
-def _split(picture: Array, rows: int, columns: int) -> Array:
+def _split_blocks(picture: Array, rows: int, columns: int) -> Array:
     """(rows block, columns block, 3) -> (rows columns, block, block, 3)."""
     blocks = picture.reshape(rows, _BLOCK, columns, _BLOCK, 3).swapaxes(1, 2)
     return blocks.reshape(-1, _BLOCK, _BLOCK, 3)
 
 
-def _busy(blocks: Array) -> Array:
+def _measure_detail(blocks: Array) -> Array:
     """Return how much adjacent pixels differ in each block; one channel is enough."""
     return np.abs(np.diff(blocks[..., 1], axis=2)).mean(axis=(1, 2))
 
 
-def _size(picture: Array) -> str:
+def _size_text(picture: Array) -> str:
     return f"{picture.shape[1]}x{picture.shape[0]}"

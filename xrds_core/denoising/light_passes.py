@@ -77,23 +77,23 @@ def read_renderers(path: Path | None = None) -> tuple[Renderer, ...]:
     UsageError
         If the file has another form; it says what is wrong and where.
     """
-    return (_read(path) if path is not None else ()) + _shipped()
+    return (_read_file(path) if path is not None else ()) + _read_shipped()
 
 
 @cache
-def _shipped() -> tuple[Renderer, ...]:
-    return _read(_SHIPPED)
+def _read_shipped() -> tuple[Renderer, ...]:
+    return _read_file(_SHIPPED)
 
 
-def _read(path: Path) -> tuple[Renderer, ...]:
+def _read_file(path: Path) -> tuple[Renderer, ...]:
     try:
         renderers = tomllib.loads(path.read_text("utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise UsageError(f"cannot read the passes in {path}: {error}") from error
-    return tuple(_renderer(path, name, table) for name, table in renderers.items())
+    return tuple(_make_renderer(path, name, table) for name, table in renderers.items())
 
 
-def _renderer(path: Path, name: str, given: Any) -> Renderer:
+def _make_renderer(path: Path, name: str, given: Any) -> Renderer:
     where = f"{path}: [{name}]"
     _check_keys(where, given, {"lobes", "groups", "alone"})
     lobes = given.get("lobes", [])
@@ -101,18 +101,18 @@ def _renderer(path: Path, name: str, given: Any) -> Renderer:
         raise UsageError(f"{where} lobes: give a list of tables")
     return Renderer(
         name,
-        tuple(_lobe(where, lobe) for lobe in lobes),
-        _texts(f"{where} groups", given.get("groups", [])),
-        _texts(f"{where} alone", given.get("alone", [])),
+        tuple(_make_lobe(where, lobe) for lobe in lobes),
+        _check_texts(f"{where} groups", given.get("groups", [])),
+        _check_texts(f"{where} alone", given.get("alone", [])),
     )
 
 
-def _lobe(where: str, given: Any) -> Lobe:
+def _make_lobe(where: str, given: Any) -> Lobe:
     _check_keys(f"{where} lobes", given, {"names", "colour"})
-    names = _texts(f"{where} lobes: names", given.get("names", []))
+    names = _check_texts(f"{where} lobes: names", given.get("names", []))
     if not names:
         raise UsageError(f"{where} lobes: a lobe without names")
-    return Lobe(names, _texts(f"{where} lobes: colour", given.get("colour", [])))
+    return Lobe(names, _check_texts(f"{where} lobes: colour", given.get("colour", [])))
 
 
 def _check_keys(where: str, given: Any, known: set[str]) -> None:
@@ -124,7 +124,7 @@ def _check_keys(where: str, given: Any, known: set[str]) -> None:
         )
 
 
-def _texts(where: str, given: Any) -> tuple[str, ...]:
+def _check_texts(where: str, given: Any) -> tuple[str, ...]:
     texts = isinstance(given, list) and all(isinstance(x, str) and x for x in given)
     if not texts:
         raise UsageError(f"{where}: give a list of names")
@@ -211,7 +211,7 @@ def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPar
     """
     if not wanted:
         return ()
-    passes = _passes(channels, layer)
+    passes = _list_passes(channels, layer)
     known = max(
         (_parts_written_by(renderer, passes) for renderer in wanted.renderers), key=len
     )
@@ -226,13 +226,13 @@ def find_parts(channels: Channels, layer: str, wanted: Wanted) -> tuple[LightPar
             parts.append(_find_part(channels, which, named, known))
     for name in wanted.alone:
         if name not in passes:
-            raise _unknown(channels, name, passes)
+            raise _unknown_light(channels, name, passes)
         parts.append(LightPart(name, passes[name], names=(name,)))
     return tuple({part.channels: part for part in parts}.values())
 
 
-def _passes(channels: Channels, layer: str) -> dict[str, tuple[str, ...]]:
-    """The channels of all colours in a layer, or in none, by the passes' names."""
+def _list_passes(channels: Channels, layer: str) -> dict[str, tuple[str, ...]]:
+    """Return the channels of all colours in a layer, or in none, by pass name."""
     ahead = f"{layer}." if layer else ""
     prefixes = sorted({name.rpartition(".")[0] for name in channels.names})
     channels_by_prefix = (
@@ -248,11 +248,11 @@ def _passes(channels: Channels, layer: str) -> dict[str, tuple[str, ...]]:
 def _parts_written_by(
     renderer: Renderer, passes: dict[str, tuple[str, ...]]
 ) -> list[LightPart]:
-    """The parts that a renderer would have written."""
+    """Return the AOVs and light passes that a renderer would have written."""
     parts = []
     for lobe in renderer.lobes:
-        name = _first(lobe.names, passes)
-        colour = _first(lobe.colour, passes)
+        name = _first_present(lobe.names, passes)
+        colour = _first_present(lobe.colour, passes)
         if name and (colour or not lobe.colour):
             over = passes[colour] if colour else ()
             parts.append(LightPart(name, passes[name], over, "lobes", lobe.names))
@@ -262,18 +262,18 @@ def _parts_written_by(
             any(fnmatchcase(name, pattern) for pattern in renderer.groups)
             and name not in taken
         ):
-            group = (name, *(_short(name, pattern) for pattern in renderer.groups))
+            group = (name, *(_short_name(name, pattern) for pattern in renderer.groups))
             parts.append(LightPart(name, channels, (), GROUPS, group))
         elif name in renderer.alone:
             parts.append(LightPart(name, channels, names=(name,)))
     return parts
 
 
-def _first(names: Sequence[str], passes: Collection[str]) -> str:
+def _first_present(names: Sequence[str], passes: Collection[str]) -> str:
     return next((name for name in names if name in passes), "")
 
 
-def _short(name: str, pattern: str) -> str:
+def _short_name(name: str, pattern: str) -> str:
     """The light group's own name."""
     return name.removeprefix(pattern.rstrip("*"))
 
@@ -287,11 +287,11 @@ def _find_part(
     exact = next((part for part in known if part.name == name), None)
     part = exact or named.get(name)
     if part is None:
-        raise _unknown(channels, name, [known_part.name for known_part in known])
+        raise _unknown_light(channels, name, [known_part.name for known_part in known])
     return part
 
 
-def _unknown(channels: Channels, name: str, known: Collection[str]) -> UsageError:
+def _unknown_light(channels: Channels, name: str, known: Collection[str]) -> UsageError:
     names = ", ".join(sorted(known)) or "none"
     return UsageError(f"{channels.path} has no light {name!r}; it holds {names}")
 

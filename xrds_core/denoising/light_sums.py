@@ -95,7 +95,7 @@ def _finite_light(part: Array) -> Array:
 def _allowed_light(
     name: str, rows: slice, masks: Mapping[str, Array]
 ) -> Array | np.float32:
-    """Where a part can have light: 1, elsewhere 0."""
+    """Return where a part can have light: 1, elsewhere 0."""
     if name not in masks:
         return np.float32(1.0)
     return np.greater(masks[name][rows], 0.0).astype(np.float32)
@@ -137,11 +137,11 @@ def light_in(
     if radiance is None or not light_by_name:
         return light_by_name
     least = _ALL * float(np.nan_to_num(radiance).mean())
-    for name, members in _sums(parts).items():
+    for name, members in _group_by_sum(parts).items():
         missing = radiance - sum(light_by_name[part.name] for part in members)
         is_much = float(np.nan_to_num(np.abs(missing)).mean()) > least
-        if is_much if like is None else _rest(name) in like:
-            light_by_name[_rest(name)] = np.maximum(missing, np.float32(0.0))
+        if is_much if like is None else _rest_name(name) in like:
+            light_by_name[_rest_name(name)] = np.maximum(missing, np.float32(0.0))
     return light_by_name
 
 
@@ -170,10 +170,10 @@ def added_up(
         Light by name; parts that belong to no sum stay as they are.
     """
     light_by_name = {part.name: denoised[part.name] for part in parts}
-    for name, members in _sums(parts).items():
+    for name, members in _group_by_sum(parts).items():
         sums = {part.name: denoised[part.name] for part in members}
-        if _rest(name) in denoised:
-            sums[_rest(name)] = denoised[_rest(name)]
+        if _rest_name(name) in denoised:
+            sums[_rest_name(name)] = denoised[_rest_name(name)]
         masks = {
             part.name: colours[part.colour_name] for part in members if part.colour
         }
@@ -181,7 +181,7 @@ def added_up(
     return {part.name: light_by_name[part.name] for part in parts}
 
 
-def _sums(parts: Sequence[LightPart]) -> dict[str, list[LightPart]]:
+def _group_by_sum(parts: Sequence[LightPart]) -> dict[str, list[LightPart]]:
     sums: dict[str, list[LightPart]] = {}
     for part in parts:
         if part.sum:
@@ -189,6 +189,6 @@ def _sums(parts: Sequence[LightPart]) -> dict[str, list[LightPart]]:
     return sums
 
 
-def _rest(name: str) -> str:
-    """The name of what a sum misses; no pass is called so."""
+def _rest_name(name: str) -> str:
+    """Return the name of what a sum misses; no pass has such a name."""
     return f"rest of {name}."

@@ -26,7 +26,7 @@ def load() -> ModuleType:
         return import_module("mitsuba_oidn")
     except (ImportError, OSError, RuntimeError) as error:
         raise XRDSError(
-            f"cannot load Open Image Denoise ({_line(error)}): install it with "
+            f"cannot load Open Image Denoise ({_first_line(error)}): install it with "
             f"{sys.executable} -m pip install mitsuba-oidn"
         ) from error
 
@@ -78,7 +78,8 @@ def open_device(name: str, threads: int) -> Any:
     except oidn.Error as error:
         here = ", ".join(devices()) or "none"
         raise UsageError(
-            f"device {name!r} is not here ({_line(error)}); use auto, or one of: {here}"
+            f"device {name!r} is not here ({_first_line(error)}); use auto, or one of: "
+            f"{here}"
         ) from error
     return device
 
@@ -92,12 +93,14 @@ def explained(device: str, shape: tuple[int, ...]) -> Iterator[None]:
     except (oidn.Error, MemoryError) as error:
         code = getattr(error, "code", None)
         if not isinstance(error, MemoryError) and code != oidn.ErrorCode.OutOfMemory:
-            raise XRDSError(f"Open Image Denoise failed: {_line(error)}") from error
+            raise XRDSError(
+                f"Open Image Denoise failed: {_first_line(error)}"
+            ) from error
         raise OutOfMemory(
             f"{device} has too little memory to denoise {shape[1]}x{shape[0]} pixels: "
             "set a memory_limit, close other programs, or use another device"
         ) from error
 
 
-def _line(error: BaseException) -> str:
+def _first_line(error: BaseException) -> str:
     return str(error).partition("\n")[0]

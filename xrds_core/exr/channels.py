@@ -69,7 +69,7 @@ class Channels:
         matches = [
             prefix
             for prefix in sorted(prefixes)
-            if _ends(f".{prefix}", ending, any_case) and self.of(prefix, letters)
+            if _has_ending(f".{prefix}", ending, any_case) and self.of(prefix, letters)
         ]
         if wanted in matches:
             return wanted
@@ -98,7 +98,7 @@ class Channels:
         return ", ".join(sorted(passes)) or "nothing"
 
 
-def _ends(name: str, ending: str, any_case: bool) -> bool:
+def _has_ending(name: str, ending: str, any_case: bool) -> bool:
     if any_case:
         name, ending = name.lower(), ending.lower()
     return name.endswith(ending)
@@ -133,7 +133,7 @@ def by_view(
         The first view comes first; names are without that of the view. A file without
         views has one that is called "".
     """
-    views = _views(parts, places)
+    views = _list_views(parts, places)
     if len(views) < 2:
         return {"": dict(places)}
     by_name: dict[str, dict[str, Any]] = {view: {} for view in views}
@@ -150,7 +150,7 @@ def by_view(
     }
 
 
-def _views(parts: Sequence[Part], names: Mapping[str, Any]) -> list[str]:
+def _list_views(parts: Sequence[Part], names: Mapping[str, Any]) -> list[str]:
     for declared in (part.attributes.get(VIEWS) for part in parts):
         if isinstance(declared, list) and all(
             x and isinstance(x, str) for x in declared

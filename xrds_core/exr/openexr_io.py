@@ -187,7 +187,7 @@ def write_part(path: str | Path, part: Part, codec: str = FLOAT_ZIP.codec) -> No
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
         _pack(archive, [part])
-        _apart("write", path, archive, codec)
+        _run_apart("write", path, archive, codec)
 
 
 def copy(
@@ -240,7 +240,7 @@ def copy(
             for number, channels in planes.items()
         ]
         _pack(archive, parts)
-        _apart("copy", path, archive, str(limit))
+        _run_apart("copy", path, archive, str(limit))
 
 
 @cache
@@ -268,37 +268,39 @@ def _library() -> Any:
 
 
 def _read(path: str | Path, limit: int) -> list[Part]:
-    parts = _opened(path, limit).parts
+    parts = _open_file(path, limit).parts
     return [
-        _part(part, {name: channel.pixels for name, channel in part.channels.items()})
+        _make_part(
+            part, {name: channel.pixels for name, channel in part.channels.items()}
+        )
         for part in parts
     ]
 
 
 def _read_headers(path: str | Path) -> list[Part]:
-    return [_part(part, {}) for part in _whole_headers(path)]
+    return [_make_part(part, {}) for part in _read_whole_headers(path)]
 
 
-def _whole_headers(path: str | Path) -> Any:
+def _read_whole_headers(path: str | Path) -> Any:
     try:
         with _silent_library():
-            return _headers(path)
+            return _read_checked_headers(path)
     except _FAULTS as error:
-        raise _incomplete(path, error) from error
+        raise _incomplete_error(path, error) from error
 
 
-def _part(part: Any, channels: dict[str, Pixels]) -> Part:
+def _make_part(part: Any, channels: dict[str, Pixels]) -> Part:
     header = part.header
     return Part(
         header.get("name", ""),
-        _window(header["dataWindow"]),
-        _window(header["displayWindow"]),
+        _to_window(header["dataWindow"]),
+        _to_window(header["displayWindow"]),
         channels,
-        _attributes(header),
+        _read_attributes(header),
     )
 
 
-def _headers(path: str | Path, limit: float = math.inf) -> Any:
+def _read_checked_headers(path: str | Path, limit: float = math.inf) -> Any:
     openexr = _library()
     with readable(path) as readable_path:
         headers = openexr.File(str(readable_path), header_only=True).parts
@@ -306,19 +308,19 @@ def _headers(path: str | Path, limit: float = math.inf) -> Any:
     return headers
 
 
-def _opened(path: str | Path, limit: int) -> Any:
+def _open_file(path: str | Path, limit: int) -> Any:
     """Return the library's file with all its pixels; PictureError if not whole."""
     openexr = _library()
     try:
         # OpenEXR leaves out a part that it cannot read and says why on stdout
         with _silent_library(), redirect_stdout(StringIO()) as output:
-            headers = _headers(path, limit)
+            headers = _read_checked_headers(path, limit)
             with readable(path) as readable_path:
                 file = openexr.File(str(readable_path), separate_channels=True)
     except _FAULTS as error:
-        raise _incomplete(path, error) from error
+        raise _incomplete_error(path, error) from error
     if not file.parts or len(file.parts) != len(headers):
-        raise _incomplete(path, output.getvalue().strip().rpartition(" - ")[2])
+        raise _incomplete_error(path, output.getvalue().strip().rpartition(" - ")[2])
     for part in file.parts:
         _bound_ringing(part)
     return file
@@ -333,19 +335,19 @@ def _bound_ringing(part: Any) -> None:
     ):
         for channel in part.channels.values():
             if channel.pixels.dtype == np.float16:
-                np.copyto(channel.pixels, _bounded(channel.pixels, LARGEST_HALF))
+                np.copyto(channel.pixels, _clip(channel.pixels, LARGEST_HALF))
 
 
-def _bounded(pixels: Pixels, most: float) -> Pixels:
+def _clip(pixels: Pixels, most: float) -> Pixels:
     """NaN stays."""
     return np.clip(pixels, -most, most).astype(pixels.dtype, copy=False)
 
 
-def _incomplete(path: str | Path, reason: object) -> PictureError:
+def _incomplete_error(path: str | Path, reason: object) -> PictureError:
     return PictureError(f"{path} is not a complete OpenEXR file ({reason})")
 
 
-def _attributes(header: Mapping[str, Any]) -> Attributes:
+def _read_attributes(header: Mapping[str, Any]) -> Attributes:
     matrices = {
         name: value.tolist()
         for name, value in header.items()
@@ -386,8 +388,8 @@ def _write(path: str | Path, part: Part, codec: str) -> None:
     for name, value in part.attributes.items():
         matrix = isinstance(value, list)
         header[name] = np.asarray(value, np.float32) if matrix else value
-    header["dataWindow"] = _corners(part.data_window)
-    header["displayWindow"] = _corners(part.display_window)
+    header["dataWindow"] = _to_corners(part.data_window)
+    header["displayWindow"] = _to_corners(part.display_window)
     # the library reads other arrays as if they were contiguous
     planes = {name: np.ascontiguousarray(x) for name, x in part.channels.items()}
     try:
@@ -412,7 +414,7 @@ def _write_dwa(
     halves = [name for name, x in planes.items() if x.dtype == np.float16]
     most = dict.fromkeys(planes, math.inf) | dict.fromkeys(halves, LARGEST_HALF)
     while True:
-        bounded = {name: _bounded(x, most[name]) for name, x in planes.items()}
+        bounded = {name: _clip(x, most[name]) for name, x in planes.items()}
         with _silent_library():
             openexr.File(dict(header), dict(bounded)).write(str(path))
             (read,) = openexr.File(str(path), separate_channels=True).parts
@@ -444,17 +446,17 @@ def _copy(
     openexr = _library()
     if alone:
         ((number, new_channels),) = planes.items()
-        whole = _whole_headers(source)[number].header
+        whole = _read_whole_headers(source)[number].header
         header = {k: v for k, v in whole.items() if k not in _OF_CHANNELS}
-        header["compression"] = _lossless(header["compression"])
+        header["compression"] = _lossless_codec(header["compression"])
         header["type"] = openexr.scanlineimage
         if window is not None:
-            header["dataWindow"] = _corners(window)
+            header["dataWindow"] = _to_corners(window)
         header |= metadata
         channels: dict[str, Any] = {}
         _set_channels(channels, new_channels)
     else:
-        file = _opened(source, limit)
+        file = _open_file(source, limit)
         if window is not None:
             _crop(file.parts, window)
         for number, new_channels in planes.items():
@@ -476,7 +478,7 @@ def _crop(parts: Any, window: Window) -> None:
     """Leave of each part what lies in a window; raises PictureError where it cannot."""
     (left, top), (right, bottom) = window
     for part in parts:
-        (x, y), (last_x, last_y) = _window(part.header["dataWindow"])
+        (x, y), (last_x, last_y) = _to_window(part.header["dataWindow"])
         if left < x or top < y or right > last_x or bottom > last_y:
             raise PictureError(
                 f"a part of it does not cover the crop, {part.header.get('name', '')!r}"
@@ -488,11 +490,11 @@ def _crop(parts: Any, window: Window) -> None:
                 )
             inner = channel.pixels[top - y : bottom - y + 1, left - x : right - x + 1]
             channel.pixels = np.ascontiguousarray(inner)
-        part.header["dataWindow"] = _corners(window)
+        part.header["dataWindow"] = _to_corners(window)
 
 
-def _corners(window: Window) -> tuple[Any, Any]:
-    """A window as the library takes it."""
+def _to_corners(window: Window) -> tuple[Any, Any]:
+    """Return a window in the form that the library takes."""
     first, last = (np.array(corner, np.int32) for corner in window)
     return first, last
 
@@ -517,7 +519,7 @@ def _make_writable(parts: Any) -> None:
     """
     openexr = _library()
     for part in parts:
-        part.header["compression"] = _lossless(part.header["compression"])
+        part.header["compression"] = _lossless_codec(part.header["compression"])
         if "tiles" in part.header:
             tiles = part.header["tiles"]
             tiles.mode = openexr.ONE_LEVEL
@@ -526,25 +528,25 @@ def _make_writable(parts: Any) -> None:
             across, down = channel.xSampling, channel.ySampling
             if (across, down) != (1, 1):
                 part.channels[name] = openexr.Channel(
-                    name, _repeated(channel.pixels, across, down, part)
+                    name, _repeat_pixels(channel.pixels, across, down, part)
                 )
 
 
-def _lossless(compression: Any) -> Any:
-    """ZIP in place of what would lose some of all channels a second time."""
+def _lossless_codec(compression: Any) -> Any:
+    """Return ZIP in place of codecs that would lose some of all channels again."""
     openexr = _library()
     lossy = ("B44", "B44A", "DWAA", "DWAB")
     losses = [getattr(openexr, f"{name}_COMPRESSION") for name in lossy]
     return openexr.ZIP_COMPRESSION if compression in losses else compression
 
 
-def _repeated(pixels: Pixels, across: int, down: int, part: Any) -> Pixels:
-    (left, top), (right, bottom) = _window(part.header["dataWindow"])
+def _repeat_pixels(pixels: Pixels, across: int, down: int, part: Any) -> Pixels:
+    (left, top), (right, bottom) = _to_window(part.header["dataWindow"])
     whole = pixels.repeat(down, axis=0).repeat(across, axis=1)
     return np.ascontiguousarray(whole[: bottom - top + 1, : right - left + 1])
 
 
-def _window(corners: Any) -> Window:
+def _to_window(corners: Any) -> Window:
     (left, top), (right, bottom) = corners
     return (int(left), int(top)), (int(right), int(bottom))
 
@@ -553,11 +555,11 @@ def _read_apart(path: str | Path, limit: int) -> list[Part]:
     """Read all parts, without a limit their headers alone."""
     with scratch_folder() as folder:
         archive = folder / "parts.npz"
-        _apart("read" if limit else "headers", path, archive, str(limit))
+        _run_apart("read" if limit else "headers", path, archive, str(limit))
         return _unpack(archive)
 
 
-def _apart(task: str, path: str | Path, archive: Path, how: str) -> None:
+def _run_apart(task: str, path: str | Path, archive: Path, how: str) -> None:
     """Do a task in a process without the program's library."""
     words = (task, os.fspath(path), str(archive), how)
     done = run_python("-m", __name__, *words, path=sys.path)
@@ -583,8 +585,8 @@ def _unpack(archive: Path) -> list[Part]:
         return [
             Part(
                 head["name"],
-                _window(head["data_window"]),
-                _window(head["display_window"]),
+                _to_window(head["data_window"]),
+                _to_window(head["display_window"]),
                 {
                     name: stored[f"{number}.{index}"]
                     for index, name in enumerate(head["channels"])
@@ -610,7 +612,7 @@ def _main(task: str, path: str, archive: str, how: str) -> int:
         else:
             options = parts[0].attributes
             planes = {part.attributes["part"]: part.channels for part in parts}
-            window = options["window"] and _window(options["window"])
+            window = options["window"] and _to_window(options["window"])
             chosen = options["alone"], window, options["metadata"]
             _copy(options["source"], path, planes, *chosen, int(how))
     except PictureError as error:

@@ -27,7 +27,7 @@ _allowed = 0
 
 
 def allow(size: int | None) -> None:
-    """Let this process read files of `size` bytes of pixels; None: the usual again."""
+    """Let this process read `size` bytes of pixels; None for the default limit."""
     global _allowed
     _allowed = size or 0
 
@@ -69,7 +69,8 @@ def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
                 f"{path} is deep; save it with flat channels of full resolution"
             )
         windows = [
-            _window(path, header, window) for window in ("dataWindow", "displayWindow")
+            _check_window(path, header, window)
+            for window in ("dataWindow", "displayWindow")
         ]
         claimed += _area_around(windows) * len(header["channels"]) * _BYTES
     if claimed > limit:
@@ -79,7 +80,7 @@ def check_claims(path: object, headers: Sequence[Any], limit: float) -> None:
         )
 
 
-def _window(path: object, header: Any, name: str) -> list[int]:
+def _check_window(path: object, header: Any, name: str) -> list[int]:
     """Return left, top, right and bottom, exclusive."""
     (left, top), (right, bottom) = header[name]
     left, top, right, bottom = int(left), int(top), int(right) + 1, int(bottom) + 1
@@ -167,7 +168,7 @@ class Attribute:
 
 def header_bytes(path: str | Path) -> bytes:
     """Return the headers of a file, or its first bytes where it is damaged."""
-    data = _beginning(path)
+    data = _read_beginning(path)
     try:
         *_, last = attributes_in(data)
     except ValueError:
@@ -178,7 +179,7 @@ def header_bytes(path: str | Path) -> bytes:
 @contextmanager
 def readable(path: str | Path) -> Iterator[Path]:
     """Yield a file that the library reads: the file itself but for one it refuses."""
-    refused = _refused(path)
+    refused = _find_refused(path)
     if not refused:
         yield Path(path)
         return
@@ -191,9 +192,9 @@ def readable(path: str | Path) -> Iterator[Path]:
 
 def restore(source: str | Path, path: str | Path) -> None:
     """Give a file that was made of a `source` its names and kinds of attributes."""
-    heads = {attribute.veiled: attribute.head for attribute in _refused(source)}
+    heads = {attribute.veiled: attribute.head for attribute in _find_refused(source)}
     if heads:
-        attributes = attributes_in(_beginning(path))
+        attributes = attributes_in(_read_beginning(path))
         _patch(
             path,
             {
@@ -204,11 +205,11 @@ def restore(source: str | Path, path: str | Path) -> None:
         )
 
 
-def _refused(path: str | Path) -> list[Attribute]:
+def _find_refused(path: str | Path) -> list[Attribute]:
     try:
         return [
             attribute
-            for attribute in attributes_in(_beginning(path))
+            for attribute in attributes_in(_read_beginning(path))
             if attribute.is_refused
         ]
     except ValueError:  # damaged: the library says how
@@ -226,7 +227,7 @@ def _is_carried(kind: bytes, value: bytes) -> bool:
 
 
 def _are_floats(value: bytes) -> bool:
-    """Whether they are some, and none is a NaN that another number format changes."""
+    """Whether bytes are floats, without a NaN that conversion would change."""
     if not value or len(value) % 4:
         return False
     bits = np.frombuffer(value, "<u4")
@@ -235,7 +236,7 @@ def _are_floats(value: bytes) -> bool:
 
 
 def _are_texts(value: bytes) -> bool:
-    """Whether they are texts, each behind its length, and at least one."""
+    """Whether bytes are texts, each behind its length, and at least one."""
     place = 0
     while place + 4 <= len(value):
         (size,) = struct.unpack_from("<i", value, place)
@@ -247,7 +248,7 @@ def _are_texts(value: bytes) -> bool:
 
 
 def _is_reduced(value: bytes) -> bool:
-    """Whether a fraction is in lowest terms, as the library writes it."""
+    """Whether a fraction is in lowest terms, which is how the library writes it."""
     if len(value) != 8:
         return False
     above, below = struct.unpack("<iI", value)
@@ -269,8 +270,8 @@ def _patch(path: str | Path, changes: dict[int, bytes]) -> None:
             file.write(value)
 
 
-def _beginning(path: str | Path) -> bytes:
-    """Return so much of a file that all its headers are in it."""
+def _read_beginning(path: str | Path) -> bytes:
+    """Read the beginning of a file, up to the end of its headers."""
     with Path(path).open("rb") as file:
         data = file.read(1 << 16)
         while len(data) < _MOST and not _is_complete(data):

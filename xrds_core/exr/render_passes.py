@@ -139,7 +139,7 @@ def write_picture(
         If the file cannot be written.
     """
     planes = {name: encoding.plane(pixels) for name, pixels in channels.items()}
-    with _whole(path) as unfinished:
+    with _write_whole(path) as unfinished:
         attributes = dict(metadata or {})
         openexr_io.write(unfinished, planes, encoding.codec, attributes)
 
@@ -184,7 +184,7 @@ def copy_picture(
         part: {k: np.ascontiguousarray(v, np.float32) for k, v in pixels.items()}
         for part, pixels in channels.items()
     }
-    with _whole(path) as unfinished:
+    with _write_whole(path) as unfinished:
         added = dict(metadata or {})
         openexr_io.copy(
             source, unfinished, planes, alone=alone, window=window, metadata=added
@@ -207,12 +207,12 @@ def write_part(path: str | Path, part: Part) -> None:
     PictureError
         If the file cannot be written.
     """
-    with _whole(path) as unfinished:
+    with _write_whole(path) as unfinished:
         openexr_io.write_part(unfinished, part)
 
 
 @contextmanager
-def _whole(path: str | Path) -> Iterator[Path]:
+def _write_whole(path: str | Path) -> Iterator[Path]:
     try:
         with replacing(Path(path)) as unfinished:
             yield unfinished
@@ -251,7 +251,7 @@ class File:
         self.path = path
         self.parts = openexr_io.read(path)
         self.own_parts = len(self.parts)
-        self._places = _places(path, self.parts)
+        self._places = _locate_channels(path, self.parts)
         for name, other in (also or {}).items():
             self._add(name, other)
         self.names = Channels(path, self._places)
@@ -272,7 +272,7 @@ class File:
         parts = openexr_io.read(path)
         if parts[0].display_window != self.parts[0].display_window:
             raise PictureError(f"{path} is no part of {self.path}: its size differs")
-        for channel, (part, own) in _places(path, parts).items():
+        for channel, (part, own) in _locate_channels(path, parts).items():
             full = channel if "." in channel else f"{name}.{channel}"
             self._places.setdefault(full, (len(self.parts) + part, own))
         self.parts += parts
@@ -317,10 +317,10 @@ class File:
                 f"channel {name!r} of {self.path} is deep or subsampled; "
                 "save it with flat channels of full resolution"
             )
-        return _placed(pixels, part, self.window or part.display_window)
+        return _place_in_window(pixels, part, self.window or part.display_window)
 
 
-def _places(path: str | Path, parts: list[Part]) -> dict[str, tuple[int, str]]:
+def _locate_channels(path: str | Path, parts: list[Part]) -> dict[str, tuple[int, str]]:
     """Return part and own name of each channel, by its full name.
 
     Raises PictureError where two parts hold channels of one name.
@@ -344,7 +344,7 @@ def _places(path: str | Path, parts: list[Part]) -> dict[str, tuple[int, str]]:
     return places
 
 
-def _placed(pixels: Any, part: Part, window: Window) -> Array:
+def _place_in_window(pixels: Any, part: Part, window: Window) -> Array:
     """Return `pixels` of the data window in another one, zero around."""
     (left, top), (right, bottom) = window
     x, y = part.data_window[0]
@@ -352,13 +352,13 @@ def _placed(pixels: Any, part: Part, window: Window) -> Array:
     if (x, y) == (left, top) and pixels.shape == size:
         return np.asarray(pixels, np.float32)
     picture = np.zeros(size, np.float32)
-    rows, source_rows = _shared(y - top, pixels.shape[0], size[0])
-    columns, source_columns = _shared(x - left, pixels.shape[1], size[1])
+    rows, source_rows = _find_overlap(y - top, pixels.shape[0], size[0])
+    columns, source_columns = _find_overlap(x - left, pixels.shape[1], size[1])
     picture[rows, columns] = pixels[source_rows, source_columns]
     return picture
 
 
-def _shared(offset: int, length: int, limit: int) -> tuple[slice, slice]:
+def _find_overlap(offset: int, length: int, limit: int) -> tuple[slice, slice]:
     """Return where `length` pixels at `offset` go, and which of them."""
     start, stop = max(offset, 0), min(offset + length, limit)
     stop = max(start, stop)

@@ -165,11 +165,11 @@ def compile_libraries(
         ThreadPoolExecutor(os.cpu_count()) as pool,
     ):
         work = Path(place)
-        run = partial(_run, compiler, _cache(work))
+        run = partial(_run, compiler, _find_cache(work))
         jobs = {
             name: [
                 pool.submit(run, [*words, *flags, "-o", str(made)])
-                for made, words in _objects(name, work).items()
+                for made, words in _list_objects(name, work).items()
             ]
             for name in platforms
         }
@@ -179,7 +179,7 @@ def compile_libraries(
         return [_link(name, folder, flags, work, run) for name in jobs]
 
 
-def _objects(platform: str, work: Path) -> dict[Path, list[str]]:
+def _list_objects(platform: str, work: Path) -> dict[Path, list[str]]:
     """The object files of a library, and how each is compiled."""
     target = PLATFORMS[platform].target
     windows = target.startswith("x86_64-windows")
@@ -187,18 +187,18 @@ def _objects(platform: str, work: Path) -> dict[Path, list[str]]:
     levels = _LEVELS if target.startswith("x86_64") else {"v1": ""}
     arguments = {}
     for level, processor in levels.items():
-        named = [f"-DNAME(x)=x##_{level}", *_processor(processor)]
+        named = [f"-DNAME(x)=x##_{level}", *_processor_flags(processor)]
         arguments[f"kernels_{level}"] = ["kernels.c", *named]
-    arguments["dispatch"] = ["dispatch.c", *_processor(levels["v1"])]
+    arguments["dispatch"] = ["dispatch.c", *_processor_flags(levels["v1"])]
     if windows:
-        arguments["windows"] = ["windows.c", *_processor(levels["v1"])]
+        arguments["windows"] = ["windows.c", *_processor_flags(levels["v1"])]
     return {
         work / f"{platform}-{name}.o": [*base, *words, str(HERE / source)]
         for name, (source, *words) in arguments.items()
     }
 
 
-def _processor(name: str) -> list[str]:
+def _processor_flags(name: str) -> list[str]:
     return [f"-mcpu={name}"] if name else []
 
 
@@ -214,8 +214,8 @@ def _link(
     words = ["-shared", "-O3", "-target", target, *flags, "-o", str(made)]
     words += [] if flags else ["-s"]
     if target.startswith("x86_64"):
-        words += _processor(_LEVELS["v1"])
-    objects = [str(path) for path in _objects(platform, work)]
+        words += _processor_flags(_LEVELS["v1"])
+    objects = [str(path) for path in _list_objects(platform, work)]
     if "windows" in target:  # see windows.c
         objects += ["-nostdlib", "-lucrtbase"]
     if "macos" in target:  # else the temporary folder's name is kept in it
@@ -226,7 +226,7 @@ def _link(
     return part.replace(folder / made.name)
 
 
-def _cache(work: Path) -> Path:
+def _find_cache(work: Path) -> Path:
     """Where zig keeps what it compiled: its own place, if that can be written to."""
     if folder := os.environ.get("ZIG_GLOBAL_CACHE_DIR"):
         return Path(folder)
@@ -246,7 +246,7 @@ def _cache(work: Path) -> Path:
 def _run(compiler: str | None, cache: Path, words: list[str]) -> None:
     """Run a C compiler, zig's if it is None; what it warns of goes on to stderr."""
     if compiler:
-        command = [*shlex.split(compiler), *_for_others(words)]
+        command = [*shlex.split(compiler), *_translate_flags(words)]
     else:  # -P: nothing of the working folder is taken for zig
         command = [sys.executable, "-P", "-m", "ziglang", "cc", *words]
     environment = os.environ | {"ZIG_GLOBAL_CACHE_DIR": str(cache)}
@@ -267,7 +267,7 @@ def _run(compiler: str | None, cache: Path, words: list[str]) -> None:
         print(done.stdout, file=sys.stderr, end="")
 
 
-def _for_others(words: list[str]) -> list[str]:
+def _translate_flags(words: list[str]) -> list[str]:
     """Zig's options as GCC and Clang have them."""
     kept = []
     following = iter(words)

@@ -95,11 +95,11 @@ def library() -> CDLL:
     for name, (result, arguments) in _FUNCTIONS.items():
         function = getattr(compiled, name, None)
         if function is None:
-            raise LibraryError(_other_version(path))
+            raise LibraryError(_other_version_message(path))
         function.restype, function.argtypes = result, arguments
     sizes = [compiled.struct_size(number) for number in range(len(IN_ORDER))]
     if sizes != [sizeof(structure) for structure in IN_ORDER]:
-        raise LibraryError(_other_version(path))
+        raise LibraryError(_other_version_message(path))
     return compiled
 
 
@@ -118,7 +118,7 @@ def _check_length(path: Path) -> None:
         raise OSError("it is cut off")
 
 
-def _other_version(path: Path) -> str:
+def _other_version_message(path: Path) -> str:
     return (
         f"the compiled library {path} is of another version of XRDS: install XRDS "
         "again, or in a checkout run make native"

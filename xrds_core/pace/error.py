@@ -1,10 +1,10 @@
-"""How many samples a frame needs beside its neighbours' for the error of more.
+"""Measures how many samples a frame with neighbours needs.
 
-A frame of few samples, accumulated and denoised, is as good as a frame alone of more.
-How many more is measured without a reference: for two independent renders a, b that a
-picture was not made of, the mean of (picture - a)(picture - b) is its squared error,
-without bias. From there on it is enough to count what neighbours add, where there is
-noise.
+A frame of few samples, accumulated and denoised, has the error of a frame of more
+samples without neighbours. How many more is measured without a reference: for two
+independent renders a, b that a picture was not made of, the mean of
+(picture - a)(picture - b) is its squared error, without bias. From there on it is
+enough to count what neighbours add, where there is noise.
 """
 
 from __future__ import annotations
@@ -78,11 +78,11 @@ def error_ratio(
         Infinite where noise hides the error of all samples.
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
-        errors, part_errors = _errors(picture, noisy, parts, exposure)
-        return Ratio(*_ratio(errors, part_errors * share**FALL))
+        errors, part_errors = _measure_errors(picture, noisy, parts, exposure)
+        return Ratio(*_estimate_ratio(errors, part_errors * share**FALL))
 
 
-def _errors(
+def _measure_errors(
     picture: Array, noisy: Array, parts: tuple[Rendered, Rendered], exposure: float
 ) -> tuple[Array, Array]:
     """Return the errors of the picture and of one of the parts, by blocks.
@@ -120,17 +120,17 @@ def _errors(
     return half + more, half
 
 
-def _ratio(errors: Array, reference: Array) -> tuple[float, float]:
+def _estimate_ratio(errors: Array, reference: Array) -> tuple[float, float]:
     """Return the ratio of two sums over blocks, and its standard error."""
     whole = float(reference.sum())
-    if whole <= 2.0 * _spread(reference):
+    if whole <= 2.0 * _standard_error(reference):
         return float("inf"), 0.0
     ratio = max(float(errors.sum()), 0.0) / whole
     # blocks that are hard to render are so both ways: what is left counts
-    return ratio, _spread(errors - ratio * reference) / whole
+    return ratio, _standard_error(errors - ratio * reference) / whole
 
 
-def _spread(errors: Array) -> float:
+def _standard_error(errors: Array) -> float:
     """Return the standard error of a sum over blocks."""
     return float(errors.std() * np.sqrt(max(errors.size, 1)))
 

@@ -67,7 +67,7 @@ def enriched(frame: Stored, alone: Accumulated, extra: Passes) -> Stored:
     enriched : Stored
     """
     combined = with_extra(alone, alone, extra)
-    rows = _rows(_counts(extra))
+    rows = _find_rows(_counts(extra))
     width = frame.shape[1]
     place = slice(rows.start * width, rows.stop * width)
     picture = frame.picture.copy()
@@ -118,7 +118,7 @@ def with_extra(
     combined : Accumulated
     """
     more = _counts(extra)
-    rows = _rows(more)  # often few of many
+    rows = _find_rows(more)  # often few of many
     usable = np.isfinite(extra.picture[rows]).all(axis=-1) & (more[rows] > 0.0)
     for part in (extra.albedo, extra.normal):
         usable &= np.isfinite(part[rows]).all(axis=-1)
@@ -139,7 +139,7 @@ def with_extra(
             if share.any():
                 # NaN where there are no samples
                 mixed += np.where(share[wide] > 0.0, plane[rows], 0.0) * share[wide]
-        return _with_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
+        return _replace_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
 
     def mean_pass(name: str) -> Array | None:
         whole = getattr(frame, name)
@@ -164,17 +164,17 @@ def with_extra(
             name: mean(part, alone.parts[name], extra.parts[name])
             for name, part in frame.parts.items()
         },
-        samples=_with_rows(frame.samples, rows, counted),
+        samples=_replace_rows(frame.samples, rows, counted),
     )
 
 
-def _rows(samples: Array) -> slice:
+def _find_rows(samples: Array) -> slice:
     """Return the rows from the first to the last one with samples."""
     rows = np.flatnonzero(samples.any(axis=1))
     return slice(rows[0], rows[-1] + 1) if len(rows) else slice(0, 0)
 
 
-def _with_rows(whole: Array, rows: slice, values: Array) -> Array:
+def _replace_rows(whole: Array, rows: slice, values: Array) -> Array:
     result = whole.copy()
     result[rows] = values
     return result

@@ -42,7 +42,7 @@ def whole(value: Any, least: int = 0, most: int = MOST) -> int:
     text = str(value)[:40] if isinstance(value, int | float | str) else ""
     match = re.fullmatch(r"([0-9]{1,10})(\.0+)?", text)
     if match is None or not least <= int(match[1]) <= most:
-        raise ValueError(f"{_short(value)} is no whole number from {least} to {most}")
+        raise ValueError(f"{_shorten(value)} is no whole number from {least} to {most}")
     return int(match[1])
 
 
@@ -60,7 +60,7 @@ def number(value: Any, least: float = -LARGEST, most: float = LARGEST) -> float:
     if isinstance(value, int | float) and not isinstance(value, bool):
         result = float(value) if abs(value) <= LARGEST else math.nan
     if not least <= result <= most:
-        raise ValueError(f"{_short(value)} is no number from {least:g} to {most:g}")
+        raise ValueError(f"{_shorten(value)} is no number from {least:g} to {most:g}")
     return result
 
 
@@ -72,7 +72,7 @@ def positive(value: Any) -> float:
 def pair_of_numbers(value: Any) -> tuple[float, float]:
     """Two numbers in a list."""
     if not isinstance(value, list) or len(value) != 2:
-        raise ValueError(f"{_short(value)} are not two numbers")
+        raise ValueError(f"{_shorten(value)} are not two numbers")
     return number(value[0]), number(value[1])
 
 
@@ -117,10 +117,10 @@ def sphere_of(text: Any) -> Sphere:
         west, east, south, north = (number(float(x), -100.0, 100.0) for x in words)
     except ValueError as error:
         raise ValueError(
-            f"{_short(text)} are not west, east, south and north in radians"
+            f"{_shorten(text)} are not west, east, south and north in radians"
         ) from error
     if east - west < _LEAST_SPAN or north - south < _LEAST_SPAN:
-        raise ValueError(f"{_short(text)} is a panorama without an extent")
+        raise ValueError(f"{_shorten(text)} is a panorama without an extent")
     return Sphere((west, east), (south, north))
 
 
@@ -128,8 +128,8 @@ def _is_four(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 4
 
 
-def _short(value: Any) -> str:
-    """The value, if it is short enough for an error message."""
+def _shorten(value: Any) -> str:
+    """Return a value as text, if it is short enough for an error message."""
     if isinstance(value, int) and abs(value) > MOST:
         return "a number beyond 32 bits"
     text = repr(value) if isinstance(value, int | float | str) else ""
@@ -188,27 +188,27 @@ def from_header(header: Mapping[str, Any], size: tuple[int, int]) -> Camera | No
     """
     if not has_camera(header):
         return None
-    view = placement(_transposed(header[VIEW]))
+    view = placement(_transpose(header[VIEW]))
     if SPHERE in header:
         sphere = sphere_of(header[SPHERE])
         return Camera(_AHEAD @ view, np.zeros((4, 4)), size, sphere=sphere)
     if PROJECT in header:
-        project = projection(_transposed(header[PROJECT]))
+        project = projection(_transpose(header[PROJECT]))
         return Camera(_AHEAD @ view, project, size)
-    ndc = matrix(_transposed(header[NDC]))
+    ndc = matrix(_transpose(header[NDC]))
     seen: Matrix = ndc @ np.linalg.inv(view)
     perspective = abs(seen[3, 2]) > _SKEW * abs(seen[3, 3])
     turned: Matrix = _AHEAD if not perspective or seen[3, 2] > 0 else np.eye(4)
-    project = _project(seen @ turned, perspective)
+    project = _make_projection(seen @ turned, perspective)
     return Camera(turned @ view, projection(project.tolist()), size)
 
 
-def _transposed(rows: Any) -> list[list[float]]:
-    """Headers hold matrices for row vectors, cameras those for columns."""
+def _transpose(rows: Any) -> list[list[float]]:
+    """Transpose a matrix: headers hold those for row vectors, cameras for columns."""
     return matrix(rows).T.tolist()
 
 
-def _project(seen: Matrix, perspective: bool) -> Matrix:
+def _make_projection(seen: Matrix, perspective: bool) -> Matrix:
     """Return `Camera.project` from the transform from OpenGL camera space to NDC."""
     column, scale = (2, -seen[3, 2]) if perspective else (3, seen[3, 3])
     if not scale > 0 or not seen[0, 0] or not seen[1, 1]:
@@ -269,7 +269,7 @@ def read_cameras(path: Path) -> dict[int | None, dict[str, Any]]:
         entries = json.loads(read_stream(path, _MOST_BYTES).decode("utf-8"))
         keys = {None if k == "all" else int(k): v for k, v in entries.items()}
         for camera in keys.values():
-            _camera(camera, (2, 2), 1.0)
+            _make_camera(camera, (2, 2), 1.0)
     except KeyError as error:
         raise UsageError(f"{path}: a camera lacks {error}") from error
     except (ValueError, TypeError, AttributeError) as error:
@@ -309,17 +309,25 @@ def camera_of_frame(
         If the entry and the size together give no camera.
     """
     entry = cameras.get(number, cameras.get(None))
-    return None if entry is None else _camera(entry, size, aspect)
+    return None if entry is None else _make_camera(entry, size, aspect)
 
 
-def _camera(item: Mapping[str, Any], size: tuple[int, int], aspect: float) -> Camera:
+def _make_camera(
+    item: Mapping[str, Any], size: tuple[int, int], aspect: float
+) -> Camera:
     view = np.linalg.inv(placement(item["to_world"]))
     name = str(item.get("name", ""))
-    rows = item["project"] if "project" in item else _lens(item, size, aspect).tolist()
+    rows = (
+        item["project"]
+        if "project" in item
+        else _make_lens_projection(item, size, aspect).tolist()
+    )
     return Camera(view, projection(rows), size, name=name)
 
 
-def _lens(entry: Mapping[str, Any], size: tuple[int, int], aspect: float) -> Matrix:
+def _make_lens_projection(
+    entry: Mapping[str, Any], size: tuple[int, int], aspect: float
+) -> Matrix:
     """Return `Camera.project` for a focal length, or for an orthographic width."""
     width, height = size[0] * aspect, size[1]
     project = np.zeros((4, 4))

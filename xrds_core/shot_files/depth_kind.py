@@ -93,12 +93,12 @@ def kind_of(frame: Stored) -> str:
     mismatch : str
         A phrase; "" if the depth fits or nothing can be said.
     """
-    pairs = _surface(frame)
+    pairs = _find_surface_pairs(frame)
     if pairs.shape[1] < _FEWEST:
         return ""
     x, y = centres(pairs, frame.shape[1])
     near = frame.inverse_depth[pairs]
-    length = np.linalg.norm(_points(frame, x, y, np.ones_like(x)), axis=0)
+    length = np.linalg.norm(_find_points(frame, x, y, np.ones_like(x)), axis=0)
     kinds = {
         "": near,
         "fits the normals as length of the ray, not along the axis": near * length,
@@ -107,7 +107,7 @@ def kind_of(frame: Stored) -> str:
     normal = floats(frame.picture[pairs][..., frame.normals]).mean(axis=0)
     left: dict[str, float] = {}
     for kind, inverse in kinds.items():
-        first, second = np.moveaxis(_points(frame, x, y, inverse), 1, 0)
+        first, second = np.moveaxis(_find_points(frame, x, y, inverse), 1, 0)
         step = second - first
         across = np.abs((step * normal.T).sum(axis=0))
         left[kind] = float(np.median(across / np.linalg.norm(step, axis=0)))
@@ -157,7 +157,7 @@ def unit_of(frame: Stored, other: Stored) -> str:
     return f"fits the cameras when multiplied by about {factor:g}"
 
 
-def _points(frame: Stored, x: Array, y: Array, inverse_depth: Array) -> Array:
+def _find_points(frame: Stored, x: Array, y: Array, inverse_depth: Array) -> Array:
     """Return (3, ...) in the camera's axes, Z away from the viewer, of pixels."""
     world = np.tensordot(
         frame.camera.view @ world_of(frame.camera),
@@ -169,7 +169,7 @@ def _points(frame: Stored, x: Array, y: Array, inverse_depth: Array) -> Array:
     return np.asarray(points)
 
 
-def _surface(frame: Stored) -> Pixels:
+def _find_surface_pairs(frame: Stored) -> Pixels:
     """Return pairs (2, n) of pixels, beside and below, that lie on one surface."""
     height, width = frame.shape
     inner = np.arange(height * width).reshape(height, width)[:-1, :-1]

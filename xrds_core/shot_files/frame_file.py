@@ -161,7 +161,7 @@ def read_frame(
     PictureError
         If the file is incomplete.
     """
-    first, *rest = File(path, _also(path, number, reading)).views()
+    first, *rest = File(path, _find_further_files(path, number, reading)).views()
     frame = _read_view(first, number, reading, reusable)
     others, unread = {}, {}
     for file in rest:
@@ -174,34 +174,34 @@ def read_frame(
 
 def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> FrameFile:
     passes = find_passes(file.names, reading.names)
-    number_of_part, channels = _target(file, passes)
+    number_of_part, channels = _find_target(file, passes)
     part = file.parts[number_of_part]
-    file.window = _window(file.path, part) if reusable else part.data_window
-    camera, depth = _geometry(file, part, passes, number, reading, reusable)
-    beauty = _stack(file, passes.beauty)
-    light = find_parts(file.names, _layer(passes), reading.light)
+    file.window = _choose_window(file.path, part) if reusable else part.data_window
+    camera, depth = _read_geometry(file, part, passes, number, reading, reusable)
+    beauty = _read_stack(file, passes.beauty)
+    light = find_parts(file.names, _layer_of(passes), reading.light)
     frame = Frame(
         number=number,
         camera=camera or _CENTRE,
         radiance=beauty,
-        albedo=_guide(_stack(file, passes.albedo)),
-        normal=_guide(_normal(file, passes, camera, reading)),
+        albedo=_clean_guide(_read_stack(file, passes.albedo)),
+        normal=_clean_guide(_read_normal(file, passes, camera, reading)),
         depth=np.full(beauty.shape[:2], np.inf, np.float32) if depth is None else depth,
-        samples=_samples(file, part, reading),
+        samples=_read_samples(file, part, reading),
         alpha=file.plane(passes.alpha) if passes.alpha else None,
-        vector=_vector(file, passes, reading) if reusable else None,
+        vector=_read_vector(file, passes, reading) if reusable else None,
         still=cameras.whole_or_none(part.attributes.get(STILL)) == 1,
-        parts=_light(file, light),
-        **_others(file, passes),
+        parts=_read_light(file, light),
+        **_read_others(file, passes),
     )
     if reading.halves is not None:
-        frame = _with_other_half(frame, file, camera, reading)
+        frame = _add_other_half(frame, file, camera, reading)
     stored = store(frame)
     if reading.halves is None and passes.noise:
-        stored = replace(stored, noise=_noise(file, passes))
+        stored = replace(stored, noise=_read_noise(file, passes))
     return FrameFile(
         stored=stored,
-        inner=_inner(file.window, part.data_window),
+        inner=_crop_to(file.window, part.data_window),
         data_window=part.data_window,
         part=number_of_part,
         channels=channels,
@@ -211,15 +211,15 @@ def _read_view(file: File, number: int, reading: Reading, reusable: bool) -> Fra
         subset=cameras.whole_or_none(part.attributes.get(SUBSET)),
         light=light,
         places={
-            name: _place(file, number_of_part, name)
+            name: _choose_place(file, number_of_part, name)
             for light_part in light
             for name in (*light_part.channels, *light_part.colour)
         },
     )
 
 
-def _also(path: Path, number: int, reading: Reading) -> dict[str, Path]:
-    """The files that belong to a frame's, by their names without its number."""
+def _find_further_files(path: Path, number: int, reading: Reading) -> dict[str, Path]:
+    """Return the further files of a frame, by their names without its number."""
     files = {}
     for pattern in reading.also:
         other = frame_path(pattern, number)
@@ -229,22 +229,22 @@ def _also(path: Path, number: int, reading: Reading) -> dict[str, Path]:
     return files
 
 
-def _place(file: File, part: int, name: str) -> tuple[int, str]:
-    """Where a channel is written to: what lies in other files is added to a `part`."""
+def _choose_place(file: File, part: int, name: str) -> tuple[int, str]:
+    """Return where a channel is written: one of another file is added to `part`."""
     source_part, own_name = file.place(name)
     return (source_part, own_name) if source_part < file.own_parts else (part, name)
 
 
-def _layer(passes: PassChannels) -> str:
-    """The layer that the noisy radiance lies in; "" where it lies in none."""
+def _layer_of(passes: PassChannels) -> str:
+    """Return the layer that the noisy radiance lies in; "" where it lies in none."""
     return passes.beauty[0].rpartition(".")[0].rpartition(".")[0]
 
 
-def _light(file: File, parts: Sequence[LightPart]) -> dict[str, Array]:
-    return light_of(parts, lambda names: _stack(file, list(names)))
+def _read_light(file: File, parts: Sequence[LightPart]) -> dict[str, Array]:
+    return light_of(parts, lambda names: _read_stack(file, list(names)))
 
 
-def _with_other_half(
+def _add_other_half(
     frame: Frame, file: File, camera: Camera | None, reading: Reading
 ) -> Frame:
     """Return the mean of a frame and of its second half buffer."""
@@ -257,18 +257,18 @@ def _with_other_half(
     if other is None:
         raise Unfit(f"{path} is no half of {file.path}: it lacks the view {file.view}")
     passes = find_passes(other.names, reading.names)
-    part = other.parts[_target(other, passes)[0]]
+    part = other.parts[_find_target(other, passes)[0]]
     same_size = part.display_window == file.parts[0].display_window
     if not same_size or (passes.alpha is None) != (frame.alpha is None):
         raise Unfit(f"{path} is no half of {file.path}: its size or alpha differs")
     other.window = file.window
-    light = find_parts(other.names, _layer(passes), reading.light)
+    light = find_parts(other.names, _layer_of(passes), reading.light)
     second = Passes(
-        radiance=_stack(other, passes.beauty),
-        albedo=_guide(_stack(other, passes.albedo)),
-        normal=_guide(_normal(other, passes, camera, reading)),
+        radiance=_read_stack(other, passes.beauty),
+        albedo=_clean_guide(_read_stack(other, passes.albedo)),
+        normal=_clean_guide(_read_normal(other, passes, camera, reading)),
         alpha=other.plane(passes.alpha) if passes.alpha else None,
-        parts=_light(other, light),
+        parts=_read_light(other, light),
     )
     if second.parts.keys() != frame.parts.keys():
         raise Unfit(f"{path} is no half of {file.path}: its parts of the light differ")
@@ -288,7 +288,7 @@ _REMEDY = {
 }
 
 
-def _geometry(
+def _read_geometry(
     file: File,
     part: Part,
     passes: PassChannels,
@@ -301,25 +301,27 @@ def _geometry(
     Raises NotReusable, if `reusable`, for what is missing or unusable.
     """
     try:
-        camera = _camera(file, part, number, reading)
+        camera = _read_camera(file, part, number, reading)
     except NotReusable:
         if reusable:
             raise
         camera = None
     if not reusable:
         return camera, None
-    depth = None if camera is None else _depth(file, passes, camera, reading)
+    depth = None if camera is None else _read_depth(file, passes, camera, reading)
     if camera is None or depth is None:
         lacking = "camera" if camera is None else "depth"
         raise NotReusable(f"{file.path} has no {lacking}", _REMEDY[lacking])
     return camera, depth
 
 
-def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | None:
+def _read_camera(
+    file: File, part: Part, number: int, reading: Reading
+) -> Camera | None:
     """The camera from the options, or else from the header."""
     (left, top), (right, bottom) = part.display_window
     size = (right - left + 1, bottom - top + 1)
-    header = _header_with_camera(file, part)
+    header = _find_camera_header(file, part)
     try:
         if reading.cameras is not None:
             aspect = cameras.number(header.get("pixelAspectRatio", 1.0), 1e-3, 1e3)
@@ -338,13 +340,13 @@ def _camera(file: File, part: Part, number: int, reading: Reading) -> Camera | N
     return replace(camera, window=(x - left, y - top), name=name)
 
 
-def _header_with_camera(file: File, part: Part) -> Attributes:
+def _find_camera_header(file: File, part: Part) -> Attributes:
     """The part's header, or else that of the first part that holds a camera."""
     headers = [part.attributes, *(other.attributes for other in file.parts)]
     return next((header for header in headers if has_camera(header)), part.attributes)
 
 
-def _depth(
+def _read_depth(
     file: File, passes: PassChannels, camera: Camera, reading: Reading
 ) -> Array | None:
     """Depth (H, W) along the camera's axis, infinite without a hit."""
@@ -358,11 +360,11 @@ def _depth(
         if passes.has_length:
             height, width = plane.shape
             plane = plane * camera.depth_per_length((height, width))
-        return _from_depth(plane)
-    points = _stack(file, position)
+        return _clean_depth(plane)
+    points = _read_stack(file, position)
     points[~np.isfinite(points).all(axis=-1)] = 0.0
     if reading.position_space == "camera":
-        return _from_depth(points[..., 2])
+        return _clean_depth(points[..., 2])
     with np.errstate(over="ignore", invalid="ignore"):  # huge positions
         result = camera.depth(points)
     result[np.abs(result) < _NEAREST] = 0.0
@@ -371,7 +373,7 @@ def _depth(
     return result
 
 
-def _from_depth(depth: Array) -> Array:
+def _clean_depth(depth: Array) -> Array:
     """Depth; renderers write 0, infinity or a huge number where there is no hit."""
     depth = np.abs(depth)
     with np.errstate(invalid="ignore"):
@@ -379,10 +381,12 @@ def _from_depth(depth: Array) -> Array:
     return np.where(hit, depth, np.where(np.isnan(depth), depth, np.float32(np.inf)))
 
 
-def _others(file: File, passes: PassChannels) -> dict[str, Any]:
+def _read_others(file: File, passes: PassChannels) -> dict[str, Any]:
     """The passes that have one name alone."""
     return {
-        name: _stack(file, names) if LAYOUT[name].channels else file.plane(names[0])
+        name: _read_stack(file, names)
+        if LAYOUT[name].channels
+        else file.plane(names[0])
         for name, names in passes.others.items()
     }
 
@@ -409,11 +413,11 @@ def _check_fit(file: File, camera: Camera, points: Array, depth: Array) -> None:
         )
 
 
-def _normal(
+def _read_normal(
     file: File, passes: PassChannels, camera: Camera | None, reading: Reading
 ) -> Array:
     """Return normals in the camera's axes, Z away from the viewer."""
-    normal = _stack(file, passes.normal)
+    normal = _read_stack(file, passes.normal)
     space = reading.normal_space
     if space is None:
         space = "camera" if passes.has_camera_normal else "world"
@@ -424,23 +428,23 @@ def _normal(
         return normal @ turn.T.astype(np.float32)
 
 
-def _vector(file: File, passes: PassChannels, reading: Reading) -> Array | None:
+def _read_vector(file: File, passes: PassChannels, reading: Reading) -> Array | None:
     """Cycles' Vector pass, or one of one direction: motion is assumed to be uniform."""
     if not passes.vector:
         return None
-    motion = _stack(file, passes.vector)
+    motion = _read_stack(file, passes.vector)
     if motion.shape[-1] == 2:
         motion = motion * np.array(reading.motion_scale, np.float32)
         return -np.concatenate((motion, motion), axis=-1)
     return motion
 
 
-def _noise(file: File, passes: PassChannels) -> Noise:
+def _read_noise(file: File, passes: PassChannels) -> Noise:
     """The noise of a frame as XRDS stored it."""
     return Noise.of(*(file.plane(name) for name in passes.noise))
 
 
-def _samples(file: File, part: Part, reading: Reading) -> float:
+def _read_samples(file: File, part: Part, reading: Reading) -> float:
     """Samples per pixel: from the options, or as XRDS or Blender wrote them."""
     if reading.samples:
         return reading.samples
@@ -459,12 +463,12 @@ def _is_cycles_samples(name: str) -> bool:
     return name.startswith("cycles.") and name.endswith(".samples")
 
 
-def _target(file: File, passes: PassChannels) -> tuple[int, list[str]]:
+def _find_target(file: File, passes: PassChannels) -> tuple[int, list[str]]:
     """Return the part that the picture is written to, and its channels' names there.
 
     Raises Unfit where it lies in another file than the one that is copied.
     """
-    part, names = _target_of_all(file, passes)
+    part, names = _find_any_target(file, passes)
     if part >= file.own_parts:
         raise Unfit(
             f"the picture of {file.path} lies in a file of --also: give that file as "
@@ -473,7 +477,7 @@ def _target(file: File, passes: PassChannels) -> tuple[int, list[str]]:
     return part, names
 
 
-def _target_of_all(file: File, passes: PassChannels) -> tuple[int, list[str]]:
+def _find_any_target(file: File, passes: PassChannels) -> tuple[int, list[str]]:
     prefix = passes.picture[0].rpartition(".")[0]
     alpha = f"{prefix}.A" if prefix else "A"
     wanted = [*passes.picture, alpha] if passes.alpha is not None else passes.picture
@@ -484,23 +488,23 @@ def _target_of_all(file: File, passes: PassChannels) -> tuple[int, list[str]]:
             f"{file.path} holds {', '.join(present)} in several parts; save them in one"
         )
     if not parts:
-        names = [_in_layer(file.view, x.rpartition(".")[2]) for x in wanted]
+        names = [_name_in_layer(file.view, x.rpartition(".")[2]) for x in wanted]
         return file.place(passes.beauty[0])[0], names
     ahead = file.place(present[0])[1].rpartition(".")[0]
-    return parts.pop(), [_in_layer(ahead, x.rpartition(".")[2]) for x in wanted]
+    return parts.pop(), [_name_in_layer(ahead, x.rpartition(".")[2]) for x in wanted]
 
 
-def _in_layer(layer: str, letter: str) -> str:
+def _name_in_layer(layer: str, letter: str) -> str:
     return f"{layer}.{letter}" if layer else letter
 
 
-def _guide(guide: Array) -> Array:
+def _clean_guide(guide: Array) -> Array:
     """Guides without NaN: a sky may have no normal, and its light is valid anyway."""
     known = np.isfinite(guide).all(axis=-1, keepdims=True)
     return guide if known.all() else np.where(known, guide, np.float32(0.0))
 
 
-def _stack(file: File, names: list[str]) -> Array:
+def _read_stack(file: File, names: list[str]) -> Array:
     return np.stack([file.plane(name) for name in names], axis=-1)
 
 
@@ -508,7 +512,7 @@ def _is_half(file: File, names: list[str]) -> bool:
     return any(file.pixels(name).dtype == np.float16 for name in names)
 
 
-def _window(path: str | Path, part: Part) -> Window:
+def _choose_window(path: str | Path, part: Part) -> Window:
     """The window that the arrays of a frame cover.
 
     Renderers may crop each frame to its content, so that the display window is what
@@ -520,7 +524,7 @@ def _window(path: str | Path, part: Part) -> Window:
     (a, b), (c, d) = part.data_window
     (e, f), (g, h) = part.display_window
     whole = (min(a, e), min(b, f)), (max(c, g), max(d, h))
-    if is_mostly_empty(_area(part.data_window), _area(whole)):
+    if is_mostly_empty(_count_pixels(part.data_window), _count_pixels(whole)):
         (left, top), (right, bottom) = whole
         raise NotReusable(
             f"{path} holds few of the {right - left + 1}x{bottom - top + 1} pixels of "
@@ -530,12 +534,12 @@ def _window(path: str | Path, part: Part) -> Window:
     return whole
 
 
-def _area(window: Window) -> int:
+def _count_pixels(window: Window) -> int:
     (left, top), (right, bottom) = window
     return (right - left + 1) * (bottom - top + 1)
 
 
-def _inner(whole: Window, part: Window) -> tuple[slice, slice]:
+def _crop_to(whole: Window, part: Window) -> tuple[slice, slice]:
     """Rows and columns of a data window in the arrays of a larger one."""
     (left, top), _ = whole
     (x, y), (right, bottom) = part

@@ -226,14 +226,14 @@ class NeighbourSelection:
             )
 
     def _fits(self, number: int, own: FrameFile, n: int, other: FrameFile) -> bool:
-        why = _difference(own, other)
+        why = _find_difference(own, other)
         if why and not {number, n} & self._odd:
             self._odd.add(n)
             self._say(f"frames {number} and {n} share no samples: {why}")
         return not why
 
 
-def _difference(own: FrameFile, other: FrameFile) -> str:
+def _find_difference(own: FrameFile, other: FrameFile) -> str:
     """Return why two frames cannot share samples; "" if they can."""
     if own.stored.shape != other.stored.shape:
         old, new = (f"{w}x{h}" for h, w in (own.stored.shape, other.stored.shape))

@@ -49,7 +49,9 @@ class Recipe:
 
     def state(self, number: int) -> State:
         """Return the state of a frame's files, as they are now."""
-        return tuple(_state(frame_path(pattern, number)) for pattern in self.patterns)
+        return tuple(
+            _read_state(frame_path(pattern, number)) for pattern in self.patterns
+        )
 
     def digest(self, states: Mapping[int, State], number: int) -> str:
         """Return a digest of what a frame is made of.
@@ -77,16 +79,16 @@ class Recipe:
 
 def is_made_of(path: Path, digest: str) -> bool:
     """Whether a file is complete and has this digest."""
-    return digest in _digests(path)
+    return digest in _read_digests(path)
 
 
 def is_complete(path: Path) -> bool:
     """Whether a file can be read."""
-    return bool(_digests(path))
+    return bool(_read_digests(path))
 
 
-def _digests(path: Path) -> list[str | None]:
-    """Return those of all parts; none of a file that is damaged."""
+def _read_digests(path: Path) -> list[str | None]:
+    """Return the digests of all parts; none for a file that is damaged."""
     try:
         return [attributes.get(MADE_OF) for attributes in exr.attributes(path)]
     except PictureError:
@@ -98,7 +100,7 @@ def states_of(recipe: Recipe, numbers: Iterable[int]) -> dict[int, State]:
     return {n: recipe.state(n) for n in numbers}
 
 
-def _state(path: Path) -> tuple[str, int, int, str] | None:
+def _read_state(path: Path) -> tuple[str, int, int, str] | None:
     try:
         status = path.stat()
         header = header_bytes(path) if path.is_file() else b""

@@ -114,23 +114,25 @@ def find_passes(channels: Channels, names: PassNames) -> PassChannels:
     PictureError
         If several layers hold a pass.
     """
-    beauty = _pass(channels, names, "beauty")
+    beauty = _find_pass(channels, names, "beauty")
     prefix = "" if beauty is None else beauty
     radiance = channels.of(prefix)
     if not radiance:
-        raise _missing(channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB")
-    target = _target(channels, prefix)
+        raise _missing_error(
+            channels, "beauty", names.beauty or f"{NOISY}, {COMBINED}, RGB"
+        )
+    target = _find_target(channels, prefix)
     alphas = [f"{x}.A" if x else "A" for x in (prefix, target)]
-    normal, depth = _pass(channels, names, "normal"), _depth(channels, names)
+    normal, depth = _find_pass(channels, names, "normal"), _find_depth(channels, names)
     return PassChannels(
         beauty=radiance,
-        albedo=_needed(channels, names, "albedo"),
-        normal=_needed(channels, names, "normal"),
-        position=_channels(channels, names, "position"),
+        albedo=_require_channels(channels, names, "albedo"),
+        normal=_require_channels(channels, names, "normal"),
+        position=_find_channels(channels, names, "position"),
         depth=depth,
-        vector=_channels(channels, names, "vector", _MOTION),
+        vector=_find_channels(channels, names, "vector", _MOTION),
         noise=_by_name(channels, NOISE, ("XYZ",)),
-        others=_others(channels, depth),
+        others=_find_others(channels, depth),
         picture=channels.of(target) or ["R", "G", "B"],
         alpha=next((x for x in alphas if x in channels.names), None),
         has_camera_normal=(normal or "").endswith(CAMERA_NORMAL),
@@ -138,7 +140,7 @@ def find_passes(channels: Channels, names: PassNames) -> PassChannels:
     )
 
 
-def _others(channels: Channels, depth: list[str]) -> dict[str, list[str]]:
+def _find_others(channels: Channels, depth: list[str]) -> dict[str, list[str]]:
     """The passes that have one name alone, but for one that serves as depth."""
     names = LAYOUT.keys() - {*_USUAL, "radiance", "alpha"}
     others = {}
@@ -157,7 +159,7 @@ def _by_name(channels: Channels, name: str, letters: Sequence[str]) -> list[str]
     return [] if full_name is None else channels.of(full_name, letters)
 
 
-def _target(channels: Channels, prefix: str) -> str:
+def _find_target(channels: Channels, prefix: str) -> str:
     """The pass that the denoised picture is written to: Cycles has two of them."""
     layer, _, name = prefix.rpartition(".")
     if name != NOISY:
@@ -166,7 +168,7 @@ def _target(channels: Channels, prefix: str) -> str:
     return combined if channels.of(combined) else ""
 
 
-def _pass(
+def _find_pass(
     channels: Channels,
     names: PassNames,
     kind: str,
@@ -177,7 +179,7 @@ def _pass(
     if requested is not None:
         full_name = channels.find(requested, letters)
         if full_name is None:
-            raise _missing(channels, kind, requested)
+            raise _missing_error(channels, kind, requested)
         return full_name
     if kind == "beauty" and channels.of("") and not channels.find(NOISY):
         return None  # plain R, G, B
@@ -188,32 +190,32 @@ def _pass(
     return None
 
 
-def _channels(
+def _find_channels(
     channels: Channels,
     names: PassNames,
     kind: str,
     letters: Sequence[str] = COMPONENTS,
 ) -> list[str]:
-    full_name = _pass(channels, names, kind, letters)
+    full_name = _find_pass(channels, names, kind, letters)
     return [] if full_name is None else channels.of(full_name, letters)
 
 
-def _depth(channels: Channels, names: PassNames) -> list[str]:
+def _find_depth(channels: Channels, names: PassNames) -> list[str]:
     """Depth is one channel: `Depth.Z`, or without a pass `Z`."""
     wanted = (names.depth,) if names.depth else _USUAL["depth"]
     usual = [x.lower() for x in wanted]
     plain = [name for name in channels.names if name.lower() in usual]
-    return plain[:1] or _channels(channels, names, "depth", _SINGLE)
+    return plain[:1] or _find_channels(channels, names, "depth", _SINGLE)
 
 
-def _needed(channels: Channels, names: PassNames, kind: str) -> list[str]:
-    channel_names = _channels(channels, names, kind)
+def _require_channels(channels: Channels, names: PassNames, kind: str) -> list[str]:
+    channel_names = _find_channels(channels, names, kind)
     if not channel_names:
-        raise _missing(channels, kind, getattr(names, kind) or _USUAL[kind][0])
+        raise _missing_error(channels, kind, getattr(names, kind) or _USUAL[kind][0])
     return channel_names
 
 
-def _missing(channels: Channels, kind: str, name: str) -> Unfit:
+def _missing_error(channels: Channels, kind: str, name: str) -> Unfit:
     return Unfit(
         f"{channels.path} has no {kind} ({name}); it holds {channels.contents()}; "
         f"render it too, or name the pass with --{kind}"

@@ -84,31 +84,35 @@ def write_cached_frame(path: Path, frame: Frame, origin: Origin) -> None:
         "",
         ((x, y), (x + width - 1, y + height - 1)),
         ((0, 0), (right, bottom)),
-        _channels(frame, f"{origin.layer}." if origin.layer else ""),
+        _make_channels(frame, f"{origin.layer}." if origin.layer else ""),
         attributes,
     )
     exr.write_part(path, part)
 
 
-def _channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
+def _make_channels(frame: Frame, layer: str) -> dict[str, NDArray[Any]]:
     # noise always: computed from the half floats of the rest it would differ
-    channels = _planes(f"{layer}{NOISE}", "XYZ", _noise(frame).astype(np.float16))
+    channels = _split_planes(
+        f"{layer}{NOISE}", "XYZ", _stack_noise(frame).astype(np.float16)
+    )
     for name, pixels in frame.given.items():
         layout = LAYOUT[name]
         if name == "counts":
             packed = pack_counts(pixels).reshape(frame.shape)
         else:
-            packed = pixels.astype(np.float32) if layout.is_full else _half(pixels)
-        channels |= _planes(f"{layer}{layout.name}", layout.letters, packed)
+            packed = pixels.astype(np.float32) if layout.is_full else _to_half(pixels)
+        channels |= _split_planes(f"{layer}{layout.name}", layout.letters, packed)
     return channels
 
 
-def _planes(name: str, letters: str, pixels: NDArray[Any]) -> dict[str, NDArray[Any]]:
+def _split_planes(
+    name: str, letters: str, pixels: NDArray[Any]
+) -> dict[str, NDArray[Any]]:
     planes = pixels[..., None] if pixels.ndim == 2 else pixels
     return {f"{name}.{letter}": planes[..., i] for i, letter in enumerate(letters)}
 
 
-def _noise(frame: Frame) -> Array:
+def _stack_noise(frame: Frame) -> Array:
     """Return (H, W, 3): brightness, difference and guides of `Noise`."""
     noise = pack_frame(frame)[2]
     assert noise is not None
@@ -116,7 +120,7 @@ def _noise(frame: Frame) -> Array:
     return np.stack(parts, axis=-1).reshape(*frame.shape, 3).astype(np.float32)
 
 
-def _half(values: Array) -> NDArray[np.float16]:
+def _to_half(values: Array) -> NDArray[np.float16]:
     """Clip to the largest half float; infinities stay."""
     cut = np.clip(values, -LARGEST_HALF, LARGEST_HALF)
     return np.where(np.isfinite(values), cut, values).astype(np.float16)

@@ -123,7 +123,7 @@ class Files:
             planes = np.moveaxis(finished.picture, 2, 0)
             by_part.setdefault(part, {}).update(zip(names, planes, strict=False))
             if not self.picture_only:
-                for name, plane in _light(frame, finished).items():
+                for name, plane in _light_planes(frame, finished).items():
                     part, own = frame.places[name]
                     by_part.setdefault(part, {})[own] = plane
         path = frame_path(self.output, number)
@@ -241,11 +241,11 @@ def denoise_sequence(
         If no frame can be read, the first lacks passes, or an output cannot be written;
         outputs before it are complete.
     """
-    numbers = _numbers(files, frames, say)
+    numbers = _choose_numbers(files, frames, say)
     existing = _existing_frames(files.source, numbers)
     files.check(numbers, existing)
     radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
-    recipe = _recipe(files, reading or Reading(), denoiser)
+    recipe = _make_recipe(files, reading or Reading(), denoiser)
     loader = Loader(files.source, recipe, reusable=radius != 0, say=say)
     loader.look(numbers, set(existing))
     readable = [n for n in numbers if n not in loader.failed]
@@ -254,7 +254,7 @@ def denoise_sequence(
         radius = RADIUS if first is None or first.radius is None else first.radius
     beside = (*numbers, *existing)
     shot = Shot((), radius, others=beside)
-    done = _done(files, recipe, shot, numbers, say) if resume else set()
+    done = _find_done(files, recipe, shot, numbers, say) if resume else set()
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
@@ -267,7 +267,7 @@ def denoise_sequence(
         "device": denoiser.device,
         "frames": entries,
         "kept": sorted(done),
-        "left_out": _left_out(loader, [n for n in numbers if n not in done]),
+        "left_out": _list_left_out(loader, [n for n in numbers if n not in done]),
     }
 
 
@@ -323,7 +323,7 @@ class _Frames(FrameSource[FrameFile]):
             others[view] = self.selection.select(
                 number, file, _neighbours_in_view(frame, view)
             )
-            region, within = _regions(file, self.files.crop)
+            region, within = _find_regions(file, self.files.crop)
             done = finish_frame(
                 file.stored,
                 others[view],
@@ -336,7 +336,7 @@ class _Frames(FrameSource[FrameFile]):
         finished = views[""][1]
         started = time.perf_counter()
         made_of = {MADE_OF: self._digest(number)}
-        metadata = _metadata(own, finished, self.denoiser) | made_of
+        metadata = _make_metadata(own, finished, self.denoiser) | made_of
         check = partial(self.loader.check, number)
         path = self.files.write(number, views, metadata, check)
         self.selection.record(others[""], finished.accumulated)
@@ -347,7 +347,7 @@ class _Frames(FrameSource[FrameFile]):
         failed = self.loader.failed
         left = sum(n > number and n not in failed for n in self.shot.frames)
         self.say(f"frame {number}: {path}, {self.clock.lap(left)}")
-        return _entry(number, path, self.shot.radius, finished, seconds)
+        return _make_entry(number, path, self.shot.radius, finished, seconds)
 
     def _digest(self, number: int) -> str:
         near = sorted((number, *self.shot.neighbours(number)))
@@ -355,15 +355,15 @@ class _Frames(FrameSource[FrameFile]):
         return self.recipe.digest(states, number)
 
 
-def _recipe(files: Files, reading: Reading, denoiser: Denoiser) -> Recipe:
+def _make_recipe(files: Files, reading: Reading, denoiser: Denoiser) -> Recipe:
     settings = denoiser.quality, files.picture_only, files.crop
     return Recipe(files.patterns, reading, settings)
 
 
-def _done(
+def _find_done(
     files: Files, recipe: Recipe, shot: Shot, numbers: Sequence[int], say: Say
 ) -> set[int]:
-    """The frames that are complete; a line tells those that are made anew."""
+    """Return the frames that are complete; a line reports those that are made anew."""
     written = set(_existing_frames(files.output, numbers))
     written.intersection_update(numbers)
     near = {n: sorted((n, *shot.neighbours(n))) for n in sorted(written)}
@@ -381,8 +381,10 @@ def _done(
     return done
 
 
-def _metadata(own: FrameFile, finished: Finished, denoiser: Denoiser) -> dict[str, str]:
-    """What made a frame, as files of `xrds render` have it."""
+def _make_metadata(
+    own: FrameFile, finished: Finished, denoiser: Denoiser
+) -> dict[str, str]:
+    """Return what made a frame, in the attributes that `xrds render` writes."""
     frames = finished.accumulated.frames
     return {
         "xrds.version": package_version(),
@@ -396,7 +398,7 @@ def _metadata(own: FrameFile, finished: Finished, denoiser: Denoiser) -> dict[st
 def _neighbours_in_view(
     neighbourhood: Neighbourhood[FrameFile], view: str
 ) -> dict[int, FrameFile]:
-    """The same view of a frame's neighbours, "" for the first one."""
+    """Return the same view of a frame's neighbours; "" is the first view."""
     if not view:
         return neighbourhood.neighbours
     near = neighbourhood.neighbours.items()
@@ -405,7 +407,9 @@ def _neighbours_in_view(
     }
 
 
-def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Rectangle]:
+def _find_regions(
+    own: FrameFile, crop: PixelWindow | None
+) -> tuple[Rectangle, Rectangle]:
     """What to denoise of a frame's arrays, and which part of that to write.
 
     A crop is denoised with what a denoiser sees around it. Raises PictureError where
@@ -426,7 +430,7 @@ def _regions(own: FrameFile, crop: PixelWindow | None) -> tuple[Rectangle, Recta
     return (region[0], region[1]), (within[0], within[1])
 
 
-def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
+def _light_planes(frame: FrameFile, finished: Finished) -> dict[str, Array]:
     """The planes of a frame's AOVs and light passes, by full channel name."""
     passes = passes_of(frame.light, finished.parts)
     return {
@@ -436,12 +440,12 @@ def _light(frame: FrameFile, finished: Finished) -> dict[str, Array]:
     }
 
 
-def _left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
+def _list_left_out(loader: Loader, todo: Sequence[int]) -> list[dict[str, Any]]:
     failed = {n: loader.failed[n] for n in todo if n in loader.failed}
     return [{"frame": n, "reason": why} for n, why in failed.items()]
 
 
-def _numbers(files: Files, frames: Iterable[int] | None, say: Say) -> list[int]:
+def _choose_numbers(files: Files, frames: Iterable[int] | None, say: Say) -> list[int]:
     """The frames to denoise, in order."""
     for pattern in (*files.patterns, files.output):
         check_pattern(pattern)
@@ -450,10 +454,10 @@ def _numbers(files: Files, frames: Iterable[int] | None, say: Say) -> list[int]:
             f"{len(others)} files have another number of digits than # in "
             f"{files.source} and are left out, such as {others[0]}"
         )
-    return sorted(set(frames)) if frames else _all_frames(files.source)
+    return sorted(set(frames)) if frames else _find_all_frames(files.source)
 
 
-def _all_frames(pattern: str) -> list[int]:
+def _find_all_frames(pattern: str) -> list[int]:
     if "#" not in Path(pattern).name:
         return [0]
     numbers = frame_numbers(pattern)
@@ -463,13 +467,13 @@ def _all_frames(pattern: str) -> list[int]:
 
 
 def _existing_frames(pattern: str, numbers: Sequence[int]) -> Sequence[int]:
-    """The frames that have a file; without # there is one for every number."""
+    """Return the frames that have a file; without # there is one for every number."""
     if "#" in Path(pattern).name:
         return frame_numbers(pattern)
     return numbers if os.path.lexists(pattern) else []
 
 
-def _entry(
+def _make_entry(
     number: int, path: Path, radius: int, finished: Finished, seconds: dict[str, float]
 ) -> dict[str, Any]:
     accumulated = finished.accumulated

@@ -37,13 +37,13 @@ def finish(picture: Array, low: Array, guide_alpha: Array | None, scale: int) ->
         inner = slice((top - first) * scale, (top - first + _BAND) * scale)
         band, target = low[first:last], picture[rows]
         guide = None if guide_alpha is None else guide_alpha[rows]
-        alpha = _alpha(band[..., 3], guide, target.shape[:2], scale)
-        bounded = _bounded(target[..., :3], alpha, band, scale)
+        alpha = _upsample(band[..., 3], guide, target.shape[:2], scale)
+        bounded = _bound_colour(target[..., :3], alpha, band, scale)
         target[inner, :, :3] = bounded[inner]
         target[inner, :, 3] = alpha[inner]
 
 
-def _alpha(
+def _upsample(
     low: Array, guide: Array | None, shape: tuple[int, ...], scale: int
 ) -> Array:
     if guide is not None:
@@ -52,21 +52,21 @@ def _alpha(
     return to_picture(large)[: shape[0], : shape[1], 0]
 
 
-def _bounded(radiance: Array, alpha: Array, low: Array, scale: int) -> Array:
+def _bound_colour(radiance: Array, alpha: Array, low: Array, scale: int) -> Array:
     """Clamp the colour behind `alpha` to the range of the 3x3 pixels of `low`.
 
     Only near edges: where all nine are opaque, radiance may be anything. Light that
     covers nothing (alpha 0), such as a fire's, sets no upper bound.
     """
     height, width = alpha.shape
-    limits = (_expand(x, scale)[:height, :width] for x in _colour_range(low))
+    limits = (_expand(x, scale)[:height, :width] for x in _find_colour_range(low))
     with np.errstate(invalid="ignore"):  # infinity times alpha 0
         darkest, brightest = (x * alpha[..., None] for x in limits)
     # fmin and fmax: a bound that is NaN is none
     return np.fmax(np.fmin(radiance, brightest), darkest)
 
 
-def _colour_range(low: Array) -> tuple[Array, Array]:
+def _find_colour_range(low: Array) -> tuple[Array, Array]:
     """Return the least and largest radiance / alpha around pixels, both (h, w, 3)."""
     radiance, alpha = low[..., :3], low[..., 3:]
     with np.errstate(all="ignore"):

@@ -254,7 +254,7 @@ def demodulated_base(radiance: Array, albedo: Array, scale: int) -> Array:
         Radiance.
     """
     guide = to_planes(albedo) + ALBEDO_EPSILON
-    return to_picture(_modulated(to_planes(radiance), guide, scale))
+    return to_picture(_modulate(to_planes(radiance), guide, scale))
 
 
 def regressed_base(
@@ -286,10 +286,10 @@ def regressed_base(
     guides = torch.cat((to_planes(albedo), to_planes(normal)), dim=1)
     low, before = to_planes(radiance * gain), to_planes(noisy * gain)
     explained = explain(low, before, guides, scale)
-    return to_picture(_modulated(explained.low, explained.factor, scale)) / gain
+    return to_picture(_modulate(explained.low, explained.factor, scale)) / gain
 
 
-def _modulated(low: Tensor, modulator: Tensor, scale: int) -> Tensor:
+def _modulate(low: Tensor, modulator: Tensor, scale: int) -> Tensor:
     """Return up(L / down(M)) M, where M (B, C, s h, s w) is positive."""
     return upsample_bilinear(low / area_mean(modulator, scale), scale) * modulator
 

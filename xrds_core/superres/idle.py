@@ -48,10 +48,13 @@ def busy_area(inputs: Inputs, block: int, margin: int) -> Area | None:
     """
     height, width = inputs.low.shape[:2]
     whole = slice(0, height), slice(0, width)
-    busy = ~_idle(inputs, block)
+    busy = ~_find_idle(inputs, block)
     if not busy.any():
         return None
-    spans = (_span(busy.any(1), block, margin), _span(busy.any(0), block, margin))
+    spans = (
+        _find_span(busy.any(1), block, margin),
+        _find_span(busy.any(0), block, margin),
+    )
     rows, columns = (
         slice(start, min(stop, size))
         for (start, stop), size in zip(spans, (height, width), strict=True)
@@ -74,12 +77,12 @@ def write_base(picture: Array, inputs: Inputs) -> None:
         target[...] = base[above : above + len(target), : target.shape[1]]
 
 
-def _idle(inputs: Inputs, block: int) -> NDArray[np.bool_]:
+def _find_idle(inputs: Inputs, block: int) -> NDArray[np.bool_]:
     """Return which blocks are idle, (rows, columns) of blocks."""
     full = block * inputs.scale
-    low = _extremes(inputs.low, block)
-    albedo = _extremes(inputs.albedo, full)
-    normal = _extremes(inputs.normal, full)
+    low = _find_extremes(inputs.low, block)
+    albedo = _find_extremes(inputs.albedo, full)
+    normal = _find_extremes(inputs.normal, full)
     background = (normal[0] == 0).all(-1) & (normal[1] == 0).all(-1)
     background &= (albedo[1] <= 1.0).all(-1) & _shines_by_itself(inputs, block)
     even = _is_even(low) & _is_even(albedo) & _is_even(normal)
@@ -87,7 +90,7 @@ def _idle(inputs: Inputs, block: int) -> NDArray[np.bool_]:
 
 
 def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
-    """Return the blocks whose radiance is their albedo: so a background's is."""
+    """Return the blocks whose radiance is their albedo, like a background's."""
     low, scale = inputs.low[..., :3], inputs.scale
     albedo = np.minimum(inputs.albedo, 2.0)  # above 1 is no background anyway
     for axis in (0, 1):
@@ -96,12 +99,12 @@ def _shines_by_itself(inputs: Inputs, block: int) -> NDArray[np.bool_]:
         counts = (ends - np.array(starts)).astype(np.float32)
         albedo = np.add.reduceat(albedo, starts, axis=axis)
         albedo /= counts.reshape((-1, 1, 1) if axis == 0 else (1, -1, 1))
-    apart, bright = (_sums(x, block) for x in (np.abs(low - albedo), low))
+    apart, bright = (_sum_blocks(x, block) for x in (np.abs(low - albedo), low))
     shines: NDArray[np.bool_] = apart <= _ALIKE * bright
     return shines
 
 
-def _sums(picture: NDArray[Any], block: int) -> NDArray[np.float64]:
+def _sum_blocks(picture: NDArray[Any], block: int) -> NDArray[np.float64]:
     """Return the sum over each block and its channels."""
     for axis in (0, 1):
         # float64: sums of the brightest light would leave float32
@@ -117,7 +120,7 @@ def _is_even(extremes: tuple[Array, Array]) -> NDArray[np.bool_]:
     return spread
 
 
-def _extremes(picture: Array, block: int) -> tuple[Array, Array]:
+def _find_extremes(picture: Array, block: int) -> tuple[Array, Array]:
     """Return the least and the largest value of each block, (rows, columns, C)."""
     starts = [range(0, size, block) for size in picture.shape[:2]]
     least = np.minimum.reduceat(picture, starts[0], axis=0)
@@ -128,7 +131,7 @@ def _extremes(picture: Array, block: int) -> tuple[Array, Array]:
     )
 
 
-def _span(busy: NDArray[np.bool_], block: int, margin: int) -> tuple[int, int]:
+def _find_span(busy: NDArray[np.bool_], block: int, margin: int) -> tuple[int, int]:
     """Return first and last pixel of the busy blocks with whole blocks around them."""
     indices = np.flatnonzero(busy)
     around = -(-margin // block)

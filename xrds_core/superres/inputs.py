@@ -63,11 +63,11 @@ class Inputs:
         Where they end before the low-resolution picture does, their edge is repeated.
         """
         albedo, normal = (
-            to_planes(self._cut(x, tile)) for x in (self.albedo, self.normal)
+            to_planes(self._cut_tile(x, tile)) for x in (self.albedo, self.normal)
         )
         return torch.cat((albedo.clamp(0.0, 1.0), normal.clamp(-1.0, 1.0)), dim=1)
 
-    def _cut(self, guide: Array, tile: Tile) -> Array:
+    def _cut_tile(self, guide: Array, tile: Tile) -> Array:
         spans = (tile.rows, tile.columns)
         rows, columns = (
             span.output(self.scale, limit)
@@ -144,12 +144,12 @@ def check(
         name: (clean_alpha if name == "guide_alpha" else fill_holes)(guide)
         for name, guide in guides.items()
     }
-    before, faults = (None, 0) if noisy is None else _noisy(noisy, low)
-    low, bad_pixels = _picture(low)
+    before, faults = (None, 0) if noisy is None else _clean_noisy(noisy, low)
+    low, bad_pixels = _clean_picture(low)
     bad_pixels += faults + sum(count for _, count in cleaned.values())
     cover, _ = cleaned.get("guide_alpha", (None, 0))
     if cover is not None and low.shape[2] == 3:
-        low = np.concatenate((low, _low_alpha(cover, low, scale)), axis=2)
+        low = np.concatenate((low, _downsample_alpha(cover, low, scale)), axis=2)
     return Inputs(
         scale,
         low,
@@ -161,7 +161,7 @@ def check(
     )
 
 
-def _picture(low: Array) -> tuple[Array, int]:
+def _clean_picture(low: Array) -> tuple[Array, int]:
     """Return the picture, cleaned, and its bad pixels; bad alpha spoils no colour."""
     cleaned, bad = clean_radiance(low)
     if not bad or low.shape[2] == 3:
@@ -171,18 +171,18 @@ def _picture(low: Array) -> tuple[Array, int]:
     return np.concatenate((colour, alpha.clip(0.0)), axis=2), bad
 
 
-def _noisy(value: Any, low: Array) -> tuple[Array, int]:
+def _clean_noisy(value: Any, low: Array) -> tuple[Array, int]:
     """Return the radiance before denoising, cleaned, and its bad pixels."""
     noisy = float_array("noisy", value, (3,))
     if noisy.shape[:2] != low.shape[:2]:
         raise PictureError(
-            f"noisy is {_size(noisy)} pixels, but radiance is {_size(low)}: "
+            f"noisy is {_size_text(noisy)} pixels, but radiance is {_size_text(low)}: "
             "give both from the same render"
         )
     return clean_radiance(noisy)
 
 
-def _low_alpha(cover: Array, low: Array, scale: int) -> Array:
+def _downsample_alpha(cover: Array, low: Array, scale: int) -> Array:
     """Return what the guides' alpha (H, W, 1) is at low resolution, (h, w, 1)."""
     height, width = low.shape[:2]
     whole = pad_guide(cover, low, scale)
@@ -195,16 +195,16 @@ def _check_sizes(scale: int, low: Array, guides: dict[str, Array]) -> None:
     for name, guide in guides.items():
         if guide.shape[:2] != albedo.shape[:2]:
             raise PictureError(
-                f"{name} is {_size(guide)} pixels, but albedo is {_size(albedo)}: "
-                "give guides from the same render"
+                f"{name} is {_size_text(guide)} pixels, but albedo is "
+                f"{_size_text(albedo)}: give guides from the same render"
             )
     if not _fits(scale, low, albedo):
         other = [s for s in _SCALES if _fits(s, low, albedo)]
         raise PictureError(
-            f"the guides are {_size(albedo)} pixels, but radiance of {_size(low)} at "
-            f"scale {scale} needs guides of {_size(low, scale)}, or fewer than {scale} "
-            "pixels less: render them at that size"
-            + (f", or use scale {other[0]}" if other else "")
+            f"the guides are {_size_text(albedo)} pixels, but radiance of "
+            f"{_size_text(low)} at scale {scale} needs guides of "
+            f"{_size_text(low, scale)}, or fewer than {scale} pixels less: render them "
+            "at that size" + (f", or use scale {other[0]}" if other else "")
         )
 
 
@@ -212,5 +212,5 @@ def _fits(scale: int, low: Array, guide: Array) -> bool:
     return low.shape[:2] == tuple(-(-size // scale) for size in guide.shape[:2])
 
 
-def _size(picture: Array, scale: int = 1) -> str:
+def _size_text(picture: Array, scale: int = 1) -> str:
     return f"{picture.shape[1] * scale}x{picture.shape[0] * scale}"

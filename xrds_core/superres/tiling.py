@@ -46,15 +46,15 @@ class Span:
         """
         weights = np.ones(self.size * scale, np.float32)
         if self.overlap_before:
-            rise = _rise(self.overlap_before * scale)
+            rise = _make_ramp(self.overlap_before * scale)
             weights[: rise.size] = rise
         if self.overlap_after:
-            fall = 1.0 - _rise(self.overlap_after * scale)
+            fall = 1.0 - _make_ramp(self.overlap_after * scale)
             weights[-fall.size :] = fall
         return weights
 
 
-def _rise(length: int) -> Array:
+def _make_ramp(length: int) -> Array:
     """Return a smooth step from 0 to 1."""
     x = (np.arange(length) + 0.5) / length
     x = np.clip((x - _BLIND) / (1.0 - 2.0 * _BLIND), 0.0, 1.0)
@@ -102,8 +102,8 @@ def tiles(
     tiles : list of Tile
         Row by row.
     """
-    rows = _spans(low_height, tile[0], overlap, multiple)
-    columns = _spans(low_width, tile[1], overlap, multiple)
+    rows = _make_spans(low_height, tile[0], overlap, multiple)
+    columns = _make_spans(low_width, tile[1], overlap, multiple)
     return [Tile(row, column) for row in rows for column in columns]
 
 
@@ -112,13 +112,15 @@ def largest(plan: list[Tile]) -> int:
     return max((tile.rows.size * tile.columns.size for tile in plan), default=0)
 
 
-def _spans(length: int, tile: int, overlap: int, multiple: int) -> list[Span]:
-    overlap = _up(overlap, multiple)
+def _make_spans(length: int, tile: int, overlap: int, multiple: int) -> list[Span]:
+    overlap = _round_up(overlap, multiple)
     tile = max(tile // multiple * multiple, 2 * overlap, multiple)  # ramps stay apart
     if length <= tile:
         return [Span(0, length, 0, 0)]
     count = math.ceil((length - overlap) / (tile - overlap))
-    step = _up(math.ceil((length - overlap) / count), multiple)  # even, so smaller
+    step = _round_up(
+        math.ceil((length - overlap) / count), multiple
+    )  # even, so smaller
     starts = range(0, length - overlap, step)
     return [
         Span(
@@ -153,14 +155,14 @@ def fit(
         Those of the picture if it is small enough; never less than two overlaps, below
         which tiles cannot be blended.
     """
-    least = 2 * _up(overlap, multiple)
+    least = 2 * _round_up(overlap, multiple)
     square = max(math.isqrt(int(pixels)) // multiple * multiple, least)
-    height = min(square, _up(low_height, multiple))
+    height = min(square, _round_up(low_height, multiple))
     width = max(int(pixels / height) // multiple * multiple, least)
-    width = min(width, _up(low_width, multiple))
+    width = min(width, _round_up(low_width, multiple))
     taller = max(int(pixels / width) // multiple * multiple, height)
-    return min(taller, _up(low_height, multiple)), width
+    return min(taller, _round_up(low_height, multiple)), width
 
 
-def _up(length: int, multiple: int) -> int:
+def _round_up(length: int, multiple: int) -> int:
     return -(-length // multiple) * multiple

@@ -180,24 +180,24 @@ class Upscaler:
         scale, given = self.scale, (radiance, albedo, normal, guide_alpha, noisy)
         inputs = check(scale, *given, guide_samples)
         exposure = choose_exposure(exposure, inputs.low)
-        area = self._area(inputs, skip_idle)
+        area = self._choose_area(inputs, skip_idle)
         device = self.device.type
         quiet = guide_noise.remover(guide_samples, device, memory_limit, progress)
         if quiet is not None and area is not None and not inputs.is_black():
             inputs = inputs.with_guides(quiet)
-        plan = self._tiles(area, memory_limit, tile)
+        plan = self._plan_tiles(area, memory_limit, tile)
         steps = Progress(progress)
         while True:
             try:
-                picture = self._picture(inputs, area, exposure, plan, steps)
+                picture = self._make_picture(inputs, area, exposure, plan, steps)
                 return Upscaled(picture, exposure, inputs.bad_pixels, len(plan))
             except OutOfMemory:
-                smaller = self._smaller(area, plan)
+                smaller = self._plan_smaller(area, plan)
                 if smaller is None:
                     raise
                 plan = smaller
 
-    def _area(self, inputs: Inputs, skip_idle: bool) -> Area | None:
+    def _choose_area(self, inputs: Inputs, skip_idle: bool) -> Area | None:
         """Return the low-resolution rows and columns that the network is to see."""
         window = self.network.config.low_multiple
         if skip_idle and self.network.config.base:
@@ -205,7 +205,7 @@ class Upscaler:
         height, width = inputs.low.shape[:2]
         return slice(0, height), slice(0, width)
 
-    def _tiles(
+    def _plan_tiles(
         self, area: Area | None, limit: int | None, side: int | None
     ) -> list[tiling.Tile]:
         if area is None:
@@ -214,7 +214,9 @@ class Upscaler:
         overlap, multiple = _OVERLAP_WINDOWS * window, 2 * window
         height, width = (span.stop - span.start for span in area)
         if side is None:
-            pixels = self._memory(limit) / (self.bytes_per_pixel() * self.scale**2)
+            pixels = self._choose_memory(limit) / (
+                self.bytes_per_pixel() * self.scale**2
+            )
         else:
             pixels = side**2
         size = tiling.fit(height, width, pixels, overlap, multiple)
@@ -223,15 +225,15 @@ class Upscaler:
             for tile in tiling.tiles(height, width, size, overlap, multiple)
         ]
 
-    def _smaller(
+    def _plan_smaller(
         self, area: Area | None, plan: list[tiling.Tile]
     ) -> list[tiling.Tile] | None:
         """Return tiles of half the size, None where there are no smaller ones."""
         largest = tiling.largest(plan)
-        smaller = self._tiles(area, None, math.isqrt(largest // 2))
+        smaller = self._plan_tiles(area, None, math.isqrt(largest // 2))
         return smaller if tiling.largest(smaller) < largest else None
 
-    def _memory(self, limit: int | None) -> float:
+    def _choose_memory(self, limit: int | None) -> float:
         if limit is not None:
             return limit
         free = 0.8 * free_memory(self.device)
@@ -242,7 +244,7 @@ class Upscaler:
         overhead = _CPU_OVERHEAD if self.device.type == "cpu" else _GPU_OVERHEAD
         return self.cost.bytes * overhead + _TILE_BYTES
 
-    def _picture(
+    def _make_picture(
         self,
         inputs: Inputs,
         area: Area | None,
@@ -252,12 +254,12 @@ class Upscaler:
     ) -> Array:
         picture = np.zeros((*inputs.shape, inputs.low.shape[2]), np.float32)
         self._fill_idle(picture, inputs, area)
-        progress.begin(self._work(plan))
+        progress.begin(self._count_work(plan))
         progress.report(0.0)
         if not inputs.is_black():
             with watched(self.network, progress):
                 for tile in plan:
-                    self._add(picture, inputs, tile, exposure)
+                    self._add_tile(picture, inputs, tile, exposure)
         if inputs.low.shape[2] == 4:
             finish(picture, inputs.low, inputs.guide_alpha, self.scale)
         progress.report(1.0)
@@ -265,7 +267,7 @@ class Upscaler:
 
     def _fill_idle(self, picture: Array, inputs: Inputs, area: Area | None) -> None:
         """Write the base outside of `area`, which stays 0."""
-        if area is not None and _size(area) == inputs.low.shape[:2]:
+        if area is not None and _area_size(area) == inputs.low.shape[:2]:
             return
         base = picture[..., :3]
         bright = np.float32(_BRIGHT if inputs.low.max() > _BRIGHT else 1.0)
@@ -278,7 +280,7 @@ class Upscaler:
             )
             picture[rows, columns, :3] = 0.0
 
-    def _work(self, plan: list[tiling.Tile]) -> float:
+    def _count_work(self, plan: list[tiling.Tile]) -> float:
         """Return the number of values that the layers will have returned."""
         window = self.network.config.low_multiple
         cells = sum(
@@ -287,11 +289,11 @@ class Upscaler:
         )
         return cells * (window * self.scale) ** 2 * self.cost.values
 
-    def _add(
+    def _add_tile(
         self, picture: Array, inputs: Inputs, tile: tiling.Tile, exposure: float
     ) -> None:
         """Add one tile to the pixels it covers, with its blend weights."""
-        result = self._run(inputs, tile, exposure)
+        result = self._run_tile(inputs, tile, exposure)
         rows = tile.rows.output(self.scale, picture.shape[0])
         columns = tile.columns.output(self.scale, picture.shape[1])
         target = picture[rows, columns, :3]
@@ -299,7 +301,7 @@ class Upscaler:
         share = tile.weights(self.scale)[:height, :width, None]
         target += result[:height, :width] * share
 
-    def _run(self, inputs: Inputs, tile: tiling.Tile, exposure: float) -> Array:
+    def _run_tile(self, inputs: Inputs, tile: tiling.Tile, exposure: float) -> Array:
         """Return the radiance of one tile, (scale height, scale width, 3)."""
         bf16 = self.precision == torch.bfloat16
         try:
@@ -330,7 +332,7 @@ class Upscaler:
         return to_picture(result)
 
 
-def _size(area: Area) -> tuple[int, ...]:
+def _area_size(area: Area) -> tuple[int, ...]:
     return tuple(span.stop - span.start for span in area)
 
 
@@ -375,7 +377,7 @@ def upscale(
     WeightsError, UsageError, PictureError, Cancelled
         For the reasons that `Upscaler` has.
     """
-    return _upscaler(preset, scale, device)(
+    return _get_upscaler(preset, scale, device)(
         radiance,
         albedo,
         normal,
@@ -389,5 +391,5 @@ def upscale(
 
 
 @lru_cache(maxsize=1)
-def _upscaler(preset: str, scale: int, device: str) -> Upscaler:
+def _get_upscaler(preset: str, scale: int, device: str) -> Upscaler:
     return Upscaler(preset, scale, device)

@@ -82,7 +82,7 @@ def load(path: str | Path) -> tuple[XRDS, dict[str, str]]:
     """
     path = Path(path)
     tensors, metadata = _read(path)
-    config, expected = _described(path, metadata, len(tensors))
+    config, expected = _read_description(path, metadata, len(tensors))
     _compare(path, expected, tensors)
     network = XRDS(config)
     network.load_state_dict({name: x.float() for name, x in tensors.items()})
@@ -104,7 +104,7 @@ def _read(path: Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     return tensors, metadata
 
 
-def _described(
+def _read_description(
     path: Path, metadata: dict[str, str], tensors: int
 ) -> tuple[NetworkConfig, dict[str, torch.Size]]:
     """Return the configuration in `metadata` and the shapes that follow from it."""

@@ -62,7 +62,7 @@ def available(directory: str | Path | None = None) -> list[dict[str, Any]]:
     WeightsError
         If a file named as a preset's is damaged.
     """
-    return [_record(path) for path in network_files(Path(directory or DIRECTORY))]
+    return [_make_record(path) for path in network_files(Path(directory or DIRECTORY))]
 
 
 def network_files(folder: Path) -> list[Path]:
@@ -71,7 +71,7 @@ def network_files(folder: Path) -> list[Path]:
     return [path for path in paths if path.name.split("_x")[0] in PRESETS]
 
 
-def _record(path: Path) -> dict[str, Any]:
+def _make_record(path: Path) -> dict[str, Any]:
     header = read_header(path)
     if header is None:
         raise WeightsError(f"{path} is not a complete weights file; download it again")
@@ -79,12 +79,12 @@ def _record(path: Path) -> dict[str, Any]:
         "preset": header.preset,
         "scale": header.scale,
         "file": path.name,
-        "sha256": _digest(path),
+        "sha256": _hash_file(path),
         "blender_series": header.blender_series or None,
     }
 
 
-def _digest(path: Path) -> str:
+def _hash_file(path: Path) -> str:
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 

@@ -67,10 +67,15 @@ def test_the_one_part_is_the_picture(high: Denoiser) -> None:
 
 
 def test_many_parts_take_a_smaller_network(high: Denoiser) -> None:
-    networks = [high._for_parts(count).network for count in (1, 3, 4, 8, 9, 40)]
+    networks = [
+        high._choose_part_network(count).network for count in (1, 3, 4, 8, 9, 40)
+    ]
     assert networks == ["High", "High", "Balanced", "Balanced", "Fast", "Fast"]
     fast = Denoiser("balanced", device="cpu")
-    assert [fast._for_parts(x).network for x in (1, 9)] == ["Balanced", "Fast"]
+    assert [fast._choose_part_network(x).network for x in (1, 9)] == [
+        "Balanced",
+        "Fast",
+    ]
 
 
 def test_what_has_no_light_costs_nothing(

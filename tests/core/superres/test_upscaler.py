@@ -499,13 +499,13 @@ def test_upscale_uses_shipped_presets(
     monkeypatch.setattr(weights, "DIRECTORY", tmp_path)
     save_network(network(4), f"{tmp_path}/fast_x4.safetensors", {})
     inputs = picture(6, 5, 4)
-    upscaler._upscaler.cache_clear()
+    upscaler._get_upscaler.cache_clear()
     fractions: list[float] = []
     result = upscale(*inputs, scale=4, exposure=0.5, progress=fractions.append)
     again = upscale(*inputs, scale=4, exposure=0.5)
     assert result.shape == (24, 20, 3)
     np.testing.assert_array_equal(result, again)
     assert fractions[-1] == 1.0
-    assert upscaler._upscaler.cache_info().hits == 1
+    assert upscaler._get_upscaler.cache_info().hits == 1
     with pytest.raises(WeightsError, match="it holds: fast_x4"):
         upscale(*inputs, scale=4, preset="balanced")

@@ -25,7 +25,7 @@ def word_for(
         return translated("as set") if denoises else translated("noisy")
     if not denoises:
         return translated("cleaner")
-    above = _above(mode, estimates)
+    above = _decibels_above(mode, estimates)
     if above is None:
         return translated("not measured")
     if above >= _ALIKE:
@@ -36,7 +36,7 @@ def word_for(
     return translated("softer") if soft else translated("much softer")
 
 
-def _above(mode: Mode, estimates: Sequence[Estimate]) -> float | None:
+def _decibels_above(mode: Mode, estimates: Sequence[Estimate]) -> float | None:
     """How far above Cycles' picture a mode's is expected; None where unknown."""
     decibels = {estimate.mode: estimate.decibels for estimate in estimates}
     ours, cycles = decibels.get(mode), decibels.get(Mode.CYCLES_ONLY)

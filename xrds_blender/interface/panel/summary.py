@@ -80,7 +80,7 @@ def next_render(scene: Any, request: Request) -> list[Row]:
     if request.time_budget is not None:
         return [("Picture", _size(*size)), *_neighbours(scene, request)]
     if request.settings.is_enlarged:
-        return _enlarged(scene, request)
+        return _rows_of_enlarged(scene, request)
     rows = [("Picture", _sampled(*size, scene.cycles.samples))]
     if request.settings.is_cycles_only:
         own = scene_settings(scene).denoising
@@ -99,7 +99,7 @@ def _neighbours(scene: Any, request: Request) -> list[Row]:
     if not is_shot(scene, request):
         return []
     text = "{radius} before and after, {memory}"
-    taken = _amount(estimates.shot_memory(*size, radius, request.settings.scale))
+    taken = _format_bytes(estimates.shot_memory(*size, radius, request.settings.scale))
     shown = translated(text, radius=radius, memory=taken)
     return [("Neighbouring Frames", shown)]
 
@@ -109,7 +109,7 @@ def _named(settings: Settings) -> str:
     return f"{translated(NAMES[settings.mode])}, {_samples(settings.samples or 0)}"
 
 
-def _enlarged(scene: Any, request: Request) -> list[Row]:
+def _rows_of_enlarged(scene: Any, request: Request) -> list[Row]:
     facts = _facts_cache().facts(scene, bpy.context.view_layer, request.settings)
     chosen = request.plan(facts)
     size = facts.width, facts.height
@@ -120,14 +120,14 @@ def _enlarged(scene: Any, request: Request) -> list[Row]:
     rows = [
         ("Low Resolution", _sampled(*small, scene.cycles.samples)),
         ("Guides", guides if chosen.render_guides else translated("none")),
-        ("Memory", f"≤ {_amount(taken)}"),
+        ("Memory", f"≤ {_format_bytes(taken)}"),
         *_neighbours(scene, request),
     ]
-    skipped = ", ".join(translated(name) for name in _skipped(chosen))
+    skipped = ", ".join(translated(name) for name in _list_skipped(chosen))
     return [*rows, ("Skipped", skipped)] if skipped else rows
 
 
-def _skipped(chosen: Plan) -> list[str]:
+def _list_skipped(chosen: Plan) -> list[str]:
     """What the scene does not need."""
     parts = {
         "light in the guides": chosen.render_guides and not chosen.guides.sample_world,
@@ -175,7 +175,7 @@ def _size(width: int, height: int) -> str:
     return f"{width} × {height}"
 
 
-def _amount(size: float) -> str:
+def _format_bytes(size: float) -> str:
     """Bytes as a person reads them."""
     return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{max(size / 1e6, 1):.0f} MB"
 
@@ -241,8 +241,8 @@ def draw(layout: Any, context: Any, times: Expected) -> None:
     column.label(text=title, translate=False)
     limit = "≤ " if times.at_most else ""
     rows = [
-        ("Cycles", _both(times.cycles, times.frames)),
-        ("XRDS", _both(times.ours, times.frames, limit)),
+        ("Cycles", _format_times(times.cycles, times.frames)),
+        ("XRDS", _format_times(times.ours, times.frames, limit)),
         (translated("Picture"), times.picture),
     ]
     for name, value in rows:
@@ -255,7 +255,7 @@ def draw(layout: Any, context: Any, times: Expected) -> None:
         paragraph.draw(layout, context, translated(note))
 
 
-def _both(seconds: float | None, frames: int, limit: str = "") -> str:
+def _format_times(seconds: float | None, frames: int, limit: str = "") -> str:
     """The time of all frames, and of one."""
     if seconds is None:
         return "?"
