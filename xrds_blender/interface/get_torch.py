@@ -15,7 +15,7 @@ from xrds_core.errors import UsageError
 
 from ..internals.lifetimes import PROCESS
 from ..rendering import torch_folder
-from . import machine
+from . import preference_values
 
 LOOK_AGAIN = 2.0  # seconds between two looks for the result
 NEEDED = "Super-resolution needs PyTorch: 0.2 GB to download, 0.9 GB on the disk"
@@ -58,7 +58,7 @@ def remembered() -> str:
     note = _home() / "pytorch_folder.txt"
     chosen = note.read_text("utf-8") if note.is_file() else ""
     for candidate in (chosen, str(folder())):
-        path = machine.folder(candidate)
+        path = preference_values.folder(candidate)
         if path is not None and _fits(path):
             return candidate
     return ""
@@ -71,7 +71,7 @@ def is_looking() -> bool:
 
 def _home() -> Path:
     try:
-        return Path(bpy.utils.extension_path_user(machine.package))
+        return Path(bpy.utils.extension_path_user(preference_values.package))
     except ValueError:  # not installed as an extension
         return Path(bpy.utils.user_resource("DATAFILES", path="xrds"))
 
@@ -88,7 +88,7 @@ def _fits(path: Path) -> bool:
 
 def _look() -> float | None:
     search = PROCESS.of(_Search)
-    entry = bpy.context.preferences.addons.get(machine.package)
+    entry = bpy.context.preferences.addons.get(preference_values.package)
     if entry is None or not search.goes_on:
         search.goes_on = False
         return None

@@ -114,9 +114,9 @@ def self_test() -> list[str]:
     Raises XRDSError where no picture, or a wrong one, comes out.
     """
     from ..rendering.render import render
-    from .machine import machine
+    from .preference_values import preference_values
 
-    here = machine()
+    here = preference_values()
     with _scene() as scene:
         picture = render(
             scene,

@@ -12,7 +12,7 @@ import bpy
 from xrds_core.errors import UsageError
 
 from ..rendering import torch_folder
-from . import get_torch, machine
+from . import get_torch, preference_values
 from .operators import XRDS_OT_self_test
 from .panel.paragraph import translated
 
@@ -58,7 +58,7 @@ def _apply_torch(preferences: Any, _: Any = None) -> None:
     """Look for torch where the preferences say; what is wrong is shown below."""
     get_torch.remember(preferences.torch)
     try:
-        torch_folder.use(machine.folder(preferences.torch))
+        torch_folder.use(preference_values.folder(preferences.torch))
     except UsageError:
         torch_folder.use(None)
 
@@ -76,7 +76,7 @@ _NAMES = (
 class XRDS_Preferences(bpy.types.AddonPreferences):
     """Preferences of the add-on."""
 
-    bl_idname = machine.package
+    bl_idname = preference_values.package
 
     device: bpy.props.EnumProperty(
         name="Network Device",
@@ -129,7 +129,7 @@ class XRDS_Preferences(bpy.types.AddonPreferences):
         layout.use_property_split = True
         for name in _NAMES:
             layout.prop(self, name)
-        for icon, line in torch_status(machine.folder(self.torch)):
+        for icon, line in torch_status(preference_values.folder(self.torch)):
             layout.label(text=line, icon=icon)
         if not torch_folder.is_there():
             self._draw_how_to_get_torch(layout.box())
@@ -173,7 +173,7 @@ _CLASSES = (XRDS_OT_self_test, get_torch.XRDS_OT_get_torch, XRDS_Preferences)
 
 def register(package: str) -> None:
     """Register the preferences under the add-on's module name."""
-    XRDS_Preferences.bl_idname = machine.package = package
+    XRDS_Preferences.bl_idname = preference_values.package = package
     for item in _CLASSES:
         bpy.utils.register_class(item)
     entry = bpy.context.preferences.addons.get(package)

@@ -12,7 +12,7 @@ from ..planning.request import Request, render_request
 from ..planning.settings import Mode
 from ..rendering import modes
 from ..scene.contents import passes_looked_at
-from .machine import machine
+from .preference_values import preference_values
 from .translations import CONTEXT
 
 SAME_PICTURE, SAME_TIME, DEADLINE = "same_picture", "same_time", "deadline"
@@ -263,7 +263,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
 
 def request_of(settings: XRDSSettings) -> Request:
     """What a scene's settings and the preferences describe."""
-    here = machine()
+    here = preference_values()
     passes: tuple[str, ...] = (settings.passes,)
     if settings.passes == AUTOMATIC:
         passes = passes_looked_at(settings.id_data)

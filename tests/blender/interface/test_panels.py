@@ -16,8 +16,8 @@ import xrds_blender
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.interface import (
     live_picture,
-    machine,
     operators,
+    preference_values,
     preferences,
     properties,
     registration,
@@ -417,12 +417,12 @@ def test_operator_needs_a_camera() -> None:
 
 
 def test_machine_without_add_on_has_defaults() -> None:
-    assert machine.machine() == machine.Machine()
+    assert preference_values.preference_values() == preference_values.PreferenceValues()
 
 
 def test_job_takes_the_preferences(monkeypatch: pytest.MonkeyPatch) -> None:
-    here = machine.Machine("cuda:1", 1 << 30, Path("folder"))
-    monkeypatch.setattr(properties, "machine", lambda: here)
+    here = preference_values.PreferenceValues("cuda:1", 1 << 30, Path("folder"))
+    monkeypatch.setattr(properties, "preference_values", lambda: here)
     settings = bpy.context.scene.xrds
     found = properties.request_of(settings).machine
     assert (found.device, found.memory_limit, found.weights) == (
@@ -485,8 +485,8 @@ def test_self_test_renders_and_leaves_nothing() -> None:
 def test_self_test_tells_what_is_wrong(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    here = machine.Machine(weights=tmp_path)
-    monkeypatch.setattr(machine, "machine", lambda: here)
+    here = preference_values.PreferenceValues(weights=tmp_path)
+    monkeypatch.setattr(preference_values, "preference_values", lambda: here)
     with pytest.raises(RuntimeError, match="no weights"):
         bpy.ops.xrds.self_test()
     assert preferences.XRDS_OT_self_test.lines[0].startswith("Failed: no weights")

@@ -23,7 +23,7 @@ from ...rendering.modes import frame_seconds
 from ...rendering.pace.same_picture import can_save
 from ...rendering.sampling import has_neighbours
 from ...scene.contents import frame_range
-from ..machine import machine
+from ..preference_values import preference_values
 from ..properties import DENOISE
 from . import mode_table, paragraph
 from .mode_table import NAMES
@@ -114,7 +114,7 @@ def _rows_of_enlarged(scene: Any, request: Request) -> list[Row]:
     chosen = request.plan(facts)
     size = facts.width, facts.height
     small = estimates.low_size(*size, request.settings.scale)
-    limit = machine().memory_limit
+    limit = preference_values().memory_limit
     taken = estimates.memory(*size, *request.settings.network, limit)
     guides = _sampled(*size, chosen.guide_samples)
     rows = [

@@ -15,7 +15,7 @@ package = "xrds_blender"
 
 
 @dataclass(frozen=True)
-class Machine:
+class PreferenceValues:
     """The preferences as plain values; the defaults hold where there is no add-on."""
 
     device: str = "auto"
@@ -31,13 +31,13 @@ class Machine:
     """Folder that PyTorch is taken from; None means the one that Python finds."""
 
 
-def machine() -> Machine:
+def preference_values() -> PreferenceValues:
     """The preferences of the enabled add-on, or the defaults."""
     entry = bpy.context.preferences.addons.get(package)
     stored: Any = entry and entry.preferences
     if stored is None:
-        return Machine()
-    return Machine(
+        return PreferenceValues()
+    return PreferenceValues(
         device=stored.device or "auto",
         memory_limit=stored.memory_limit * MEBIBYTE or None,
         weights=folder(stored.weights),
