@@ -154,9 +154,9 @@ def _decibels(
     neither says anything.
     """
     known = {mode: curve for mode, curve in curves.items() if curve is not None}
-    found: dict[Mode, float | None] = dict.fromkeys(curves)
+    below_best: dict[Mode, float | None] = dict.fromkeys(curves)
     if not known:
-        return found
+        return below_best
     first = next(iter(known.values()))
     apart = {
         mode: _difference(curve, first, samples)
@@ -164,11 +164,11 @@ def _decibels(
         if samples >= curve.samples[0]
     }
     most = max(apart.values(), default=0.0)
-    return found | {mode: value - most for mode, value in apart.items()}
+    return below_best | {mode: value - most for mode, value in apart.items()}
 
 
 def _difference(curve: Curve, other: Curve, samples: int) -> float:
-    last = (each.samples[-1] / each.worth for each in (curve, other))
+    last = (one.samples[-1] / one.worth for one in (curve, other))
     count = min(samples, *last)
     return curve.at(count) - other.at(count)
 

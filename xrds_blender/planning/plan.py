@@ -186,7 +186,7 @@ def _render_guides(facts: Facts, allowed: bool) -> tuple[bool, Decision]:
 
 def _samples(facts: Facts, allowed: bool) -> tuple[int, Decision]:
     requested, name = facts.guide_samples, "guide samples"
-    masks = any(each.startswith("cryptomatte") for each in facts.scene.passes)
+    masks = any(name.startswith("cryptomatte") for name in facts.scene.passes)
     if masks and requested < CRYPTOMATTE_SAMPLES:
         reason = (
             f"Cryptomatte is on: its masks need more than the {requested} requested"
@@ -342,11 +342,11 @@ def _in_part(scene: SceneFacts) -> tuple[Decision, ...]:
         ),
         "hair": (scene.hair, "hair, finer than a pixel, is found again by chance"),
     }
-    found = {what: reason for what, (there, reason) in causes.items() if there}
-    if not found:
+    present = {what: reason for what, (there, reason) in causes.items() if there}
+    if not present:
         return ()
-    reason = "; ".join(found.values())
-    return (Decision("left out by pixel", ", ".join(found), reason),)
+    reason = "; ".join(present.values())
+    return (Decision("left out by pixel", ", ".join(present), reason),)
 
 
 def _cuts(cuts: Collection[int]) -> tuple[Decision, ...]:

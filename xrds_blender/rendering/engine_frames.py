@@ -68,7 +68,7 @@ class EngineFrames(FrameSource[Sampled]):
         cls, scene: Any, method: Method, beside: Method | None = None
     ) -> EngineFrames:
         """The frames of a scene's range; `beside` is another layer's method."""
-        found = cls(method)
+        frames = cls(method)
         numbers = frame_range(scene)
         radius, begins = method.request.settings.temporal_radius, cuts(scene, numbers)
         shot = Shot(tuple(numbers), radius, begins)
@@ -78,8 +78,8 @@ class EngineFrames(FrameSource[Sampled]):
             layers=layers_of(scene),
             beside=None if beside is None else beside.pace,
         )
-        found.window = Window(shot, found)
-        return found
+        frames.window = Window(shot, frames)
+        return frames
 
     def neighbourhood(self, engine: Any, depsgraph: Any) -> Neighbourhood[Sampled]:
         """The frame that Blender asks for, with its neighbours.
@@ -97,14 +97,14 @@ class EngineFrames(FrameSource[Sampled]):
             last = missing[-1] if missing else None
             self._call = _Call(engine, depsgraph, passes, number, last)
             try:
-                found = self.window.neighbourhood(number)
+                frame = self.window.neighbourhood(number)
             finally:
                 self._call = None
                 go_to(engine, depsgraph, number)
                 if number in self.ahead:
                     passes.put_back(self.ahead.pop(number))
-        assert found is not None
-        return found
+        assert frame is not None
+        return frame
 
     def sample_next(self, engine: Any, depsgraph: Any) -> None:
         """Sample what the frame after this one needs, while this one is finished.
@@ -121,8 +121,8 @@ class EngineFrames(FrameSource[Sampled]):
             before = passes.all_passes()
             self._call = _Call(engine, depsgraph, passes, number, None)
             try:
-                for each in missing:
-                    self.window.load(each)
+                for later_frame in missing:
+                    self.window.load(later_frame)
             finally:
                 self._call = None
                 go_to(engine, depsgraph, number)
@@ -151,9 +151,9 @@ class EngineFrames(FrameSource[Sampled]):
         newest = self.window.newest
         seconds = None
         if self.count:
-            each = (time.perf_counter() - self.began) / self.count
+            seconds_each = (time.perf_counter() - self.began) / self.count
             last = number - step if newest is None else newest
-            seconds = each * ((end - last) // step + 1)
+            seconds = seconds_each * ((end - last) // step + 1)
         stages.begin_frame(number, (end - number) // step, seconds)
 
     def load(self, number: int) -> Sampled:

@@ -193,13 +193,13 @@ class FullSize(Method):
             progress=report,
         )
         made = denoised.radiance, denoised.parts
-        found = {**samples.parts, **added_up(*made, light, samples.parts)}
+        parts = {**samples.parts, **added_up(*made, light, samples.parts)}
         seconds = {"denoise": time.perf_counter() - started}
         decisions = in_time(self.settings.quality, self._quality)
         picture = self._picture(
             denoised, samples.albedo, samples.normal, seconds, decisions=decisions
         )
-        return replace(picture, parts=passes_by_name(light, found))
+        return replace(picture, parts=passes_by_name(light, parts))
 
     def _picture(
         self,

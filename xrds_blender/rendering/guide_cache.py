@@ -154,7 +154,9 @@ class GuideCache:
         if guides.nbytes > self.memory_limit:
             return
         self._cached[key] = guides
-        while sum(each.nbytes for each in self._cached.values()) > self.memory_limit:
+        while (
+            sum(guides.nbytes for guides in self._cached.values()) > self.memory_limit
+        ):
             self._cached.popitem(last=False)
 
 

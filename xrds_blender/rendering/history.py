@@ -92,8 +92,8 @@ def last(scene: Any) -> LastRender | None:
     done = [layers[x.name] for x in scene.view_layers if x.use and x.name in layers]
     if not done:
         return None
-    stages = {stage for each in done for stage in each.seconds}
-    seconds = {s: sum(each.seconds.get(s, 0.0) for each in done) for s in stages}
+    stages = {stage for render in done for stage in render.seconds}
+    seconds = {s: sum(render.seconds.get(s, 0.0) for render in done) for s in stages}
     return replace(done[-1], seconds=seconds)
 
 

@@ -183,12 +183,14 @@ def stamp_result(engine: Any, entries: dict[str, str], layer: str) -> None:
 
 
 def _decided(plan: tuple[Decision, ...], name: str) -> str | None:
-    return next((each.value for each in plan if each.decision == name), None)
+    return next(
+        (decision.value for decision in plan if decision.decision == name), None
+    )
 
 
 def _left_out(plan: tuple[Decision, ...]) -> list[str]:
-    found = [_LEFT_OUT.get((each.decision, each.value)) for each in plan]
+    left_out = [_LEFT_OUT.get((decision.decision, decision.value)) for decision in plan]
     cached = _decided(plan, GUIDE_CACHE) or ""
     if cached.startswith("used"):
-        found.append("guides, from the cache")
-    return [words for words in found if words]
+        left_out.append("guides, from the cache")
+    return [words for words in left_out if words]

@@ -143,17 +143,17 @@ def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Pictu
             animation = animations[key] = _Animation(request, frames)
         frames = animation.frames
         try:
-            found = frames.neighbourhood(engine, depsgraph)
+            frame = frames.neighbourhood(engine, depsgraph)
         except Cancelled:
             own = frames.window.get(number)
             if own is not None:  # else its samples so far are in the result already
                 _leave_stopped(engine, key[1], frames.method, own)
             raise
-        others = list(found.neighbours.values())
+        others = list(frame.neighbours.values())
         ahead = None
         if frames.method.pace is None and samples_on_card(depsgraph.scene_eval):
             ahead = partial(frames.sample_next, engine, depsgraph)
-        picture = _finish(engine, key[1], frames.method, found.own, others, ahead)
+        picture = _finish(engine, key[1], frames.method, frame.own, others, ahead)
     finally:
         stages.end()
     return _remembered(picture, layer, start)
@@ -210,7 +210,7 @@ def _finish(
     started = time.perf_counter()
     picture = joined(pictures, own.seconds)
     combined = picture.views or dict.fromkeys(pictures, picture.pixels)
-    parts = {view: each.parts for view, each in pictures.items()}
+    parts = {view: finished.parts for view, finished in pictures.items()}
     _write(engine, layer_name, method, own, combined, parts)
     picture.seconds["write"] = time.perf_counter() - started
     return picture

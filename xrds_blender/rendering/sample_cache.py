@@ -155,7 +155,7 @@ def _key(request: Request, choice: object) -> str:
     with Path(bpy.data.filepath).open("rb") as file:
         while block := file.read(1 << 20):
             digest.update(block)
-    outer = [path for each in outer_files() for path in each.files]
+    outer = [path for outer in outer_files() for path in outer.files]
     if colours := os.environ.get("OCIO", ""):  # textures are read by it
         outer.append(Path(colours))
     for path in dict.fromkeys(outer):

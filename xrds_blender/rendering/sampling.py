@@ -72,8 +72,8 @@ class Sampled:
 
     def neighbours(self, view: str, frames: Sequence[Sampled]) -> list[Any]:
         """That view of other frames, and this frame's other views."""
-        beside = [each for name, each in self.views.items() if name != view]
-        return [each.views[view] for each in frames if view in each.views] + beside
+        beside = [own for name, own in self.views.items() if name != view]
+        return [x.views[view] for x in frames if view in x.views] + beside
 
 
 @dataclass(frozen=True)
@@ -154,24 +154,24 @@ class Sampling:
         return self.subset() or SampleSubset(self.own_seed, self.count, 0, self.count)
 
     def further(
-        self, length: int, begin: int | None, sequence: int, each: int = 0
+        self, length: int, begin: int | None, sequence: int, count: int = 0
     ) -> list[SampleSubset]:
         """More samples of the frame, of a sequence of their own that has a number.
 
-        Of several ones of `each` samples where that is not 0. With `begin` they are of
+        Of several ones of `count` samples where that is not 0. With `begin` they are of
         one that all frames share, after so many taken of it.
         """
         if begin is not None:
             return [running_subset(begin, length, self.most, self.seed + 1)]
-        each = each or length
+        count = count or length
         return [
             SampleSubset(
                 (self.own_seed + (sequence + i) * _OTHER) % _LARGEST_SEED,
-                each,
+                count,
                 0,
-                min(each, length - first),
+                min(count, length - first),
             )
-            for i, first in enumerate(range(0, length, each))
+            for i, first in enumerate(range(0, length, count))
         ]
 
     @property
@@ -268,9 +268,9 @@ def parts_of_layer(
         return ()
     name = depsgraph.view_layer_eval.name
     names = {
-        f"{each.name}.{letter}": None
-        for each in engine.get_result().layers[name].passes
-        if each.channel_id in ("RGB", "RGBA")
+        f"{render_pass.name}.{letter}": None
+        for render_pass in engine.get_result().layers[name].passes
+        if render_pass.channel_id in ("RGB", "RGBA")
         for letter in "RGB"
     }
     return find_parts(Channels(f"view layer {name!r}", names), "", request.light)
@@ -324,7 +324,7 @@ def _alone(
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     stages.begin(engine, stages.SAMPLES, 1, 2)
     try:
-        found, clock = sample_layer(
+        samples, clock = sample_layer(
             engine,
             depsgraph,
             samples=request.settings.samples,
@@ -334,7 +334,7 @@ def _alone(
     except Cancelled:
         finish_samples(engine, layer_name, request)
         raise
-    return found, {"sync": clock.sync, "beauty": clock.render}
+    return samples, {"sync": clock.sync, "beauty": clock.render}
 
 
 def noisy_frame(
@@ -387,9 +387,9 @@ def _frames_of_halves(
     seconds = dict.fromkeys(("sync", "beauty"), 0.0)
     if how.needs_motion:
         motion, seconds = sample_motion(engine, depsgraph, how.own_seed)
-    found, more = sample_halves(engine, depsgraph, how.first, how.geometry, how.light)
+    halves, more = sample_halves(engine, depsgraph, how.first, how.geometry, how.light)
     frames = {}
-    for view, half in found.items():
+    for view, half in halves.items():
         samples = half.whole
         if view in motion:
             still = motion[view]

@@ -21,9 +21,9 @@ def finish_samples(engine: Any, layer_name: str, request: Request) -> None:
     denoiser = load_denoiser("fast", request.machine)
     noisy = samples_in(engine, layer_name)
     pictures = {
-        view: denoiser(each.picture, each.albedo, each.normal).radiance
-        for view, each in noisy.items()
-        if each.picture.any()
+        view: denoiser(samples.picture, samples.albedo, samples.normal).radiance
+        for view, samples in noisy.items()
+        if samples.picture.any()
     }
     session.write_combined(engine, layer_name, pictures)
 

@@ -149,8 +149,8 @@ class SuperResolution(Method):
 
     def lacks(self, own: Sampled, others: Sequence[Sampled]) -> bool:
         return any(
-            lacks_guides(each, own.neighbours(view, others))
-            for view, each in own.views.items()
+            lacks_guides(own_view, own.neighbours(view, others))
+            for view, own_view in own.views.items()
         )
 
     def finish(
@@ -197,14 +197,16 @@ class SuperResolution(Method):
         )
 
     def light_passes(self, own: Sampled, view: str) -> dict[str, Array]:
-        each = own.views[view]
-        lights, offset = each.place.others, each.place.offset
-        return enlarged_lights(lights, self.settings.scale, offset, each.shape)
+        own_view = own.views[view]
+        lights, offset = own_view.place.others, own_view.place.offset
+        return enlarged_lights(lights, self.settings.scale, offset, own_view.shape)
 
     def stopped(self, own: Sampled) -> dict[str, Array]:
         first = next(iter(own.views.values()))
         machine = self.request.machine
-        beauties = {view: _alone(each, machine) for view, each in own.views.items()}
+        beauties = {
+            view: _alone(own_view, machine) for view, own_view in own.views.items()
+        }
         return enlarged(beauties, self.settings.scale, first.shape)
 
 
@@ -253,7 +255,7 @@ class _Renders:
         first = self.passes.views[0]
         rendered = beauties[first].seconds, guides[first].seconds
         decisions = (*self.chosen.decisions, source.decision)
-        sync, again = sorted(each["sync"] for each in rendered)[::-1]
+        sync, again = sorted(seconds["sync"] for seconds in rendered)[::-1]
         if again:
             decisions += plan.after(sync, again)
         skip_idle = self.chosen.skip_idle
@@ -271,15 +273,17 @@ class _Renders:
             views = self._views(light)
             rendered = [next(iter(light.values())).place.seconds]
             if between and self._is_shown_by_others():
-                found, decision = views, _OF_OTHERS
+                views_with_guides, decision = views, _OF_OTHERS
             else:
-                found, decision, seconds = self._with_guides(views, light)
+                views_with_guides, decision, seconds = self._with_guides(views, light)
                 rendered.append(seconds)
         except Cancelled:
             self._finish_light(light)
             raise
         return Sampled(
-            self.how.number, _with_decision(found, decision), _summed(rendered)
+            self.how.number,
+            _with_decision(views_with_guides, decision),
+            _summed(rendered),
         )
 
     def _finish_light(self, light: Mapping[str, LowSamples] | None = None) -> None:
@@ -354,7 +358,7 @@ class _Renders:
         source = self._source(_guide_request(self.request, self.how, samples), samples)
         noisy = {v: low.place.beauty(low.samples.picture) for v, low in light.items()}
         guides = self._guides(source, noisy)
-        found = {
+        with_guides = {
             view: replace(
                 each, guides=self._stored(guides[view], view), guide_name=source.name
             )
@@ -362,7 +366,7 @@ class _Renders:
         }
         is_cached = self.how.place is not None or self.request.guide_cache is not None
         decision = source.decision if is_cached else _NOT_CACHED
-        return found, decision, next(iter(guides.values())).seconds
+        return with_guides, decision, next(iter(guides.values())).seconds
 
     def _source(self, request: Request, samples: int) -> GuideSource:
         return GuideSource(
@@ -436,8 +440,8 @@ def _stored_light(how: Sampling, scale: int, low: LowSamples, view: str) -> Stor
 
 def _summed(rendered: Sequence[Mapping[str, float]]) -> dict[str, float]:
     """Seconds by stage of all renders together."""
-    names = {stage for each in rendered for stage in each}
-    return {s: sum(each.get(s, 0.0) for each in rendered) for s in names}
+    names = {stage for seconds in rendered for stage in seconds}
+    return {s: sum(seconds.get(s, 0.0) for seconds in rendered) for s in names}
 
 
 # --- Finishing -----------------------------------------------------------------------
@@ -452,7 +456,7 @@ def accumulated_inputs(
 ) -> Inputs:
     """What the network takes of a view, with the samples of its neighbours."""
     started = time.perf_counter()
-    light = [each.light for each in others]
+    light = [frame.light for frame in others]
     accumulated = accumulate(own.light, light, movement)
     guides = accumulated_guides(own, others, movement)
     done = time.perf_counter()
@@ -484,30 +488,32 @@ def _denoised(own: View, accumulated: Accumulated, denoiser: Denoiser) -> Beauty
 
 def accumulated_guides(own: View, others: Sequence[View], movement: Movement) -> Guides:
     """Guides with the samples of other frames; the richest of those of one name."""
-    others = [each for each in others if each.guides is not None]
+    others = [frame for frame in others if frame.guides is not None]
     if own.guide_name is not None:
         name = own.guide_name
-        same = [own, *(each for each in others if name.is_same(each.guide_name))]
+        same = [own, *(frame for frame in others if name.is_same(frame.guide_name))]
         own = max(same, key=_samples)
-        others = [each for each in others if each not in same]
-    neighbours = [each.guides for each in others if each.guides is not None]
+        others = [frame for frame in others if frame not in same]
+    neighbours = [frame.guides for frame in others if frame.guides is not None]
     target = own.guides
     if target is None:
         number = own.light.number
-        beside = sorted(neighbours, key=lambda each: abs(each.number - number))[:2]
+        beside = sorted(neighbours, key=lambda frame: abs(frame.number - number))[:2]
         target = reprojected_placeholder(number, own.camera, beside)
-    found = accumulate(target, neighbours, movement)
-    assert found.alpha is not None
+    accumulated = accumulate(target, neighbours, movement)
+    assert accumulated.alpha is not None
     # their own number: where nothing is accumulated there are no more
     samples = max(1, int(target.samples))
-    return Guides(found.albedo, found.normal, found.alpha, None, samples)
+    return Guides(
+        accumulated.albedo, accumulated.normal, accumulated.alpha, None, samples
+    )
 
 
 def lacks_guides(own: View, others: Sequence[View]) -> bool:
     """Whether a frame counted on guides of frames that a cut parts from it."""
     if not isinstance(own, View) or own.guides is not None:
         return False
-    rich = [each.light for each in others if each.guides is not None]
+    rich = [frame.light for frame in others if frame.guides is not None]
     return not same_shot(own.light, rich)
 
 

@@ -148,8 +148,8 @@ class Deadline:
     def _take(self, wanted: float) -> None:
         if wanted < 1.0 and not self._is_late:
             self._is_late = True
-            each = self._beside + self._sync + self._start + self._sample
-            needed = duration(self.to_finish * each)
+            seconds = self._beside + self._sync + self._start + self._sample
+            needed = duration(self.to_finish * seconds)
             warn(
                 "the deadline leaves less than one sample for a frame; with one, "
                 f"{counted(self.to_finish, 'frame')} take about {needed}"

@@ -22,7 +22,7 @@ from ...cycles.low_resolution import Region
 from ...cycles.settings import LOOKS_EVERY, first_look
 from ..methods import Finishing
 from ..sampling import Sampled
-from .more import Part, measured_regions, nothing, pixels_of, put
+from .more import Part, measured_regions, no_samples, pixels_of, write_region
 
 Render = Callable[[Part], dict[str, Passes]]
 """Renders more samples of a frame, by view."""
@@ -68,11 +68,13 @@ def measure(
         place = None if (region.height, region.width) == shape else region
         halves = [more(Part(length, 0.5, place, sequence=-i)) for i in (1, 2)]
         started = time.perf_counter()
-        cells.append([_rendered(method, each[view]) for each in halves])
+        cells.append([_rendered(method, half[view]) for half in halves])
         seconds += time.perf_counter() - started
         for name in own.views:
-            found = mean_of([each[name] for each in halves])
-            put(extra.setdefault(name, nothing(shape, found.parts)), region, found)
+            mean = mean_of([half[name] for half in halves])
+            write_region(
+                extra.setdefault(name, no_samples(shape, mean.parts)), region, mean
+            )
     parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
     area = sum(region.width * region.height for region in regions)
     # with the neighbours' samples: what may be wrong in them has nothing to do with
@@ -153,7 +155,7 @@ class Threshold:
         return block_means(asked) / self.samples
 
 
-def learn(frame: Stored, asked: Array) -> Threshold:
+def learn_threshold(frame: Stored, asked: Array) -> Threshold:
     """Learn from a frame what its file asks for.
 
     `asked` (H, W) are the samples that each pixel takes in the file, 0 where that is

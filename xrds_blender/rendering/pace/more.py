@@ -26,8 +26,8 @@ class Part:
     """More samples of a frame: `length` of a sequence that has a number.
 
     With `begin` they are of one that all frames share, after so many taken of it. Where
-    `each` is not 0 they are of several with so many: Cycles syncs the scene again for
-    another number than it had before.
+    `at_once` is not 0 they are of several with so many: Cycles syncs the scene again
+    for another number than it had before.
 
     Where the file has a noise threshold, pixels stop at `share` of what it asks for.
     `region` is a part of the picture, None all of it.
@@ -37,7 +37,7 @@ class Part:
     share: float
     region: Region | None = None
     begin: int | None = None
-    each: int = 0
+    at_once: int = 0
     sequence: int = 1
 
 
@@ -55,12 +55,12 @@ def render_more(
     """
     how = sampling_of(engine, depsgraph, request, place)
     even = is_even(depsgraph.scene_eval, request)
-    each = part.each if even else 0
-    parts = how.further(part.length, part.begin, part.sequence, each)
+    at_once = part.at_once if even else 0
+    parts = how.further(part.length, part.begin, part.sequence, at_once)
     share = None if even else part.share
     stages.begin(engine, how.named(stages.SAMPLES), 1, 2)
     try:
-        found, seconds = more_samples(
+        samples, seconds = more_samples(
             engine,
             depsgraph,
             parts,
@@ -70,7 +70,7 @@ def render_more(
         )
     finally:
         stages.end()
-    return {v: mean_of([x[v] for x in found]) for v in found[0]}, seconds
+    return {v: mean_of([x[v] for x in samples]) for v in samples[0]}, seconds
 
 
 def with_more(own: Sampled, extra: Mapping[str, Passes], weight: float) -> Sampled:
@@ -83,7 +83,7 @@ def with_more(own: Sampled, extra: Mapping[str, Passes], weight: float) -> Sampl
     return replace(own, views=views, gathered=gathered) if extra else own
 
 
-def nothing(shape: tuple[int, int], parts: Iterable[str]) -> Passes:
+def no_samples(shape: tuple[int, int], parts: Iterable[str]) -> Passes:
     """No samples anywhere."""
     radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
     alpha, counts = np.zeros((2, *shape), np.float32)
@@ -97,7 +97,7 @@ def nothing(shape: tuple[int, int], parts: Iterable[str]) -> Passes:
     )
 
 
-def put(whole: Passes, region: Region, part: Passes) -> None:
+def write_region(whole: Passes, region: Region, part: Passes) -> None:
     """Write the samples of a region into those of the whole picture."""
     place = pixels_of(region)
     for name, pixels in whole.given.items():
@@ -106,7 +106,7 @@ def put(whole: Passes, region: Region, part: Passes) -> None:
         whole.parts[name][place] = pixels
 
 
-def together(one: Mapping[str, Passes], two: Mapping[str, Passes]) -> dict[str, Passes]:
+def unite(one: Mapping[str, Passes], two: Mapping[str, Passes]) -> dict[str, Passes]:
     """Both, by view."""
     names = one.keys() | two.keys()
     return {v: mean_of([x[v] for x in (one, two) if v in x]) for v in names}
@@ -140,12 +140,12 @@ def blocks_beside(
     places = [_columns_of(region) for region in regions]
     ends = [0, *(x.stop for x in places)]
     starts = [*(x.start for x in places), blocks.shape[1]]
-    found = []
+    parts = []
     for first, last in zip(ends, starts, strict=True):
         part = np.zeros_like(blocks)
         part[:, first:last] = blocks[:, first:last]
-        found.append(part)
-    return found
+        parts.append(part)
+    return parts
 
 
 def pixels_of(region: Region) -> tuple[slice, slice]:

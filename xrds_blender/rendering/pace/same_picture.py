@@ -35,16 +35,16 @@ from ...planning.settings import Mode
 from ...scene.contents import stands_still
 from ..methods import Finishing
 from ..sampling import Sampled, can_continue, has_neighbours, is_even
-from .measuring import Measured, Render, Threshold, learn, measure
+from .measuring import Measured, Render, Threshold, learn_threshold, measure
 from .more import (
     More,
     Part,
     blocks_beside,
-    nothing,
-    put,
+    no_samples,
     region_of,
-    together,
+    unite,
     with_more,
+    write_region,
 )
 
 FEWEST_SAMPLES = 8
@@ -95,7 +95,7 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     least = None
     if not is_even(scene, request):
         _, least = stops_at(scene.cycles, scene.cycles.samples)
-    found = SamePicture(
+    budget = SamePicture(
         scene.cycles.samples,
         history,
         neighbours=2 * request.settings.temporal_radius,
@@ -103,8 +103,8 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
         least=least,
         moves=not stands_still(scene.camera),
     )
-    found.share = found.possible(_FIRST)
-    return found
+    budget.share = budget.possible(_FIRST)
+    return budget
 
 
 @dataclass
@@ -175,11 +175,11 @@ class SamePicture:
         # One frame of many samples is worth less than many of few: all its pixels lie
         # as far beside this one's. So it is not to be among the neighbours.
         if self._worth.is_due(len(beside)) and self._measured_in not in beside:
-            found = self._measure(method, own, others, noted)
-            extra, regions = found.extra, found.regions
-            share = self._learn(own, share, found.asked)
+            measured = self._measure(method, own, others, noted)
+            extra, regions = measured.extra, measured.regions
+            share = self._learn(own, share, measured.asked)
             whole = gained.of(gained.errors > 0.0)
-            self._worth.add(found.ratio, share, whole, len(beside))
+            self._worth.add(measured.ratio, share, whole, len(beside))
             self._tried = share
         shares = np.full_like(gained.errors, share)
         if self._threshold is not None and own.samples is not None:  # even ones
@@ -194,7 +194,7 @@ class SamePicture:
         # where it was measured it has all now
         for part in blocks_beside(lacks, regions):
             further = self._top_up(shape, shares, gained, part, noted)
-            extra = together(extra, further)
+            extra = unite(extra, further)
         own = with_more(own, extra, self._weight)
         if regions:
             self._clock.leave_out(time.perf_counter())
@@ -215,12 +215,12 @@ class SamePicture:
         self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: Render
     ) -> Measured:
         """Compare a frame with its neighbours to one of all samples."""
-        found = measure(
+        measured = measure(
             method, own, others, self.samples, self.exposure, more, self.least
         )
-        self._clock.denoising = found.denoising
-        self._measured_in, self._ratio = own.number, found.ratio.value
-        return found
+        self._clock.denoising = measured.denoising
+        self._measured_in, self._ratio = own.number, measured.ratio.value
+        return measured
 
     def _before(self, own: Sampled, others: Sequence[Sampled]) -> list[Sampled]:
         """What frames before the window have left, as one that lies beside it."""
@@ -268,11 +268,11 @@ class SamePicture:
         if self.least is None:
             return share
         is_first = self._threshold is None
-        self._threshold = learn(next(iter(own.views.values())), asked)
-        found = self._share(own, share)
+        self._threshold = learn_threshold(next(iter(own.views.values())), asked)
+        had = self._share(own, share)
         if is_first:  # what the others have is known now as well
-            self._shares = {n: x * found / share for n, x in self._shares.items()}
-        return found
+            self._shares = {n: x * had / share for n, x in self._shares.items()}
+        return had
 
     def _equal(self, share: Any, gain: Any) -> Any:
         """The share of all samples that is as good without neighbours.
@@ -320,20 +320,20 @@ class SamePicture:
             self._taken_more += length
             part = Part(length, length / self.samples, region, begin, self._newest)
             for view, samples in more(part).items():
-                whole = extra.setdefault(view, nothing(shape, samples.parts))
-                put(whole, region, samples)
+                whole = extra.setdefault(view, no_samples(shape, samples.parts))
+                write_region(whole, region, samples)
         return extra
 
     def _priced(self, more: More, shape: tuple[int, int]) -> More:
         """The same; what a call costs beside its samples is noted."""
 
         def priced(part: Part) -> tuple[dict[str, Passes], dict[str, float]]:
-            found, seconds = more(part)
+            by_view, seconds = more(part)
             region = part.region or Region(0, 0, shape[1], shape[0])
             samples = part.length * region.width * region.height / BLOCK**2
             if seconds["beauty"]:
                 self._call = samples * seconds["sync"] / seconds["beauty"]
-            return found, seconds
+            return by_view, seconds
 
         return priced
 
@@ -384,9 +384,9 @@ class _Seconds:
         """The same without the seconds, which are noted here."""
 
         def noted(part: Part) -> dict[str, Passes]:
-            found, seconds = more(part)
+            samples, seconds = more(part)
             self.stages = self.added_to(seconds)
-            return found
+            return samples
 
         return noted
 
