@@ -12,7 +12,11 @@ pytest.importorskip("bpy")
 
 from shots import World, camera, view
 
-from xrds_blender.rendering.pace.measuring import Threshold, counts_of_file, learn
+from xrds_blender.rendering.pace.measuring import (
+    Threshold,
+    counts_of_file,
+    learn_threshold,
+)
 from xrds_core.accumulation.frame import Stored, store
 from xrds_core.accumulation.local_filters import BLOCK
 from xrds_core.accumulation.noise import Noise
@@ -57,7 +61,7 @@ def test_noisy_blocks_take_more_samples() -> None:
     frame = stored(noise)
     asked = np.full(SHAPE, LEAST, np.float32)
     asked[:, : 2 * BLOCK] = 4 * LEAST
-    found = learn(frame, asked)
+    found = learn_threshold(frame, asked)
     assert found.samples == pytest.approx(asked.mean())
     density = found.density(frame)
     assert density[:, 0] * found.samples == pytest.approx(4 * LEAST, rel=0.1)
@@ -73,7 +77,7 @@ def test_what_was_not_measured_does_not_count() -> None:
     frame = stored(np.full(SHAPE, 0.01, np.float32))
     asked = np.zeros(SHAPE, np.float32)
     asked[:, : 2 * BLOCK] = 2 * LEAST
-    assert learn(frame, asked).samples == 2 * LEAST
+    assert learn_threshold(frame, asked).samples == 2 * LEAST
 
 
 @pytest.mark.parametrize(
