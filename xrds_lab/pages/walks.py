@@ -2,8 +2,9 @@
 
 A walk follows a parameter of a function, and what is taken out of it, through every
 call that it is given to, in the order of the source; each function is entered once for
-each parameter. Where a method is called on an object of unknown class, all classes of
-the project that have a method of that name are entered. Counted are the files that are
+each parameter. The class of an object is the one that its annotation, or the call that
+made it, says, and all that derive from it; where nothing says it, all classes of the
+project that have a method of that name are entered. Counted are the files that are
 entered, and how often a call leads back into a file that the walk has left. Nothing is
 run: imports, definitions and calls are read.
 
@@ -46,14 +47,15 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 @dataclass
 class _Module:
-    """A module: its functions by qualified name, what its names mean, and full names of
-    all that it imports.
+    """A module: its functions by qualified name, its classes with what they derive from
+    and the classes of their fields, what its names mean, and all that it imports.
     """
 
     name: str
     path: Path
     functions: dict[str, Function] = field(default_factory=dict)
-    classes: set[str] = field(default_factory=set)
+    classes: dict[str, list[str]] = field(default_factory=dict)
+    fields: dict[str, dict[str, ast.expr]] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
     imported: set[str] = field(default_factory=set)
 
@@ -96,7 +98,10 @@ def _read(path: Path) -> _Module:
         if isinstance(node, Function):
             module.functions[node.name] = node
         elif isinstance(node, ast.ClassDef):
-            module.classes.add(node.name)
+            module.classes[node.name] = [
+                name for base in node.bases for name in _names_in(base)
+            ]
+            module.fields[node.name] = _fields(node)
             for item in node.body:
                 if isinstance(item, Function):
                     module.functions[f"{node.name}.{item.name}"] = item
@@ -111,6 +116,32 @@ def _read(path: Path) -> _Module:
                 module.names[alias.asname or alias.name] = full
                 module.imported.add(full)
     return module
+
+
+def _fields(node: ast.ClassDef) -> dict[str, ast.expr]:
+    """What says the classes of fields: annotations, and calls that make them."""
+    fields: dict[str, ast.expr] = {}
+    for item in ast.walk(node):
+        if isinstance(item, ast.AnnAssign):
+            fields[_field_name(item.target)] = item.annotation
+        elif isinstance(item, ast.Assign) and isinstance(item.value, ast.Call):
+            for target in item.targets:
+                fields.setdefault(_field_name(target), item.value.func)
+    return fields
+
+
+def _field_name(target: ast.expr) -> str:
+    """The name of a field, or of self.NAME; empty for another target."""
+    if isinstance(target, ast.Name):
+        return target.id
+    return target.attr if isinstance(target, ast.Attribute) else ""
+
+
+def _names_in(node: ast.AST) -> list[str]:
+    """The names in an annotation, also in one that is a string."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        node = ast.parse(node.value, mode="eval")
+    return [x.id for x in ast.walk(node) if isinstance(x, ast.Name)]
 
 
 def walk(module: str, function: str, parameter: str) -> Walk:
@@ -187,12 +218,61 @@ def _targets(module: _Module, within: str, call: ast.Call) -> list[tuple[str, st
         return [(module.name, own)]
     if called.attr in _COMMON or called.attr.startswith("__"):
         return []
+    return _methods(called.attr, _classes_told(module, within, called.value))
+
+
+def _methods(name: str, owners: list[str] | None) -> list[tuple[str, str]]:
+    """The methods of a name: of some classes and their kin, or of all classes."""
+    kin = None if owners is None else {x for owner in owners for x in _kin(owner)}
     return [
-        (other.name, name)
-        for other in modules().values()
-        for name in other.functions
-        if name.endswith(f".{called.attr}")
+        (module.name, function)
+        for module in modules().values()
+        for function in module.functions
+        if function.endswith(f".{name}")
+        and (kin is None or function.partition(".")[0] in kin)
     ]
+
+
+def _classes_told(module: _Module, within: str, receiver: ast.expr) -> list[str] | None:
+    """The classes that the source says an object is of; None where it does not."""
+    said = _what_says(module, within, receiver)
+    if said is None:
+        return None
+    names = [module.names.get(x, x).rpartition(".")[2] for x in _names_in(said)]
+    if "Any" in names:
+        return None
+    known = {name for other in modules().values() for name in other.classes}
+    told = [name for name in names if name in known]
+    # what a function made has a class that only its own annotation would tell
+    return told if told or not isinstance(said, ast.Name) else None
+
+
+def _what_says(module: _Module, within: str, receiver: ast.expr) -> ast.expr | None:
+    """The annotation of an object, or what is called to make it."""
+    if isinstance(receiver, ast.Name):
+        function = module.functions[within]
+        for argument in (*function.args.args, *function.args.kwonlyargs):
+            if argument.arg == receiver.id:
+                return argument.annotation
+        for node in ast.walk(function):
+            is_made = isinstance(node, ast.Assign) and isinstance(node.value, ast.Call)
+            if is_made and receiver.id in map(_field_name, node.targets):
+                return node.value.func
+    elif isinstance(receiver, ast.Attribute) and _names_in(receiver.value) == ["self"]:
+        owner = within.partition(".")[0]
+        return module.fields.get(owner, {}).get(receiver.attr)
+    return None
+
+
+@cache
+def _kin(name: str) -> frozenset[str]:
+    """A class, those that it derives from, and those that derive from it."""
+    bases = {k: v for other in modules().values() for k, v in other.classes.items()}
+    above, below = {name}, {name}
+    for _ in bases:
+        above |= {base for kind in above for base in bases.get(kind, [])}
+        below |= {kind for kind, over in bases.items() if below & {*over}}
+    return frozenset(above | below)
 
 
 def _named(module: _Module, name: str) -> list[tuple[str, str]]:
