@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from xrds_core.accumulation.frame import Halves
-from xrds_core.accumulation.passes import Passes
+from xrds_core.accumulation.passes import Passes, weighted_mean
 from xrds_core.accumulation.sample_subsets import SampleSubset
 from xrds_core.arrays import Array
 from xrds_core.denoising.light_passes import LightPart, passes_by_name
@@ -153,10 +153,6 @@ def _join_halves(first: Passes, second: Passes, shares: tuple[float, float]) -> 
     return Half(first.joined(second, halves.share()), halves)
 
 
-def _weighted_mean(first: Array, second: Array, share: Array) -> Array:
-    return np.asarray(first * share + second * (np.float32(1.0) - share))
-
-
 def _light_passes(parts: Sequence[LightPart], by_view: Mapping[str, Half]) -> _Named:
     """The light passes: those that are divided by a colour have no plain means."""
     return {
@@ -178,10 +174,10 @@ def _merge_passes(
         if is_of_first_sample(name) or (view, name) not in second:
             merged[view, name] = pixels
             continue
-        share = by_view[view].halves.share()[..., None]
+        share = by_view[view].halves.share()
         if name == SAMPLE_COUNT:  # itself a share, of the most samples
             share = np.asarray(shares[0], np.float32)
-        merged[view, name] = _weighted_mean(pixels, second[view, name], share)
+        merged[view, name] = weighted_mean(pixels, second[view, name], share)
     return merged
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -111,7 +112,7 @@ class Passes:
         arrays = {name: getattr(self, name) for name in LAYOUT}
         return {name: x for name, x in arrays.items() if x is not None}
 
-    @property
+    @cached_property
     def picture(self) -> Array:
         """Radiance and alpha, (H, W, 4), or radiance alone."""
         assert self.radiance is not None
@@ -140,12 +141,6 @@ class Passes:
         share : (H, W) or () ndarray
             This half's share of the samples.
         """
-        rest = np.float32(1.0) - share
-
-        def mean(one: Array, two: Array) -> Array:
-            wide = (...,) + (None,) * (one.ndim - 2) if share.ndim else ...
-            return np.asarray(one * share[wide] + two * rest[wide])
-
         whole: dict[str, Any] = {}
         for name, layout in LAYOUT.items():
             one, two = getattr(self, name), getattr(other, name)
@@ -154,6 +149,18 @@ class Passes:
             elif layout.joined is Joined.SUM:
                 whole[name] = one + two
             else:
-                whole[name] = mean(one, two)
-        parts = {name: mean(x, other.parts[name]) for name, x in self.parts.items()}
+                whole[name] = weighted_mean(one, two, share)
+        parts = {
+            name: weighted_mean(x, other.parts[name], share)
+            for name, x in self.parts.items()
+        }
         return replace(self, **whole, parts=parts)
+
+
+def weighted_mean(first: Array, second: Array, share: Array) -> Array:
+    """Return the mean of two pictures, (H, W) or (H, W, C); `share` is the first's.
+
+    The share is (H, W), or one number.
+    """
+    wide = share[(...,) + (None,) * (first.ndim - 2)] if share.ndim else share
+    return np.asarray(first * wide + second * (np.float32(1.0) - wide))
