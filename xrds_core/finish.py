@@ -143,7 +143,8 @@ class Finished:
     accumulated : Accumulated
         The samples that were denoised.
     seconds : dict of str to float
-        Wall-clock time by stage: accumulate, denoise.
+        Wall-clock time by stage: accumulate, denoise, and again: what of the
+        frame alone was denoised as well.
     parts : mapping of str to (H, W, 3) float32 array
         AOVs and light passes, which add up to the picture, by name; the colours that
         some are divided by, under `LightPart.colour_name`.
@@ -226,6 +227,7 @@ def finish_frame(
     passes = _Passes.of(accumulated, light, region)
     callbacks = [_progress_of_part(progress, number, parts) for number in range(parts)]
     denoised = passes.denoised(denoiser, callbacks[0])
+    again_started = time.perf_counter()
     if areas:
         alone = _fill_holes(accumulate(own, []), accumulated)
         lacking = _Passes.of(alone, light, region, like=denoised.parts)
@@ -239,6 +241,7 @@ def finish_frame(
                 inner = part[area.within]
                 whole[area.place] = inner + (whole[area.place] - inner) * weight
         denoised = replace(denoised, radiance=mixed)
+    again = time.perf_counter() - again_started
     names = dict.fromkeys(
         light_part.colour_name for light_part in light if light_part.colour
     )
@@ -248,7 +251,8 @@ def finish_frame(
     )
     seconds = {
         "accumulate": denoise_started - started,
-        "denoise": time.perf_counter() - denoise_started,
+        "denoise": time.perf_counter() - denoise_started - again,
+        "again": again,
     }
     return Finished(denoised, accumulated, seconds, finished_light)
 

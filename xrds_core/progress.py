@@ -88,11 +88,96 @@ class Clock:
         return f"{took:.1f} s; {left} left, about {rest}"
 
 
+_NEWEST = 0.2  # weight of the newest piece in what is expected of the next
+
+
+class _Work:
+    """Pieces of one kind of work: how many are left, and the seconds of one."""
+
+    def __init__(self, left: int, seconds: float | None) -> None:
+        self.left, self.seconds = left, seconds
+        self._done = 0
+
+    def add(self, seconds: float) -> None:
+        self._done += 1
+        self.left = max(self.left - 1, 0)
+        before = 0.0 if self.seconds is None else self.seconds
+        self.seconds = before + max(1.0 / self._done, _NEWEST) * (seconds - before)
+
+
+class ShotClock:
+    """Tells the seconds left of a shot: each frame is sampled, and later finished.
+
+    Wall-clock time between two calls counts for the kind of work that the second one
+    notes: so what else goes on is part of it.
+
+    Parameters
+    ----------
+    to_sample, to_finish : int
+        Frames that are to be sampled, and to be finished.
+    finishing : float or None
+        Expected seconds of finishing a frame, until the first one is finished.
+    now : callable
+        Returns seconds; tests drive it.
+    """
+
+    def __init__(
+        self,
+        to_sample: int = 0,
+        to_finish: int = 0,
+        finishing: float | None = None,
+        now: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._now = now
+        self._sampling = _Work(to_sample, None)
+        self._finishing = _Work(to_finish, finishing)
+        self._start = self._last = now()
+
+    def add(self, to_sample: int, to_finish: int) -> None:
+        """Add frames, as of another view layer."""
+        self._sampling.left += to_sample
+        self._finishing.left += to_finish
+
+    def sampled(self) -> None:
+        self._sampling.add(self._lap())
+
+    def finished(self) -> None:
+        self._finishing.add(self._lap())
+
+    def left(self) -> float | None:
+        """Seconds until all is done; None where nothing is known yet."""
+        works = [x for x in (self._sampling, self._finishing) if x.left]
+        known = [(x.left, x.seconds) for x in works if x.seconds is not None]
+        if len(known) < len(works):
+            return None
+        if not known:
+            return 0.0
+        # of what goes on now, which may be either
+        present = sum(seconds for _, seconds in known) / len(known)
+        spent = self._now() - self._last
+        return sum(left * seconds for left, seconds in known) - min(spent, present)
+
+    def fraction(self) -> float:
+        """The part of all seconds that is spent; below 1 until nothing is left."""
+        left, spent = self.left(), self._now() - self._start
+        if left is None:
+            return 0.0
+        return min(spent / max(spent + left, 1e-6), _NEARLY)
+
+    def _lap(self) -> float:
+        now = self._now()
+        spent, self._last = now - self._last, now
+        return spent
+
+
 def duration(seconds: float) -> str:
-    """Seconds as a person reads them: 4.2 s, 45 s, 12 min, 3.4 h."""
+    """Seconds as a person reads them: 4.2 s, 45 s, 12 min, 3 h 24 min."""
     if seconds < 10:
         return f"{seconds:.1f} s"
     if seconds < 100:
         return f"{seconds:.0f} s"
     minutes = round(seconds / 60)
-    return f"{minutes} min" if minutes < 100 else f"{minutes / 60:.1f} h"
+    if minutes < 100:
+        return f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours} h {minutes:02} min" if hours < 100 else f"{hours} h"

@@ -111,7 +111,8 @@ def _plan_lines(result: dict[str, Any]) -> list[str]:
         f"{_decision_line(decision)}: {decision['reason']}"
         for decision in result["decisions"]
     ]
-    return [_expected_line(result), *lines, *(f"note: {x}" for x in result["remarks"])]
+    notes = [f"note: {x}" for x in result["remarks"]]
+    return [_expected_line(result), *result["summary"], *lines, *notes]
 
 
 def _expected_line(plan: dict[str, Any]) -> str:

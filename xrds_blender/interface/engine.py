@@ -75,7 +75,10 @@ class XRDSRender(bpy.types.RenderEngine):
         settings = picture.settings or request.settings
         entries = record_of(picture, settings, samples)
         stamp_result(self, entries, layer)
-        self.report({"INFO"}, log_line(entries, frame, layer))
+        line = log_line(entries, frame, layer)
+        self.report({"INFO"}, line)
+        if not bpy.app.background:  # a window shows one report of a whole animation
+            print(line, flush=True)
         for note in notes if settings.is_enlarged else ():
             self.report({"INFO"}, f"XRDS: {note}")
 

@@ -108,14 +108,14 @@ DENOISE = [
 _ANIMATIONS = [
     (
         SAME_PICTURE,
-        "Same Picture",
+        "Same Picture, Sooner",
         "Frames look as the file's own samples make them, sooner: each takes as many "
         "samples as it needs beside those of its neighbours. How many is measured in "
         "the first frame, and where neighbours are of no use all are taken",
     ),
     (
         SAME_TIME,
-        "Same Samples",
+        "Same Samples, Cleaner",
         "Each frame takes the file's own samples, and the neighbours' make it better",
     ),
     (
@@ -177,23 +177,23 @@ class XRDSSettings(bpy.types.PropertyGroup):
         "for one sample as for a thousand",
     )
     temporal_radius: IntProperty(
-        name="Temporal Radius",
+        name="Frames Before and After",
         translation_context=CONTEXT,
         default=RADIUS,
         min=0,
         soft_max=8,
         max=32,
-        description="In an animation, how many frames before and after give their "
-        "samples to each frame. More give less noise and flicker and take more memory; "
-        "0 renders every frame by itself",
+        description="In an animation, so many frames before each frame, and as many "
+        "after it, give it their samples. More give less noise and flicker and take "
+        "more memory; 0 renders every frame by itself",
     )
     animation: EnumProperty(
-        name="Animation",
+        name="Animations Keep",
         translation_context=CONTEXT,
         items=_ANIMATIONS,
         default=SAME_TIME,
-        description="What neighbouring frames' samples are used for in an animation: "
-        "fewer samples for each frame, or better frames",
+        description="What an animation keeps of the file's settings: neighbouring "
+        "frames' samples make it quicker, or better",
     )
     passes: EnumProperty(
         name="Passes",

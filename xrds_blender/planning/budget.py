@@ -28,21 +28,15 @@ ALIKE = 1.1
 # saves little more time and costs decibels.
 LATE = 0.05
 MOST_SAMPLES = 16384
-# Of a neighbour's samples in a shot: those that count like the frame's own, as Cycles +
-# OIDN needs 4 to 5 times the samples for the same picture at a radius of 4.
-REUSED = 0.5
-# Seconds that each neighbour takes, to be packed and accumulated, over those of the
-# quickest denoising.
-ACCUMULATION = 0.25
 
 
 @dataclass(frozen=True)
 class Costs:
     """Seconds of one frame's parts, all for the whole frame at its full size.
 
-    `fixed`: scene sync, BVH, reading and writing, whatever is rendered; `beauty` and
-    `guide`: one sample; `denoise` by denoiser; `network` by network; `pictures`: how
-    many are denoised at full size.
+    `fixed`: scene sync, BVH, reading and writing, whatever is rendered, and in a shot
+    what neighbours take; `beauty` and `guide`: one sample; `denoise` by denoiser;
+    `network` by network.
     """
 
     fixed: float
@@ -50,19 +44,6 @@ class Costs:
     guide: float
     denoise: Mapping[Denoising, float]
     network: Mapping[Network, float]
-    pictures: int = 1
-
-    def in_shot(self, radius: int) -> Costs:
-        """Those of a frame that reuses samples of `radius` frames before and after.
-
-        At full size the frame is denoised by itself as well.
-        """
-        reusing = 2 * radius * ACCUMULATION * min(self.denoise.values())
-        return replace(
-            self,
-            fixed=self.fixed + reusing,
-            pictures=2 if radius else 1,
-        )
 
     def seconds(self, settings: Settings) -> float:
         """Of the whole frame; raises KeyError for an unknown denoiser or network."""
@@ -82,7 +63,7 @@ class Costs:
         denoising = settings.denoising
         denoise = 0.0 if denoising is None else self.denoise[denoising]
         if not settings.is_enlarged:
-            return self.fixed + denoise * self.pictures
+            return self.fixed + denoise
         seconds = self.fixed + denoise / settings.scale**2
         guides = settings.guide_samples * self.guide
         return seconds + guides + self.network[settings.network]
@@ -92,25 +73,28 @@ class Costs:
 class Curve:
     """PSNR in dB over sample counts, never falling; linear in log2 of the count.
 
-    Beyond its last sample it is flat: what was not measured is not promised. Each
-    sample counts as `worth` of those.
+    Beyond its last sample it is flat: what was not measured is not promised.
     """
 
     samples: tuple[int, ...]
     psnr: tuple[float, ...]
-    worth: float = 1.0
 
     def at(self, count: float) -> float:
         """PSNR at a count of at least the first."""
-        samples = count * self.worth
-        after = bisect_right(self.samples, samples)
+        after = bisect_right(self.samples, count)
         if after in {0, len(self.samples)}:
             return self.psnr[max(after - 1, 0)]
         (low, high), (least, most) = (
             values[after - 1 : after + 1] for values in (self.samples, self.psnr)
         )
-        share = math.log2(samples / low) / math.log2(high / low)
+        share = math.log2(count / low) / math.log2(high / low)
         return least + share * (most - least)
+
+    @property
+    def last_slope(self) -> float:
+        """Decibels of the last doubling that was measured."""
+        (low, high), (least, most) = self.samples[-2:], self.psnr[-2:]
+        return (most - least) / math.log2(high / low)
 
     @classmethod
     def of(cls, points: Mapping[int, float]) -> Curve:
@@ -133,11 +117,6 @@ class ErrorModel:
         """In dB; raises KeyError for what was not measured."""
         assert settings.samples is not None
         return self.curves[settings.family].at(settings.samples)
-
-    def in_shot(self, radius: int) -> ErrorModel:
-        """Of frames that `radius` frames before and after give their samples."""
-        worth = 1 + 2 * radius * REUSED
-        return ErrorModel({s: replace(c, worth=worth) for s, c in self.curves.items()})
 
     @property
     def full_size(self) -> dict[Denoising, Curve]:

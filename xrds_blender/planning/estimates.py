@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from xrds_core.accumulation.frame import bytes_needed
 
+from . import shot_figures
 from .budget import Costs, Curve, ErrorModel, Model
 from .settings import (
     DEFAULT_DENOISING,
@@ -101,22 +103,18 @@ def estimates(
     here: Capabilities,
     model: Model,
     seconds: Callable[[Settings], float | None] = lambda _: None,
-    radius: int = 0,
+    gain: float = 0.0,
 ) -> list[Estimate]:
     """What to expect of each mode that can work, in the order of MODES.
 
-    `radius` frames to each side give a frame their samples.
+    In a shot neighbouring frames `gain` so many decibels in each mode of ours.
     """
     in_mode = {m: resolved(replace(settings, mode=m), scene) for m in MODES}
     able = {mode: each for mode, each in in_mode.items() if not missing(each, here)}
     samples = settings.samples or scene.samples
-    alone = model.errors
-    errors = alone.in_shot(radius) if radius else alone
-    curves = {
-        m: _curve(s, here, alone if m is Mode.CYCLES_ONLY else errors)
-        for m, s in able.items()
-    }
-    below = _decibels(curves, samples)
+    curves = {m: _curve(s, here, model.errors) for m, s in able.items()}
+    gains = {m: 0.0 if m is Mode.CYCLES_ONLY else gain for m in able}
+    below = _decibels(curves, samples, gains)
     return [Estimate(m, below[m], seconds(each)) for m, each in able.items()]
 
 
@@ -146,9 +144,9 @@ def _curve(settings: Settings, here: Capabilities, errors: ErrorModel) -> Curve 
 
 
 def _decibels(
-    curves: Mapping[Mode, Curve | None], samples: int
+    curves: Mapping[Mode, Curve | None], samples: int, gains: Mapping[Mode, float]
 ) -> dict[Mode, float | None]:
-    """How far below the best each mode is.
+    """How far below the best each mode is, with what it gains in a shot.
 
     Two curves are compared at a count for which both were measured: beyond that
     neither says anything.
@@ -159,7 +157,7 @@ def _decibels(
         return below_best
     first = next(iter(known.values()))
     apart = {
-        mode: _difference(curve, first, samples)
+        mode: _difference(curve, first, samples) + gains[mode]
         for mode, curve in known.items()
         if samples >= curve.samples[0]
     }
@@ -168,8 +166,7 @@ def _decibels(
 
 
 def _difference(curve: Curve, other: Curve, samples: int) -> float:
-    last = (one.samples[-1] / one.worth for one in (curve, other))
-    count = min(samples, *last)
+    count = min(samples, curve.samples[-1], other.samples[-1])
     return curve.at(count) - other.at(count)
 
 
@@ -185,9 +182,11 @@ GUIDE_SHARE = 0.65
 class Measured:
     """Seconds of a frame's parts, for the whole frame of `pixels` at full size.
 
-    `fixed`: scene sync, BVH and writing; `beauty` and `guide`: one sample; `denoise`:
-    Blender's default denoiser; `networks`: each that has run; `totals`: renders as they
-    were. None is what no render has shown yet.
+    `fixed`: scene sync, BVH, writing and all else; `beauty` and `guide`: one sample;
+    `denoise`: Blender's default denoiser; `networks`: each that has run; `reuse`: what
+    neighbours took, which is accumulated and denoised again; `totals`: frames by
+    themselves as they were. `share` is how much of the file's samples frames took in
+    the last *Same Picture*. None is what no render has shown yet.
     """
 
     pixels: int
@@ -196,40 +195,58 @@ class Measured:
     guide: float | None = None
     denoise: float | None = None
     networks: Mapping[Network, float] = field(default_factory=dict)
+    reuse: float | None = None
     totals: Mapping[Settings, float] = field(default_factory=dict)
+    share: float | None = None
 
-    def seconds(self, settings: Settings, pixels: int, model: Model) -> float | None:
-        """Those that resolved settings will about take; `pixels` may be others."""
+    def seconds(
+        self, settings: Settings, pixels: int, model: Model, radius: int = 0
+    ) -> float | None:
+        """Those that resolved settings will about take; `pixels` may be others.
+
+        `radius` frames before and after are reused.
+        """
         here = _resized(self, pixels)
-        if settings in here.totals:
+        radius = 0 if settings.is_cycles_only else radius
+        if not radius and settings in here.totals:
             return here.totals[settings]
         if here.beauty is None:
             return None
         if settings.denoising is None:
             assert settings.samples is not None
             return here.fixed + settings.samples * here.beauty
-        costs = here.costs(pixels, model)
+        costs = here.costs(pixels, model, radius)
         try:
             return None if costs is None else costs.seconds(_in_process(settings))
         except KeyError:  # a network of which nothing is known
             return None
 
-    def costs(self, pixels: int, model: Model) -> Costs | None:
+    def costs(self, pixels: int, model: Model, radius: int = 0) -> Costs | None:
         """Costs of every choice at a number of pixels; None where too little is known.
 
-        What has not run yet is taken from the model.
+        What has not run yet is taken from the model. `radius` as in `seconds`.
         """
         here = _resized(self, pixels)
         if here.beauty is None or here.denoise is None:
             return None
+        denoise = {m: here.denoise * x for m, x in model.denoiser_speed.items()}
         networks = {n: here.denoise * x for n, x in model.network_speed.items()}
         return Costs(
-            fixed=here.fixed,
+            fixed=here.fixed + here._reusing(denoise[Denoising.XRDS_HIGH], radius),
             beauty=here.beauty,
             guide=GUIDE_SHARE * here.beauty if here.guide is None else here.guide,
-            denoise={m: here.denoise * x for m, x in model.denoiser_speed.items()},
+            denoise=denoise,
             network={**networks, **here.networks},
         )
+
+    def _reusing(self, denoise: float, radius: int) -> float:
+        """Seconds that neighbours take; our denoiser takes `denoise`."""
+        if not radius:
+            return 0.0
+        if self.reuse is not None:
+            return self.reuse
+        figures = shot_figures.shipped()
+        return (2 * radius * figures.accumulate + figures.again) * denoise
 
 
 def learn(
@@ -238,20 +255,47 @@ def learn(
     pixels: int,
     seconds: Mapping[str, float],
     model: Model,
+    *,
+    frame: int = 1,
+    share: float | None = None,
 ) -> Measured:
     """What is known after one more render, of these seconds by stage.
 
     Its settings are resolved. A render at another size or in another mode adds to what
-    what is known from the ones before.
+    is known from the ones before. It is the first `frame` of a job, or a later one:
+    then what is known is the mean of them. `share` as in `Measured`.
     """
     seconds = defaultdict(float, seconds)
     before = _resized(known, pixels) if known else Measured(pixels)
-    parts = sum(value for stage, value in seconds.items() if stage != "total")
-    now = replace(
-        before,
-        fixed=seconds["sync"] + seconds["write"],
-        totals={**before.totals, settings: parts},
-    )
+    now = _learn_frame(before, settings, seconds, model)
+    if share is not None:
+        now = replace(now, share=share)
+    if frame == 1:
+        return now
+
+    means: dict[str, Any] = {}
+    for name in ("fixed", "beauty", "guide", "denoise", "reuse", "share"):
+        old, new = getattr(before, name), getattr(now, name)
+        if old is not None and new is not None:
+            means[name] = old + (new - old) / frame
+    return replace(now, **means)
+
+
+def _learn_frame(
+    before: Measured, settings: Settings, seconds: Mapping[str, float], model: Model
+) -> Measured:
+    stages = {stage: x for stage, x in seconds.items() if stage != "total"}
+    parts = sum(stages.values())
+    now = before
+    if seconds["accumulate"]:
+        # the frames ahead count in the total of the first one
+        now = replace(before, reuse=seconds["accumulate"] + seconds["again"])
+        fixed = seconds["sync"] + seconds["write"]
+    else:
+        whole = max(seconds["total"], parts)
+        now = replace(before, totals={**before.totals, settings: whole})
+        fixed = seconds["sync"] + seconds["write"] + whole - parts
+    now = replace(now, fixed=fixed)
     assert settings.samples is not None
     sample = seconds["beauty"] / settings.samples
     if settings.is_enlarged:
@@ -303,6 +347,8 @@ def _resized(known: Measured, pixels: int) -> Measured:
         beauty=of(known.beauty),
         guide=of(known.guide),
         denoise=of(known.denoise),
+        reuse=of(known.reuse),
+        share=known.share,
         networks={network: value * size for network, value in known.networks.items()},
         totals={key: value * size for key, value in known.totals.items()},
     )

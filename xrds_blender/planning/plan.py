@@ -31,6 +31,7 @@ __all__ = [
     "full_size",
     "guide_bounces",
     "neighbours",
+    "reused_less",
     "same_picture",
     "savings_but",
 ]
@@ -57,9 +58,6 @@ BOUNCE_SHARE = 0.12
 CRISP_SAMPLES = 2
 # Cryptomatte counts what covers a pixel by samples: fewer give ragged masks.
 CRYPTOMATTE_SAMPLES = 16
-
-
-_SHOWN = 6  # cuts that are named; more would not help a reader
 
 
 @dataclass(frozen=True)
@@ -280,13 +278,8 @@ def _part(facts: Facts, share: float) -> float | None:
 # --- Shots ---------------------------------------------------------------------------
 
 
-def neighbours(
-    facts: Facts, radius: int, cuts: Collection[int] = ()
-) -> tuple[Decision, ...]:
-    """The decisions of a shot whose frames reuse samples of `radius` to each side.
-
-    `cuts` are the frames at which another camera begins.
-    """
+def neighbours(facts: Facts, radius: int) -> tuple[Decision, ...]:
+    """The decisions of a shot whose frames reuse samples of `radius` to each side."""
     name, scene = "accumulation", facts.scene
     if not facts.reprojects:
         reason = "this panorama cannot be reprojected: each frame is alone"
@@ -294,10 +287,9 @@ def neighbours(
     value = f"{radius} frames to each side"
     if not scene.moving:
         reason = "nothing moves: frames differ in noise alone, and every sample counts"
-        return (Decision(name, value, reason), *_cuts(cuts))
+        return (Decision(name, value, reason),)
     reason = "pixels are found again by depth, cameras and motion, if the light agrees"
-    decisions = Decision(name, value, reason), _images(facts), *_in_part(scene)
-    return (*decisions, *_cuts(cuts))
+    return Decision(name, value, reason), _images(facts)
 
 
 def same_picture(samples: int) -> Decision:
@@ -328,34 +320,25 @@ def _images(facts: Facts) -> Decision:
     return Decision(name, "skipped", reason)
 
 
-def _in_part(scene: SceneFacts) -> tuple[Decision, ...]:
-    """What is reused less, each thing with its reason."""
+MOTION_BLUR = "Motion blur: moving things that blur reuse fewer samples"
+DEPTH_OF_FIELD = "Depth of field: blurred pixels mix many depths and reuse less"
+GLASS = "Glass: thick glass shows several things at once, so it gains less"
+VOLUMES = "Volumes: haze has no depth, it is reused with the surface behind it"
+HAIR = "Hair: strands finer than a pixel reuse fewer samples"
+
+
+def reused_less(scene: SceneFacts) -> list[str]:
+    """A sentence for each thing in a shot that gains less from its neighbours."""
+    if not scene.moving:
+        return []
     causes = {
-        "motion blur": (
-            scene.motion_blur,
-            "Cycles gives no vectors with motion blur: moving things reuse few samples",
-        ),
-        "depth of field": (scene.depth_of_field, "blurred pixels mix many depths"),
-        "volumes": (
-            scene.volumes,
-            "volumes have no depth: they are reused with the surface behind them",
-        ),
-        "hair": (scene.hair, "hair, finer than a pixel, is found again by chance"),
+        MOTION_BLUR: scene.motion_blur,
+        DEPTH_OF_FIELD: scene.depth_of_field,
+        GLASS: scene.glass,
+        VOLUMES: scene.volumes,
+        HAIR: scene.hair,
     }
-    present = {what: reason for what, (there, reason) in causes.items() if there}
-    if not present:
-        return ()
-    reason = "; ".join(present.values())
-    return (Decision("left out by pixel", ", ".join(present), reason),)
-
-
-def _cuts(cuts: Collection[int]) -> tuple[Decision, ...]:
-    if not cuts:
-        return ()
-    shown = ", ".join(map(str, sorted(cuts)[:_SHOWN]))
-    more = "" if len(cuts) <= _SHOWN else f" and {len(cuts) - _SHOWN} more"
-    reason = "a marker binds another camera: nothing is reused across"
-    return (Decision("cuts", f"frame {shown}{more}", reason),)
+    return [sentence for sentence, is_there in causes.items() if is_there]
 
 
 @dataclass(frozen=True)
@@ -368,6 +351,8 @@ class SceneFacts:
     """Some surface or volume reflects light: radiance is noisy."""
     smooth: bool = True
     """Mirrors, glass or gloss so smooth that they show others' albedo and normals."""
+    glass: bool = True
+    """Some of it bends light and does not scatter it."""
     transparent: bool = True
     volumes: bool = True
     emitters: tuple[str, ...] = ()

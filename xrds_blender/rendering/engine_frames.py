@@ -6,7 +6,6 @@ are evaluated and sampled too, those ahead as well; none is sampled twice.
 
 from __future__ import annotations
 
-import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -53,14 +52,11 @@ class EngineFrames(FrameSource[Sampled]):
     """The frames of one view layer of an animation, for one render job.
 
     `ahead` are Cycles' own passes of frames that were sampled before their turn.
-    `count` is how many were sampled since `began`.
     """
 
     method: Method
     window: Window[Sampled] = field(init=False)
     ahead: dict[int, _Passes] = field(default_factory=dict)
-    began: float = field(default_factory=time.perf_counter)
-    count: int = 0
     _call: _Call | None = None
 
     @classmethod
@@ -79,6 +75,7 @@ class EngineFrames(FrameSource[Sampled]):
             beside=None if beside is None else beside.pace,
         )
         frames.window = Window(shot, frames)
+        stages.begin_animation(len(numbers), len(numbers))
         return frames
 
     def neighbourhood(self, engine: Any, depsgraph: Any) -> Neighbourhood[Sampled]:
@@ -87,7 +84,6 @@ class EngineFrames(FrameSource[Sampled]):
         The render result then holds the frame's own passes.
         """
         number = depsgraph.scene_eval.frame_current
-        self._show(depsgraph.scene_eval)
         for old in [n for n in self.ahead if n < number]:
             del self.ahead[old]
         missing = self.window.missing(number)
@@ -145,24 +141,13 @@ class EngineFrames(FrameSource[Sampled]):
 
         return completed(self.method, frame.own, others, more)
 
-    def _show(self, scene: Any) -> None:
-        """Show how far the animation is; frames ahead are sampled already."""
-        number, end, step = scene.frame_current, scene.frame_end, scene.frame_step
-        newest = self.window.newest
-        seconds = None
-        if self.count:
-            seconds_each = (time.perf_counter() - self.began) / self.count
-            last = number - step if newest is None else newest
-            seconds = seconds_each * ((end - last) // step + 1)
-        stages.begin_frame(number, (end - number) // step, seconds)
-
     def load(self, number: int) -> Sampled:
         """Sample a frame, and keep its passes where others overwrite them."""
         call = self._call
         assert call is not None
         go_to(call.engine, call.depsgraph, number)
         sampled = self._sample(self.window.shot.is_between(number))
-        self.count += 1
+        stages.end_sampling()
         if number >= call.number != call.last:
             self.ahead[number] = call.passes.all_passes()
         return sampled

@@ -9,14 +9,16 @@ from typing import Any
 
 from ..cycles.view import picture_size
 from ..planning.estimates import resolved, shot_memory
+from ..planning.offers import Offers, cycles_line, in_english, offer_line, source_line
 from ..planning.plan import deadline, neighbours, same_picture
 from ..planning.request import Request
-from ..scene.contents import cuts, frame_range
+from ..scene.contents import frame_range
 from ..scene.remarks import remarks
+from .advice import advice
 from .blender_job import call_engine
 from .facts import find_facts
-from .history import scene_settings
-from .modes import frame_seconds
+from .history import scene_settings, seconds
+from .modes import offers_of
 from .pace.same_picture import can_save
 from .sampling import has_neighbours
 from .time_budget import Timed, in_time
@@ -49,10 +51,11 @@ def _described(
     depsgraph: Any, timed: Timed, scene: Any, shot: Sequence[int]
 ) -> dict[str, Any]:
     request, radius = timed.request, timed.request.settings.temporal_radius
+    is_shot = len(shot) > 1
     facts = find_facts(depsgraph, request.settings)
     decisions = (*timed.decisions, *request.plan(facts).decisions)
-    if radius and len(shot) > 1:
-        decisions += neighbours(facts, radius, cuts(scene, shot))
+    if radius and is_shot:
+        decisions += neighbours(facts, radius)
     if can_save(scene, request, len(shot)):
         decisions += (same_picture(scene.cycles.samples),)
     if request.deadline is not None:
@@ -60,11 +63,24 @@ def _described(
     size = picture_size(scene.render)
     pace = request.deadline and request.deadline / len(shot)
     settings = resolved(request.settings, scene_settings(scene))
+    found = offers_of(scene, request, len(shot)) if is_shot else None
+    lines = advice(scene, facts.scene, request, shot)
     return {
         "frames": len(shot),
-        "seconds": pace or frame_seconds(scene, settings, radius),
-        "memory": shot_memory(*size, radius, settings.scale) if len(shot) > 1 else 0,
+        "seconds": pace or seconds(scene, settings, radius if is_shot else 0),
+        "memory": shot_memory(*size, radius, settings.scale) if is_shot else 0,
         "facts": asdict(facts),
         "decisions": [asdict(each) for each in decisions],
-        "remarks": remarks(scene, request),
+        "offers": [asdict(offer) for offer in found.offers] if found else [],
+        "summary": _summary(found) if found else [],
+        "remarks": [
+            *(in_english(text, **values) for text, values in lines),
+            *remarks(scene, request),
+        ],
     }
+
+
+def _summary(found: Offers) -> list[str]:
+    """What the animation takes, and what XRDS offers: the lines of the panel."""
+    offered = (offer_line(offer, found.animation) for offer in found.offers)
+    return [cycles_line(found), *offered, source_line(found)]

@@ -5,15 +5,15 @@ Remembered for as long as Blender runs and the file is open, for the panel to sh
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from ..cycles import session
 from ..cycles.view import picture_size
-from ..internals.lifetimes import FILE
+from ..internals.lifetimes import FILE, RENDER_JOB
 from ..planning import budget
-from ..planning.budget import Costs
 from ..planning.estimates import Measured, SceneSettings, learn, resolved
 from ..planning.settings import Denoising, Settings
 
@@ -71,19 +71,35 @@ def _denoising(scene: Any) -> Denoising | None:
     return Denoising(f"{cycles.denoising_quality}-{cycles.denoising_prefilter}")
 
 
+@dataclass
+class _Frames:
+    """How many frames of a render job were remembered, by scene and view layer."""
+
+    counts: Counter[tuple[str, str]] = field(default_factory=Counter)
+
+
 def remember(
     layer: Layer,
     settings: Settings,
     seconds: Mapping[str, float],
     devices: Mapping[str, str] | None = None,
+    share: float | None = None,
 ) -> None:
-    """Remember a finished render, `devices` as of `LastRender`."""
+    """Remember a finished render, `devices` as of `LastRender`, `share` of `Measured`.
+
+    What is known of an animation is the mean of its frames so far.
+    """
+    counts = RENDER_JOB.of(_Frames).counts
+    counts[layer.scene, layer.name] += 1
+    frame = counts[layer.scene, layer.name]
     settings, seconds = resolved(settings, layer.settings), dict(seconds)
     known, last = FILE.of(_Known), LastRender(settings, seconds, devices or {})
     known.last.setdefault(layer.scene, {})[layer.name] = last
     layers = known.measured.setdefault(layer.scene, {})
     before, model = layers.get(layer.name), budget.shipped()
-    layers[layer.name] = learn(before, settings, layer.pixels, seconds, model)
+    layers[layer.name] = learn(
+        before, settings, layer.pixels, seconds, model, frame=frame, share=share
+    )
 
 
 def last(scene: Any) -> LastRender | None:
@@ -97,31 +113,31 @@ def last(scene: Any) -> LastRender | None:
     return replace(done[-1], seconds=seconds)
 
 
-def seconds(scene: Any, settings: Settings) -> float | None:
+def seconds(scene: Any, settings: Settings, radius: int = 0) -> float | None:
     """What a frame of the scene will about take; None where nothing is known.
 
-    The settings are resolved.
+    The settings are resolved; `radius` frames before and after are reused.
     """
     width, height = picture_size(scene.render)
-    known = FILE.of(_Known).measured.get(scene.name, {})
-    total = 0.0
-    for layer in scene.view_layers:
-        if not layer.use:
-            continue
-        if layer.name not in known:
+    model, total = budget.shipped(), 0.0
+    for known in _measured(scene):
+        if known is None:
             return None
-        spent = known[layer.name].seconds(settings, width * height, budget.shipped())
+        spent = known.seconds(settings, width * height, model, radius)
         if spent is None:
             return None
         total += spent
     return total
 
 
-def costs(scene: Any) -> Costs | None:
-    """Costs of a frame's parts; None where unknown, or for several layers."""
-    names = [layer.name for layer in scene.view_layers if layer.use]
+def share(scene: Any) -> float | None:
+    """How much of the file's samples frames took in the last *Same Picture*."""
+    shares = [known.share for known in _measured(scene) if known]
+    known = [share for share in shares if share is not None]
+    return max(known, default=None)
+
+
+def _measured(scene: Any) -> list[Measured | None]:
+    """What is known of each layer that is rendered."""
     known = FILE.of(_Known).measured.get(scene.name, {})
-    if len(names) != 1 or names[0] not in known:
-        return None
-    width, height = picture_size(scene.render)
-    return known[names[0]].costs(width * height, budget.shipped())
+    return [known.get(layer.name) for layer in scene.view_layers if layer.use]

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
-from ..planning import budget
+from ..planning import budget, shot_figures
 from ..planning import estimates as estimating
-from ..planning.estimates import Capabilities, Estimate
+from ..planning.estimates import Capabilities, Estimate, resolved
+from ..planning.offers import Animation, Offers, offers
 from ..planning.request import Request
 from ..planning.settings import Denoising, Mode, Settings
+from ..scene.contents import stands_still
 from . import history
 from .loading import capabilities
+from .pace.same_picture import obstacle
+from .sampling import has_neighbours
 
 BEST = Denoising.XRDS_HIGH
 """What automatic takes: `best` doubles the seconds for 0.2 to 0.3 decibels."""
@@ -24,23 +29,51 @@ def estimates(
     In a `shot` frames have the samples of their neighbours.
     """
     radius = settings.temporal_radius if shot else 0
+    known, gain = history.scene_settings(scene), 0.0
+    if radius:
+        samples = settings.samples or known.samples
+        is_still = stands_still(scene.camera)
+        gain = shot_figures.shipped().gain(samples, radius, is_still)
+    return estimating.estimates(
+        settings,
+        known,
+        here,
+        budget.shipped(),
+        lambda resolved: history.seconds(scene, resolved, radius),
+        gain,
+    )
 
-    def seconds(resolved: Settings) -> float | None:
-        return frame_seconds(scene, resolved, radius)
 
-    known, model = history.scene_settings(scene), budget.shipped()
-    return estimating.estimates(settings, known, here, model, seconds, radius)
+def offers_of(scene: Any, request: Request, frames: int) -> Offers:
+    """What Cycles takes for an animation of so many frames, and what XRDS offers."""
+    settings, known = request.settings, history.scene_settings(scene)
+    radius = settings.temporal_radius
+    if not has_neighbours(scene, request) or settings.mode is not Mode.FULL_SIZE:
+        radius = 0
+    ours = replace(settings, share=1.0, samples=None)
+    by_cycles = replace(ours, mode=Mode.CYCLES_ONLY, denoising=None)
+    cycles = history.seconds(scene, resolved(by_cycles, known))
+    whole = resolved(ours, known)
 
-
-def frame_seconds(scene: Any, resolved: Settings, radius: int) -> float | None:
-    """What a frame will about take that reuses `radius` frames before and after.
-
-    None where nothing is known; the settings are resolved.
-    """
-    costs = history.costs(scene)
-    if not radius or costs is None or resolved.is_cycles_only:
-        return history.seconds(scene, resolved)
-    return costs.in_shot(radius).seconds(resolved)
+    one, two = (
+        history.seconds(scene, replace(whole, samples=n), radius) for n in (1, 2)
+    )
+    sample = 0.0 if one is None or two is None else two - one
+    animation = Animation(
+        frames,
+        known.samples,
+        cycles,
+        fixed=None if one is None else one - sample,
+        sample=sample,
+        radius=radius,
+        is_still=bool(radius) and stands_still(scene.camera),
+        has_threshold=scene.cycles.use_adaptive_sampling,
+        obstacle=obstacle(scene, request, frames),
+        share=history.share(scene),
+    )
+    model = budget.shipped()
+    curve = model.errors.full_size[BEST]
+    return offers(animation, curve, shot_figures.shipped())
 
 
 def in_mode(request: Request, mode: Mode) -> Request:

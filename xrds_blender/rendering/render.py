@@ -21,6 +21,7 @@ from xrds_core.overlap import Overlap
 from ..cycles import session
 from ..cycles.session import samples_on_card
 from ..internals.lifetimes import RENDER_JOB
+from ..planning.plan import SAME_PICTURE
 from ..planning.request import Request, render_request
 from ..scene.contents import frame_range
 from . import history, stages, torch_folder
@@ -47,6 +48,13 @@ class Animations:
     """Those of one render job, by scene and view layer: no edit comes between."""
 
     by_layer: dict[tuple[str, str], _Animation] = field(default_factory=dict)
+
+
+@dataclass
+class _Alone:
+    """View layers of one render job whose frames are rendered by themselves."""
+
+    layers: set[str] = field(default_factory=set)
 
 
 def method_of(
@@ -87,17 +95,24 @@ def render_frame(engine: Any, depsgraph: Any, request: Request) -> Picture:
 
     As `render_alone`; in an animation with the samples of its neighbours.
     """
-    if engine.is_animation:
-        scene = depsgraph.scene_eval
-        left = (scene.frame_end - scene.frame_current) // scene.frame_step
-        stages.begin_frame(scene.frame_current, left)
-        if not _renders_single_frames():
-            if has_neighbours(scene, request):
-                return _render_in_animation(engine, depsgraph, request)
-            if request.deadline is not None:
-                alone = request.with_settings(temporal_radius=0)
-                return _render_in_animation(engine, depsgraph, alone)
-    return render_alone(engine, depsgraph, request)
+    if not engine.is_animation or _renders_single_frames():
+        return render_alone(engine, depsgraph, request)
+    scene = depsgraph.scene_eval
+    stages.begin_frame(scene.frame_current, scene.frame_end)
+    try:
+        if has_neighbours(scene, request):
+            return _render_in_animation(engine, depsgraph, request)
+        if request.deadline is not None:
+            alone = request.with_settings(temporal_radius=0)
+            return _render_in_animation(engine, depsgraph, alone)
+        layers = RENDER_JOB.of(_Alone).layers
+        layer = depsgraph.view_layer_eval.name
+        if layer not in layers:
+            layers.add(layer)
+            stages.begin_animation(0, len(frame_range(scene)))
+        return render_alone(engine, depsgraph, request)
+    finally:
+        stages.end_frame()
 
 
 def render_alone(
@@ -163,7 +178,10 @@ def _remembered(picture: Picture, layer: history.Layer, start: float) -> Picture
     """The picture with how long it took, which is remembered."""
     picture.seconds["total"] = time.perf_counter() - start
     assert picture.settings is not None
-    history.remember(layer, picture.settings, picture.seconds, _devices(picture))
+    is_paced = any(each.decision == SAME_PICTURE for each in picture.plan)
+    share = picture.settings.share if is_paced else None
+    devices = _devices(picture)
+    history.remember(layer, picture.settings, picture.seconds, devices, share)
     return picture
 
 

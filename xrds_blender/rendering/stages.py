@@ -1,8 +1,9 @@
 """What a running render is doing now, how far it has come, and how long it will take.
 
 Cycles reports to Blender how far each of its renders is, so Blender's own bar would run
-several times. The status bar therefore shows what is worked out here, from the seconds
-of the stages so far and those that each kind of stage took before.
+several times. The status bar therefore shows what is worked out here: of an animation
+from the seconds that frames took to be sampled and to be finished, of a still from
+those of its stages so far and of each kind of stage before.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from xrds_core.progress import duration
+from xrds_core.progress import ShotClock, duration
 
 from ..cycles import session
 from ..internals import status
@@ -27,6 +28,7 @@ STAGES = (
     "beauty",
     "accumulate",
     "denoise",
+    "again",
     "guides",
     "network",
     "write",
@@ -57,10 +59,11 @@ class _Run:
 
 @dataclass
 class Current:
-    """The render that goes on, if any, and what of an animation is left after it."""
+    """The render that goes on, if any, and the frames of its animation."""
 
     run: _Run | None = None
-    frames_left: str = ""
+    frame: str = ""
+    clock: ShotClock | None = None
 
 
 @dataclass
@@ -93,15 +96,31 @@ def begin(engine: Any, stage: str, number: int, of: int = 3) -> None:
     engine.update_stats("XRDS", stage)
 
 
-def begin_frame(number: int, left: int, seconds: float | None = None) -> None:
-    """Note which frame of an animation has begun, and what is left after it.
+def begin_animation(to_sample: int, to_finish: int) -> None:
+    """Note the frames of an animation, or of one more of its view layers."""
+    state = RENDER_JOB.of(Current)
+    if state.clock is None:
+        state.clock = ShotClock()
+    state.clock.add(to_sample, to_finish)
 
-    `seconds`: an estimate for this frame and those after it; None without one.
-    """
-    rest = "the last one" if not left else f"{left} left"
-    if seconds is not None:
-        rest += f", about {duration(seconds)}"
-    RENDER_JOB.of(Current).frames_left = f"Frame {number} ({rest}). "
+
+def begin_frame(number: int, of: int) -> None:
+    """Note which frame of an animation has begun, and the number of the last."""
+    RENDER_JOB.of(Current).frame = f"frame {number} of {of}, "
+
+
+def end_sampling() -> None:
+    """Note that a frame of an animation was sampled."""
+    clock = RENDER_JOB.of(Current).clock
+    if clock is not None:
+        clock.sampled()
+
+
+def end_frame() -> None:
+    """Note that a frame of an animation is finished."""
+    clock = RENDER_JOB.of(Current).clock
+    if clock is not None:
+        clock.finished()
 
 
 def reporter(engine: Any) -> Callable[[float], bool]:
@@ -122,27 +141,35 @@ def end() -> None:
     state = RENDER_JOB.of(Current)
     if state.run is not None and state.run.reported >= 1.0:
         _learn(state.run, time.perf_counter())
-    state.run, state.frames_left = None, ""
+    state.run, state.frame = None, ""
 
 
 def current() -> str | None:
-    """What is being done and how long it will take, None between renders."""
+    """What is being done and how long all of it will take, None between renders."""
     state = RENDER_JOB.of(Current)
     run = state.run
     if run is None:
         return None
+    if state.clock is not None:
+        left = state.clock.left()
+        time_left = "" if left is None else f", all frames in {duration(left)}"
+        return f"XRDS: {state.frame}{run.stage.lower()}{time_left}"
     left = _left(run)
     time_left = "" if left is None else f", {_clock(left)} left"
-    return f"{state.frames_left}XRDS {run.number}/{run.of}: {run.stage}{time_left}"
+    return f"XRDS {run.number}/{run.of}: {run.stage}{time_left}"
 
 
 def show() -> None:
-    """Set Blender's progress bar to the part of the whole render that is done.
+    """Set Blender's progress bar to the part of all the work that is done.
 
     For the main thread, while the engine renders.
     """
-    run = RENDER_JOB.of(Current).run
+    state = RENDER_JOB.of(Current)
+    run = state.run
     if run is None:
+        return
+    if state.clock is not None:
+        run.engine.update_progress(state.clock.fraction())
         return
     spent, left = time.perf_counter() - run.start, _left(run)
     part = 0.0 if left is None else spent / max(spent + left, 1e-6)

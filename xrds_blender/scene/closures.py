@@ -25,6 +25,7 @@ _DIFFUSE = {
     "BSDF_TOON",
 }
 _HAIR = {"BSDF_HAIR", "BSDF_HAIR_PRINCIPLED"}
+_GLASS = {"BSDF_GLASS", "BSDF_REFRACTION"}
 _MICROFACETS = {"BSDF_GLOSSY", "BSDF_GLASS", "BSDF_REFRACTION", "BSDF_METALLIC"}
 _DISTRIBUTIONS = {"GGX", "MULTI_GGX", "BECKMANN", "PHYSICAL_CONDUCTOR", "F82"}
 _VOLUMES = {
@@ -82,6 +83,8 @@ class Closures:
     """Some closure reflects or transmits light, so that its radiance is noisy."""
     smooth: bool = False
     """Albedo and normal may be those of what a mirror or glass shows."""
+    glass: bool = False
+    """Light goes through it without being scattered, and is bent."""
     transparent: bool = False
     emits: bool = False
     volume: bool = False
@@ -151,7 +154,8 @@ def of_node(node: Any) -> Closures:
     if kind == "BSDF_PRINCIPLED":
         return _principled(node)
     if kind in _MICROFACETS:
-        return Closures(scatters=True, smooth=_is_smooth(node))
+        smooth = _is_smooth(node)
+        return Closures(scatters=True, smooth=smooth, glass=smooth and kind in _GLASS)
     if kind in {"EMISSION", "BACKGROUND"}:
         return Closures(emits=_is_lit(node, "Color", "Strength"))
     if all(socket.type != "SHADER" for socket in node.outputs):
@@ -172,6 +176,7 @@ def _principled(node: Any) -> Closures:
     return Closures(
         scatters=True,
         smooth=coat or (gloss and _is_smooth(node)),
+        glass=glass and _is_smooth(node),
         transparent=bool(_links(alpha)) or alpha.default_value < 1.0,
         emits=_is_lit(node, "Emission Color", "Emission Strength"),
         subsurface=subsurface,

@@ -60,6 +60,7 @@ def scene_facts(depsgraph: Any) -> SceneFacts:
         surfaces=bool(solid),
         scatters=surface.scatters or air.scatters,
         smooth=surface.smooth,
+        glass=surface.glass,
         transparent=surface.transparent,
         volumes=surface.volume or air.volume or any(o.type == "VOLUME" for o in solid),
         emitters=tuple(
@@ -209,6 +210,11 @@ def stands_still(camera: Any) -> bool:
 def frame_range(scene: Any) -> list[int]:
     """Numbers of the frames that Blender would render as the animation."""
     return list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+
+
+def frame_count(scene: Any) -> int:
+    """How many these are."""
+    return len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
 
 
 def moves_in_time(scene: Any) -> bool:

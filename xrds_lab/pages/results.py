@@ -69,60 +69,61 @@ class Results:
 
     folder: Path
 
-    def _read(self, name: str) -> dict[str, Any]:
+    def read(self, name: str) -> dict[str, Any]:
+        """Return what a file below the folder holds."""
         return json.loads((self.folder / name).read_text("utf-8"))
 
     @cached_property
     def bench(self) -> dict[str, Any]:
         """Stills: errors against seconds."""
-        return self._read("bench/results.json")
+        return self.read("bench/results.json")
 
     @cached_property
     def shots(self) -> dict[str, Any]:
         """Shots of the seven scenes; means over seeds."""
-        found = self._read("shots/results.json")
+        found = self.read("shots/results.json")
         return found | {"shots": over_seeds(found["shots"])}
 
     @cached_property
     def held_out(self) -> Rows:
         """Shots on which no constant was chosen: all methods."""
-        return self._read("held-out/results.json")["shots"]
+        return self.read("held-out/results.json")["shots"]
 
     @cached_property
     def installs(self) -> Rows:
         """Sizes and seconds of installs, the smallest first."""
-        return self._read("install.json")["rows"]
+        return self.read("install.json")["rows"]
 
     @cached_property
     def same_picture(self) -> Rows:
         """*Same Picture*: seconds and errors."""
-        return self._read("shots/same-picture.json")["shots"]
+        return self.read("shots/same-picture.json")["shots"]
 
     @cached_property
     def gallery(self) -> Rows:
         """Small shots of what films hold."""
-        return self._read("gallery/results.json")["shots"]
+        return self.read("gallery/results.json")["shots"]
 
     @cached_property
     def parts(self) -> Rows:
         """Parts of the light that are lit; of each the PSNR."""
-        rows = self._read("light-parts/results.json")["parts"]
+        rows = self.read("light-parts/results.json")["parts"]
         return [x for x in rows if x["sum"] and x.get("raw", _UNLIT) < _UNLIT]
 
     @cached_property
     def low_budgets(self) -> Rows:
         """Stills with no time for a sample per pixel."""
-        return self._read("low_budgets/low_budgets.json")["rows"]
+        return self.read("low_budgets/low_budgets.json")["rows"]
 
     @cached_property
     def standard(self) -> dict[str, Any]:
         """Errors of the networks for as many samples."""
-        return self._read("standard.json")
+        return self.read("standard.json")
 
     @cached_property
     def card(self) -> dict[str, Any]:
         """Seconds on a graphics card."""
-        return self._read("card/h200.json")
+        return self.read("card/h200.json")
 
     def shot_rows(self, motion: str, samples: int, radius: int) -> Rows:
         """Return XRDS' rows of `shots` with their `gain` and `flicker_ratio`.
@@ -136,7 +137,7 @@ class Results:
         """Return what shots of radius 4 gain over Cycles + OIDN, by scene."""
         rows = self.shot_rows(motion, samples, REACH)
         if not rows:  # measured, but kept in the notebook alone
-            typed = self._read("shots/gains.json")["gains"]
+            typed = self.read("shots/gains.json")["gains"]
             rows = only(typed, motion=motion, samples=samples)
         return {x["scene"]: x["gain"] for x in rows}
 

@@ -24,18 +24,24 @@ from xrds_blender.interface import (
     translations,
 )
 from xrds_blender.interface.panel import (
+    animation,
     cycles_panels,
     messages,
     panels,
     paragraph,
+    scene_cache,
     summary,
 )
-from xrds_blender.internals.lifetimes import FILE, PROCESS
+from xrds_blender.internals.lifetimes import FILE, PROCESS, RENDER_JOB
 from xrds_blender.planning import estimates
 from xrds_blender.planning.estimates import Capabilities
+from xrds_blender.planning.offers import EXPECTED, NOTHING_GAINED, Offer
+from xrds_blender.planning.plan import MOTION_BLUR
 from xrds_blender.planning.settings import Mode, Network
 from xrds_blender.rendering import history, stages
+from xrds_blender.rendering.advice import ALONE, NO_CAMERA
 from xrds_blender.rendering.modes import estimates as estimates_of
+from xrds_blender.rendering.modes import offers_of
 
 
 @pytest.fixture(autouse=True)
@@ -217,7 +223,7 @@ def test_the_table_tells_seconds_after_a_render() -> None:
     scene.render.engine = "XRDS"
     bpy.ops.render.render()
     told = drawn(panels.XRDS_PT_settings)
-    assert "Estimated Time" in told
+    assert "Time" in told
     row = told.index("Full Size")
     assert told[row + 1].endswith(" s")
     last = dict(summary.last_render(history.last(scene)))
@@ -265,7 +271,7 @@ def moving(scene: bpy.types.Scene) -> None:
         cube.location.x = frame
         cube.keyframe_insert("location", frame=frame)
     bpy.context.view_layer.update()
-    summary.forget()
+    scene_cache.forget()
 
 
 def test_a_file_where_nothing_moves_speaks_of_no_animation() -> None:
@@ -279,56 +285,118 @@ def test_an_animation_comes_first() -> None:
     pytest.importorskip("mitsuba_oidn")
     scene = bpy.context.scene
     moving(scene)
-    told = drawn(panels.XRDS_PT_settings)
-    assert told[:5] == ["Animation, 20 frames", "Cycles", "?", "XRDS", "?"]
-    assert told[5:7] == ["Picture", "cleaner"]
-    said = " ".join(told)
-    assert summary.UNKNOWN in said
-    assert summary.STILLS in said
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 64, False
+    told = " ".join(drawn(panels.XRDS_PT_settings))
+    assert told.startswith("This animation, 20 frames: one frame (F12) tells its time ")
+    assert ("The same picture, " in told) == has_subsets(scene)
+    assert "The same samples: +" in told
+    assert EXPECTED in told
     assert "Neighbouring Frames" in rows(scene)
     scene.camera.data.type = "PANO"
-    told = drawn(panels.XRDS_PT_settings)
-    assert told[told.index("XRDS") + 3] == "same"
-    assert summary.ALONE in " ".join(told)
+    told = " ".join(drawn(panels.XRDS_PT_settings))
+    assert "The same" not in told
+    assert NOTHING_GAINED in told
+    assert ALONE in told
     assert "Neighbouring Frames" not in rows(scene)
 
 
-def expected(scene: bpy.types.Scene) -> summary.Expected:
-    request = properties.request_of(scene.xrds)
-    found = estimates_of(scene, request.settings, ALL, summary.is_shot(scene, request))
-    return summary.expected(scene, request, ALL, found)
-
-
-def test_seconds_of_an_animation_are_those_of_its_frames() -> None:
-    pytest.importorskip("mitsuba_oidn")
-    scene = bpy.context.scene
-    moving(scene)
-    scene.render.resolution_x, scene.render.resolution_y = 64, 48
-    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 16, False
+def rendered(scene: bpy.types.Scene, **seconds: float) -> None:
+    """Remember a frame of these seconds by stage, 64 x 48 pixels."""
+    render = scene.render
+    render.resolution_x, render.resolution_y = 64, 48
     request = properties.request_of(scene.xrds)
     layer = history.Layer(
         scene.name, "ViewLayer", 64 * 48, history.scene_settings(scene)
     )
-    seconds = {"sync": 1.0, "beauty": 32.0, "denoise": 2.0}
     history.remember(layer, request.settings, seconds)
-    found = expected(scene)
-    assert found.cycles is not None
-    assert found.cycles > 33.0  # and Blender's denoiser
-    assert found.ours is not None
-    assert found.ours > 35.0  # and neighbours
-    assert not found.at_most
-    told = {x.mode: x.seconds for x in estimates_of(scene, request.settings, ALL, True)}
-    assert told[Mode.FULL_SIZE] == found.ours  # the table agrees with the lines above
-    assert told[Mode.CYCLES_ONLY] == found.cycles
-    alone = estimates_of(scene, request.settings, ALL)
-    assert {x.mode: x.seconds for x in alone}[Mode.FULL_SIZE] < found.ours
-    scene.xrds.mode, scene.xrds.animation = "full_size", "same_picture"
-    same = expected(scene)
-    assert (same.picture, same.at_most) == ("same", has_subsets(scene))
-    scene.xrds.animation, scene.xrds.deadline = "deadline", 600.0
-    late = expected(scene)
-    assert late.ours == pytest.approx(30.0)
+    RENDER_JOB.end()
+
+
+def offers(scene: bpy.types.Scene) -> dict[str, Offer]:
+    found = offers_of(scene, properties.request_of(scene.xrds), 20)
+    return {offer.kind: offer for offer in found.offers}
+
+
+def test_an_offer_is_taken_by_its_button() -> None:
+    pytest.importorskip("mitsuba_oidn")
+    scene = bpy.context.scene
+    moving(scene)
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 64, False
+    rendered(scene, sync=1.0, beauty=64.0, denoise=2.0)
+    found = offers(scene)
+    told = drawn(panels.XRDS_PT_settings)
+    assert "23 min" in told[0]  # 20 frames of 65 s and Blender's own denoiser
+    assert found["deadline"].seconds == pytest.approx(20 * (65 + 2.0 / 0.5513))
+    if has_subsets(scene):
+        assert found["same_picture"].seconds < 0.8 * found["deadline"].seconds
+    bpy.ops.xrds.take_offer(kind="deadline", seconds=found["deadline"].seconds)
+    settings = scene.xrds
+    assert (settings.mode, settings.animation) == ("automatic", "deadline")
+    assert settings.deadline == pytest.approx(found["deadline"].seconds)
+    assert scene.cycles.samples == 64
+    bpy.ops.xrds.take_offer(kind="same_picture")
+    assert settings.animation == "same_picture"
     FILE.end()
+
+
+def test_the_table_agrees_with_the_lines_above_it() -> None:
+    pytest.importorskip("mitsuba_oidn")
+    scene = bpy.context.scene
+    moving(scene)
+    scene.cycles.samples, scene.cycles.use_adaptive_sampling = 16, False
+    rendered(scene, sync=1.0, beauty=32.0, denoise=2.0)
+    request = properties.request_of(scene.xrds)
+    shot = {x.mode: x.seconds for x in estimates_of(scene, request.settings, ALL, True)}
+    found = offers_of(scene, request, 20)
+    assert found.cycles == pytest.approx(20 * shot[Mode.CYCLES_ONLY])
+    whole = found.animation.seconds(16.0)
+    assert whole == pytest.approx(20 * shot[Mode.FULL_SIZE])
+    alone = estimates_of(scene, request.settings, ALL)
+    assert {x.mode: x.seconds for x in alone}[Mode.FULL_SIZE] == pytest.approx(35.0)
+    assert shot[Mode.FULL_SIZE] > 35.0  # and neighbours
+    FILE.end()
+
+
+def test_notes_are_told_where_they_are_true(tmp_path: Path) -> None:
+    scene = bpy.context.scene
+    moving(scene)
+
+    def notes() -> str:
+        bpy.context.view_layer.update()
+        scene_cache.forget()
+        request = properties.request_of(scene.xrds)
+        return " ".join(animation.notes(scene, request))
+
+    scene.render.filepath = str(tmp_path / "frames" / "####")
+    assert notes() == ""
+    scene.render.use_motion_blur = True
+    assert MOTION_BLUR in notes()
+    (tmp_path / "file").touch()
+    scene.render.filepath = str(tmp_path / "file" / "####")
+    assert "cannot be written" in notes()
+    scene.xrds.animation, scene.frame_end = "same_picture", 9
+    assert "16 frames" in notes()
+    scene.camera = None
+    assert NO_CAMERA in notes()
+
+
+def test_a_large_scene_is_looked_at_after_the_panel_was_drawn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = bpy.context.scene
+    moving(scene)
+    monkeypatch.setattr(scene_cache, "_SMALL", 0)
+    app = SimpleNamespace(background=False, timers=bpy.app.timers)
+    fake = SimpleNamespace(app=app, data=bpy.data, context=bpy.context)
+    monkeypatch.setattr(scene_cache, "bpy", fake)
+    assert not scene_cache.is_animation(scene)  # not known yet
+    assert scene_cache._look_later() > 0.0  # not quiet yet
+    monkeypatch.setattr(scene_cache, "_QUIET", 0.0)
+    assert scene_cache._look_later() is None
+    assert scene_cache.is_animation(scene)
+    scene_cache.forget()
+    assert scene_cache.is_animation(scene)  # as it was, until it is looked at again
+    bpy.app.timers.unregister(scene_cache._look_later)
 
 
 def test_the_last_render_tells_its_card() -> None:
@@ -355,8 +423,19 @@ def test_cycles_users_see_it_too() -> None:
     assert panels.XRDS_PT_under_cycles.poll(context)
     layout = Layout()
     panels.XRDS_PT_under_cycles.draw(SimpleNamespace(layout=layout), context)
-    assert "Animation, 20 frames" in layout.drawn
+    assert layout.drawn[0].startswith("This animation, 20 frames")
+    assert not hasattr(panels.XRDS_PT_under_cycles, "bl_options")  # it is open
     assert layout.drawn[-2:] == ["xrds.render", "Render Animation with XRDS"]
+
+
+def test_other_engines_say_what_will_be_used() -> None:
+    context, layout = Context(), Layout()
+    context.engine = "BLENDER_WORKBENCH"
+    assert panels.XRDS_PT_under_others.poll(context)
+    panels.XRDS_PT_under_others.draw(SimpleNamespace(layout=layout), context)
+    assert "Cycles Samples" in layout.drawn
+    context.engine = "CYCLES"
+    assert not panels.XRDS_PT_under_others.poll(context)
 
 
 def remarks_of(at_hand: Capabilities) -> list[tuple[str, str]]:
@@ -573,12 +652,14 @@ def running_engine(text: object, shown: list[float]) -> SimpleNamespace:
 def test_the_status_bar_tells_the_frames_left(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(PROCESS.of(stages.Speeds), "seconds", {})
     engine = running_engine(ctypes.create_string_buffer(1024), [])
-    stages.begin_frame(12, 36, 754.0)
+    RENDER_JOB.end()
+    stages.begin_animation(0, 48)
+    stages.begin_frame(12, 48)
     stages.begin(engine, "Samples", 1, 2)
-    assert stages.current() == "Frame 12 (36 left, about 13 min). XRDS 1/2: Samples"
+    assert stages.current() == "XRDS: frame 12 of 48, samples"
+    stages.end_frame()
+    time_left = stages.current().removeprefix("XRDS: frame 12 of 48, samples, ")
+    assert time_left.startswith("all frames in ")
     stages.end()
     assert stages.current() is None
-    stages.begin_frame(48, 0)
-    stages.begin(engine, "Samples", 1, 2)
-    assert stages.current() == "Frame 48 (the last one). XRDS 1/2: Samples"
-    stages.end()
+    RENDER_JOB.end()

@@ -12,11 +12,28 @@ import pytest
 
 from xrds_blender import interface
 from xrds_blender.interface import registration, translations
-from xrds_blender.planning import estimates
+from xrds_blender.planning import estimates, offers, plan
+from xrds_blender.rendering import advice
+from xrds_blender.rendering.pace import same_picture
 
 FOLDER = Path(interface.__file__).parent
-# The panel shows what a way lacks.
-SOURCES = [*sorted(FOLDER.rglob("*.py")), Path(str(estimates.__file__))]
+# The panel shows what a mode lacks, offers and advice.
+SHOWN = (estimates, offers, advice)
+SOURCES = [*sorted(FOLDER.rglob("*.py")), *(Path(str(x.__file__)) for x in SHOWN)]
+# Other modules have a few such sentences beside what they call things.
+SENTENCES = {
+    plan.MOTION_BLUR,
+    plan.DEPTH_OF_FIELD,
+    plan.GLASS,
+    plan.VOLUMES,
+    plan.HAIR,
+    same_picture.FEW_FRAMES,
+    same_picture.FEW_SAMPLES,
+    same_picture.OLD_BLENDER,
+    same_picture.ONE_SUBSET,
+    same_picture.OWN_SAMPLES,
+    same_picture.OTHER_MODE,
+}
 WORDS = translations.read()
 # Shown as they are in every language.
 NAMES = {"XRDS", "Cycles", "CPU", "Metal", "Error: "}
@@ -94,6 +111,7 @@ def texts() -> set[Text]:
     registration.ensure_registered()
     told = {text for item in own_types() for text in texts_of(item)}
     told |= {text for path in SOURCES for text in texts_in(path)}
+    told |= {(None, sentence) for sentence in SENTENCES}
     return {(context, text) for context, text in told if text and text not in NAMES}
 
 
@@ -123,8 +141,8 @@ def test_translations_are_whole(language: str) -> None:
     for pairs in WORDS[language].values():
         for english, text in pairs.items():
             assert text.strip(), english
-            places = re.findall(r"{\w*}", english)
-            assert sorted(re.findall(r"{\w*}", text)) == sorted(places), english
+            places = re.findall(r"{[^}]*}", english)
+            assert sorted(re.findall(r"{[^}]*}", text)) == sorted(places), english
 
 
 def test_there_are_german_and_japanese() -> None:

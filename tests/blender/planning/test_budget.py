@@ -53,28 +53,6 @@ def test_curve_is_linear_in_doublings_and_goes_on() -> None:
     assert [curve.at(n) for n in (1, 2, 4, 16)] == [20.0, 22.0, 24.0, 24.0]
 
 
-def test_a_shot_pays_for_its_neighbours() -> None:
-    plain = replace(PLAIN, samples=3)
-    low, reuse = (
-        replace(LOW, samples=8),
-        2 * 4 * budget.ACCUMULATION * 2.0,
-    )  # of the quickest denoiser's seconds
-    alone = COSTS.denoise[plain.denoising]  # the frame by itself
-    assert COSTS.in_shot(4).seconds(plain) == pytest.approx(
-        COSTS.seconds(plain) + reuse + alone
-    )
-    assert COSTS.in_shot(4).seconds(low) == pytest.approx(COSTS.seconds(low) + reuse)
-    assert COSTS.in_shot(0).seconds(plain) == COSTS.seconds(plain)
-
-
-def test_in_a_shot_a_sample_counts_for_more() -> None:
-    shot = ERRORS.in_shot(3)  # three neighbours' worth and its own
-    assert shot.psnr(replace(PLAIN, samples=1)) == ERRORS.psnr(
-        replace(PLAIN, samples=4)
-    )
-    assert ERRORS.in_shot(0).psnr(replace(PLAIN, samples=1)) == 24.0
-
-
 def test_curve_never_falls() -> None:
     assert Curve.of({1: 20.0, 2: 25.0, 4: 24.0}).psnr == (20.0, 25.0, 25.0)
 

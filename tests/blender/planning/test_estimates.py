@@ -200,7 +200,7 @@ def test_layers_of_a_scene_add_up() -> None:
     one = history.seconds(scene, settings)
     assert one == pytest.approx(2 * (33.5 + DENOISE))
     assert history.last(scene).seconds["beauty"] == 64.0
-    assert history.costs(scene) is None
+    assert history.seconds(scene, settings, 4) > one  # and neighbours
     layers[1].use = False
     assert history.seconds(scene, settings) == pytest.approx(one / 2)
     layers[2].use = True  # never rendered

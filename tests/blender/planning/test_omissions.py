@@ -199,6 +199,7 @@ def test_a_plan_is_of_the_frames_asked_for() -> None:
     def told(*frames: int) -> tuple[bool, dict[str, str]]:
         found = explain(scene, job, frames)
         values = {each["decision"]: each["value"] for each in found["decisions"]}
+        values["notes"] = " ".join(found["remarks"])
         return found["facts"]["scene"]["transparent"], values
 
     opaque, alone = told(2)
@@ -207,5 +208,5 @@ def test_a_plan_is_of_the_frames_asked_for() -> None:
     clear, together = told(6, 7, 8)
     assert clear
     assert together["accumulation"] == "2 frames to each side"
-    assert together["cuts"] == "frame 8"
-    assert "cuts" not in told(6, 7)[1]
+    assert "2 shots: 6–7, 8–8;" in together["notes"]
+    assert "shots" not in told(6, 7)[1]["notes"]

@@ -65,30 +65,31 @@ def test_what_one_session_saved_is_the_second_sync() -> None:
     assert plan.after(0.5, 0.6)[0].saving_seconds == 0.0
 
 
-def test_the_plan_of_a_shot_names_what_is_reused_less() -> None:
+def test_the_plan_of_a_shot() -> None:
     quiet = replace(
         FACTS.scene,
         motion_blur=False,
         volumes=False,
         hair=False,
         smooth=False,
+        glass=False,
         depth_of_field=False,
     )
 
-    def lent(cuts: tuple[int, ...] = (), **more: object) -> dict[str, str]:
-        scene = replace(quiet, **more)
-        found = plan.neighbours(replace(FACTS, scene=scene, scale=1), 3, cuts)
+    def lent(**more: object) -> dict[str, str]:
+        found = plan.neighbours(
+            replace(FACTS, scene=replace(quiet, **more), scale=1), 3
+        )
         assert all(each.reason for each in found)
         return {each.decision: each.value for each in found}
 
     assert lent() == {"accumulation": "3 frames to each side", "images": "skipped"}
     assert lent(smooth=True)["images"] == "followed"
-    assert lent(motion_blur=True, volumes=True)["left out by pixel"] == (
-        "motion blur, volumes"
-    )
-    assert lent(moving=(), volumes=True) == {"accumulation": "3 frames to each side"}
-    assert lent(cuts=(9, 5))["cuts"] == "frame 5, 9"
-    assert lent(cuts=tuple(range(9)))["cuts"] == "frame 0, 1, 2, 3, 4, 5 and 3 more"
+    assert lent(moving=()) == {"accumulation": "3 frames to each side"}
+    blurred = replace(quiet, motion_blur=True, volumes=True)
+    assert plan.reused_less(blurred) == [plan.MOTION_BLUR, plan.VOLUMES]
+    assert plan.reused_less(replace(blurred, moving=())) == []
+    assert plan.reused_less(quiet) == []
     mirrors = replace(FACTS, scene=replace(quiet, smooth=True))
     assert plan.neighbours(mirrors, 3)[1].value == "skipped"  # above scale 1
     panorama = plan.neighbours(replace(FACTS, reprojects=False), 3)

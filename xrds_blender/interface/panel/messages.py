@@ -14,12 +14,9 @@ from typing import Any
 import bpy
 
 from ...planning.estimates import Capabilities, missing
-from ...planning.plan import Facts, SceneFacts
 from ...planning.request import Request
-from ...planning.settings import MODES, Mode, Settings
-from ...rendering.facts import join_facts
+from ...planning.settings import MODES, Mode
 from ...rendering.loading import weights_headers
-from ...scene.contents import scene_facts
 
 LIGHTS = ("diffuse", "glossy", "transmission")
 
@@ -144,28 +141,3 @@ def _knows_passes(request: Request) -> bool:
         return True
     trained = tuple(int(part) for part in series.split(".")[:2])
     return (trained >= PASSES_CHANGED) == (bpy.app.version[:2] >= PASSES_CHANGED)
-
-
-class FactsCache:
-    """Reads a scene again only after a change."""
-
-    def __init__(self) -> None:
-        self._known: dict[str, SceneFacts] = {}
-
-    def forget(self, *_: Any) -> None:
-        """For Blender's handlers: something has changed."""
-        self._known.clear()
-
-    def facts(self, scene: Any, layer: Any, settings: Settings) -> Facts:
-        """Facts of a scene as the viewport shows it."""
-        return join_facts(scene, settings, self.of_scene(scene, layer))
-
-    def of_scene(self, scene: Any, layer: Any) -> SceneFacts:
-        """Those of the scene alone, whatever it is rendered with."""
-        graph = layer.depsgraph
-        if graph is None:
-            return SceneFacts()
-        name = f"{scene.name} {layer.name}"
-        if name not in self._known:
-            self._known[name] = scene_facts(graph)
-        return self._known[name]

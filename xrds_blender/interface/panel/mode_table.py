@@ -23,9 +23,10 @@ def word_for(
     denoises = scene.cycles.use_denoising and here.cycles_denoiser
     if mode is Mode.CYCLES_ONLY:
         return translated("as set") if denoises else translated("noisy")
-    if not denoises:
+    if mode is Mode.FULL_SIZE and not denoises:
         return translated("cleaner")
-    above = _decibels_above(mode, estimates)
+    rival = Mode.CYCLES_ONLY if denoises else Mode.FULL_SIZE
+    above = _decibels_above(mode, rival, estimates)
     if above is None:
         return translated("not measured")
     if above >= _ALIKE:
@@ -36,11 +37,13 @@ def word_for(
     return translated("softer") if soft else translated("much softer")
 
 
-def _decibels_above(mode: Mode, estimates: Sequence[Estimate]) -> float | None:
-    """How far above Cycles' picture a mode's is expected; None where unknown."""
+def _decibels_above(
+    mode: Mode, rival: Mode, estimates: Sequence[Estimate]
+) -> float | None:
+    """How far above another's picture a mode's is expected; None where unknown."""
     decibels = {estimate.mode: estimate.decibels for estimate in estimates}
-    ours, cycles = decibels.get(mode), decibels.get(Mode.CYCLES_ONLY)
-    return None if ours is None or cycles is None else ours - cycles
+    ours, theirs = decibels.get(mode), decibels.get(rival)
+    return None if ours is None or theirs is None else ours - theirs
 
 
 NAMES = {
@@ -65,7 +68,7 @@ def draw(
     mode, seconds, quality = _cells(column, timed)
     mode.label(text="")
     if timed:
-        seconds.label(text="Estimated Time", text_ctxt=CONTEXT)
+        seconds.label(text="Time", text_ctxt=CONTEXT)
     quality.label(text="Picture", text_ctxt=CONTEXT)
     by_mode = {estimate.mode: estimate for estimate in estimates}
     shown = [mode for mode in MODES if mode in by_mode or settings.mode == mode]

@@ -21,7 +21,7 @@ from ...scene.contents import has_light
 from .. import live_picture, operators, presets, translations
 from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
-from . import cycles_panels, mode_table, paragraph, summary
+from . import animation, cycles_panels, mode_table, paragraph, scene_cache, summary
 from .messages import remarks
 
 
@@ -53,18 +53,19 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
         layout, scene = self.layout, context.scene
         request = request_of(scene.xrds)
         here = capabilities(request.machine.weights)
-        shot = summary.is_shot(scene, request)
-        estimated = estimates(scene, request.settings, here, shot)
-        if summary.is_animation(scene):
-            expected = summary.expected(scene, request, here, estimated)
-            summary.draw(layout, context, expected)
+        if scene_cache.is_animation(scene):
+            animation.draw(layout, context, request)
             layout.separator()
+        shot = scene_cache.is_shot(scene, request)
+        estimated = estimates(scene, request.settings, here, shot)
         mode_table.draw(layout, scene, here, automatic(here), estimated)
         layout.use_property_split = True
         layout.use_property_decorate = False
         _draw_choices(layout, scene, request, here)
         for icon, text in remarks(scene, request, here):
             paragraph.draw(layout, context, paragraph.translated(text), icon)
+        for text in animation.notes(scene, request):
+            paragraph.draw(layout, context, text, "INFO")
 
 
 def _draw_choices(
@@ -97,8 +98,8 @@ def _draw_choices(
         layout.prop(settings, "passes")
 
 
-class XRDS_PT_under_cycles(bpy.types.Panel):
-    """What XRDS would make of the scene, under Cycles."""
+class _OtherEnginePanel:
+    """Where XRDS is found under another engine."""
 
     bl_label = "XRDS"
     bl_parent_id = "RENDER_PT_context"
@@ -106,22 +107,44 @@ class XRDS_PT_under_cycles(bpy.types.Panel):
     bl_region_type = _RenderPanel.bl_region_type
     bl_context = _RenderPanel.bl_context
     bl_translation_context = CONTEXT
-    bl_options = {"DEFAULT_CLOSED"}
+    # under a name of our own: Cycles' panels of Blender's show under XRDS as well
+    engines: set[str] = set()
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return context.engine == cycles_panels.CYCLES
+        return context.engine in cls.engines
+
+
+class XRDS_PT_under_cycles(_OtherEnginePanel, bpy.types.Panel):
+    """What XRDS would make of the scene, under Cycles."""
+
+    engines = {cycles_panels.CYCLES}
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, scene = self.layout, context.scene
-        if summary.is_animation(scene):
-            request = request_of(scene.xrds)
-            here = capabilities(request.machine.weights)
-            shot = summary.is_shot(scene, request)
-            estimated = estimates(scene, request.settings, here, shot)
-            expected = summary.expected(scene, request, here, estimated)
-            summary.draw(layout, context, expected)
+        request = request_of(context.scene.xrds)
+        if scene_cache.is_animation(context.scene):
+            animation.draw(self.layout, context, request)
+        operators.draw(self.layout.column(align=True))
+
+
+class XRDS_PT_under_others(_OtherEnginePanel, bpy.types.Panel):
+    """What XRDS renders with where the file's engine is not Cycles."""
+
+    engines = {"BLENDER_EEVEE", "BLENDER_EEVEE_NEXT", "BLENDER_WORKBENCH"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout, cycles = self.layout, context.scene.cycles
+        paragraph.draw(layout, context, paragraph.translated(RENDERS_BY_CYCLES))
+        row = layout.row()
+        row.use_property_split, row.use_property_decorate = True, False
+        row.prop(cycles, "samples", text="Cycles Samples", text_ctxt=CONTEXT)
         operators.draw(layout.column(align=True))
+
+
+RENDERS_BY_CYCLES = (
+    "XRDS renders this file by Cycles, with Cycles' settings: the picture differs from "
+    "that of this engine"
+)
 
 
 class XRDS_PT_guides(_RenderPanel, bpy.types.Panel):
@@ -230,17 +253,18 @@ CLASSES = (
     XRDS_PT_forecast,
     XRDS_PT_last_render,
     XRDS_PT_under_cycles,
+    XRDS_PT_under_others,
 )
 
 
 @persistent
 def _forget_facts(*_: object) -> None:
-    summary.forget()
+    scene_cache.forget()
 
 
 @persistent
 def _forget_file(*_: object) -> None:
-    summary.forget()
+    scene_cache.forget()
     FILE.end()
 
 
@@ -248,14 +272,7 @@ def _forget_file(*_: object) -> None:
 def _draw_again(*_: object) -> None:
     """Seconds are known after a render; Blender draws the panel only on request."""
     if not bpy.app.background:
-        bpy.app.timers.register(_tag_redraw, first_interval=0.1)
-
-
-def _tag_redraw() -> None:
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type == "PROPERTIES":
-                area.tag_redraw()
+        bpy.app.timers.register(scene_cache.redraw, first_interval=0.1)
 
 
 def _handlers() -> tuple[tuple[Any, Any], ...]:
@@ -272,6 +289,7 @@ def register() -> None:
     """Register the panels and show Cycles' own under XRDS."""
     translations.register()
     presets.register()
+    bpy.utils.register_class(animation.XRDS_OT_take_offer)
     for panel in CLASSES:
         bpy.utils.register_class(panel)
     cycles_panels.register()
@@ -288,5 +306,6 @@ def unregister() -> None:
     cycles_panels.unregister()
     for panel in reversed(CLASSES):
         bpy.utils.unregister_class(panel)
+    bpy.utils.unregister_class(animation.XRDS_OT_take_offer)
     presets.unregister()
     translations.unregister()

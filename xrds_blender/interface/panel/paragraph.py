@@ -11,10 +11,12 @@ MARGIN = 60.0  # pixels beside the text at an interface scale of 1: icon and fra
 _CJK = 0x2E80  # from here on a line may end after any letter
 
 
-def draw(layout: Any, context: Any, text: str, icon: str = "NONE") -> None:
-    """Draw a translated sentence, as wide as the region."""
+def draw(
+    layout: Any, context: Any, text: str, icon: str = "NONE", share: float = 1.0
+) -> None:
+    """Draw a translated sentence, as wide as a share of the region."""
     system = context.preferences.system
-    width = context.region.width - MARGIN * system.ui_scale
+    width = share * context.region.width - MARGIN * system.ui_scale
     column = layout.column(align=True)
     column.scale_y = 0.8
     for line in lines(text, width, _measure(context)):
@@ -56,7 +58,7 @@ def _measure(context: Any) -> Callable[[str], float]:
     return lambda text: blf.dimensions(0, text)[0]
 
 
-def translated(text: str, **values: object) -> str:
+def translated(text: str, /, **values: object) -> str:
     """A text of the panel in the interface's language, with values put in."""
     from ..translations import CONTEXT
 

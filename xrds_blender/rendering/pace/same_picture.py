@@ -67,21 +67,39 @@ _ALL = 0.8
 _USEFUL = 0.25
 
 
+FEW_FRAMES = "Same Picture needs 16 frames or more: fewer take the file's samples"
+FEW_SAMPLES = "Same Picture needs 8 samples or more: frames take the file's samples"
+OLD_BLENDER = "Same Picture needs Blender 4.4: frames take the file's samples"
+ONE_SUBSET = (
+    "Same Picture does not go with Cycles' Sample Subset or time limit: frames take "
+    "the file's samples"
+)
+OWN_SAMPLES = (
+    "Same Picture does not go with samples of a view layer: frames take those samples"
+)
+OTHER_MODE = "Same Picture needs the mode Full Size without a time budget"
+
+
+def obstacle(scene: Any, request: Request, frames: int) -> str:
+    """Why a shot of so many frames has the file's samples; empty if it need not."""
+    settings, cycles = request.settings, scene.cycles
+    is_timed = request.time_budget is not None or settings.samples is not None
+    subset = getattr(cycles, "use_sample_subset", False)
+    obstacles = {
+        OTHER_MODE: settings.mode is not Mode.FULL_SIZE or is_timed,
+        OLD_BLENDER: not has_subsets(scene),
+        FEW_FRAMES: frames < FEWEST_FRAMES,
+        FEW_SAMPLES: cycles.samples < FEWEST_SAMPLES,
+        ONE_SUBSET: subset or cycles.time_limit,
+        OWN_SAMPLES: any(layer.samples for layer in scene.view_layers),
+    }
+    return next((sentence for sentence, is_there in obstacles.items() if is_there), "")
+
+
 def can_save(scene: Any, request: Request, frames: int) -> bool:
     """Whether a shot of so many frames may have fewer samples than the file's."""
-    settings, cycles = request.settings, scene.cycles
-    return (
-        request.same_picture
-        and request.time_budget is None
-        and settings.mode is Mode.FULL_SIZE
-        and settings.samples is None
-        and frames >= FEWEST_FRAMES
-        and cycles.samples >= FEWEST_SAMPLES
-        and has_subsets(scene)
-        and not (cycles.use_sample_subset or cycles.time_limit)
-        and not any(layer.samples for layer in scene.view_layers)
-        and has_neighbours(scene, request)
-    )
+    wanted = request.same_picture and has_neighbours(scene, request)
+    return wanted and not obstacle(scene, request, frames)
 
 
 def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | None:

@@ -1,0 +1,128 @@
+"""`python -m xrds_lab.pages.shot_figures` writes what the product expects of shots.
+
+Means over docs/results, for the panel and `xrds plan` to say before a first render.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+from xrds_blender.planning.shot_figures import FILE
+
+from .results import Results, only
+
+ROOT = Path(__file__).resolve().parents[2]
+_LAST = 128  # samples of most references in `by-samples.json`
+
+
+def figures(root: Path = ROOT) -> dict[str, Any]:
+    """Return them as `ShotFigures` reads them."""
+    results = Results(root / "docs/results")
+    by_samples = results.read("shots/by-samples.json")["rows"]
+    gallery = [x for x in by_samples if "shot" in x and _LAST in x["reference_samples"]]
+    # flicker is judged in the gallery where the camera stands still
+    flicker = [x for x in results.gallery if x["flicker"] is not None]
+    stills = {x["shot"] for x in flicker}
+    pan = [x for x in by_samples if x.get("motion") == "pan" and "flicker" in x]
+    same = [
+        x
+        for x in results.same_picture
+        if x["by"] == "processor" and x["method"] == "same_picture"
+    ]
+    even = [x for x in same if not x["noise_threshold"]]
+    noisy = [x for x in same if x["noise_threshold"]]
+    locked = results.read("shots/locked-off.json")  # of 64 samples
+    late = [x["share"] for x in locked["frames"] if x["share"] < 0.5]  # not measured
+    still_share = _mean(late)
+    locked_flicker = (
+        locked["flicker"]["same_picture"] / locked["flicker"]["cycles_oidn"]
+    )
+    return {
+        "source": (
+            "gain: gallery of small shots, 320x180, middle frame of nine beside the "
+            "frame alone; flicker: the gallery's under a camera that stands still, "
+            "seven scenes under one that pans; share: Same Picture, late frames of 21, "
+            "and of 100 under a camera that stands still; accumulate: 1080p"
+        ),
+        "moving": {
+            "gain": _means(
+                (x for x in gallery if x["shot"] not in stills), lambda x: x["gain"]
+            ),
+            "flicker": _means(pan, lambda x: x["flicker"] / x["flicker_alone"]),
+            "share": _means(even, lambda x: x["late_share"]),
+            "threshold_share": _mean(x["late_share"] for x in noisy),
+            "same_flicker": _mean(_flicker_ratios(results.same_picture, same)),
+        },
+        "still": {
+            "gain": _means(
+                (x for x in gallery if x["shot"] in stills), lambda x: x["gain"]
+            ),
+            "flicker": _means(flicker, lambda x: x["flicker"]),
+            "share": {"64": still_share},
+            "threshold_share": still_share,
+            "same_flicker": round(locked_flicker, 3),
+        },
+        "by_radius": {
+            str(radius): _mean(
+                fmean(x["gain"] for x in results.shot_rows("pan", n, radius))
+                / fmean(x["gain"] for x in results.shot_rows("pan", n, 4))
+                for n in (2, 16)
+            )
+            for radius in (1, 2, 4)
+        },
+        "measuring": _mean(
+            (x["mean_share"] - x["late_share"]) * _SAME_FRAMES for x in same
+        ),
+        "accumulate": _accumulating(results),
+        "again": _mean(x["twice"] for x in gallery),
+    }
+
+
+_SAME_FRAMES = 21  # of each shot in `same-picture.json`
+_NEIGHBOURS = 8
+
+
+def _means(rows: Iterable[Any], value: Callable[[Any], float]) -> dict[str, float]:
+    """Return the mean of a value by samples."""
+    by_samples: dict[int, list[float]] = {}
+    for row in rows:
+        by_samples.setdefault(row["samples"], []).append(value(row))
+    return {str(n): _mean(by_samples[n]) for n in sorted(by_samples)}
+
+
+def _mean(values: Iterable[float]) -> float:
+    return round(fmean(values), 3)
+
+
+def _flicker_ratios(rows: list[Any], ours: list[Any]) -> Iterable[float]:
+    """Yield flicker beside that of Cycles + OIDN with the file's samples."""
+    names = ("scene", "motion", "samples", "noise_threshold", "size", "by")
+    for row in ours:
+        same = {name: row[name] for name in names}
+        (cycles,) = only(rows, method="cycles_oidn", **same)
+        yield row["flicker"] / cycles["flicker"]
+
+
+def _accumulating(results: Results) -> float:
+    """Return seconds for a neighbour over those of a denoising, on two cores."""
+    points = only(results.read("own-seconds/own-seconds.json")["points"], cores=2)
+    seconds = {
+        part: fmean(x["seconds"] for x in only(points, part=part))
+        for part in ("accumulate", "denoise")
+    }
+    return round(seconds["accumulate"] / seconds["denoise"] / _NEIGHBOURS, 4)
+
+
+def main() -> int:
+    """Write the file of the product."""
+    FILE.write_text(json.dumps(figures(), indent=1) + "\n", "utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
