@@ -13,7 +13,7 @@ from xrds_core.errors import PictureError, UsageError, XRDSError, finished, warn
 from xrds_core.exr.openexr_io import FLOAT_ZIP, Encoding
 from xrds_core.files import check_folder
 from xrds_core.frames import frame_path, in_words
-from xrds_core.progress import Clock
+from xrds_core.progress import Clock, ShotClock, duration
 
 from ..cycles.settings import subset_of_file
 from ..cycles.view import picture_size
@@ -97,12 +97,16 @@ def render_file(
     def is_done(number: int) -> bool:  # anew: others may be writing the same frames
         return resume and is_whole(frame_path(str(output), number), size)
 
-    written, last = [], None
+    written, last, clock = [], None, ShotClock()
     if output is not None:
         for number, last in _render_pictures(
-            scene, request, output, numbers, is_done, cache
+            scene, request, output, numbers, is_done, cache, clock
         ):
-            written.append(_write(scene, output, number, last, request, encoding))
+            entry = _write(scene, output, number, last, request, encoding)
+            clock.finished()
+            if numbers[1:]:
+                _say_frame(entry, numbers, clock)
+            written.append(entry)
     if cache:
         _cache_others(scene, request, numbers, cache)
     return {
@@ -122,6 +126,16 @@ def _make_notes(scene: Any, request: Request, output: str | None) -> list[str]:
     for line in notes:
         warn(line)
     return notes
+
+
+def _say_frame(entry: dict[str, Any], numbers: Sequence[int], clock: ShotClock) -> None:
+    """Print which frame was written, and what is left."""
+    left, seconds = sum(n > entry["frame"] for n in numbers), clock.left()
+    rest = f"; {left} left" if left else ""
+    if left and seconds is not None:
+        rest += f", about {duration(seconds)}"
+    took = duration(entry["seconds"]["total"])
+    warn(f"frame {entry['frame']}: {entry['output']}, {took}{rest}")
 
 
 def _kept(numbers: Sequence[int], written: Sequence[dict[str, Any]]) -> list[int]:
@@ -179,6 +193,7 @@ def _render_pictures(
     numbers: Sequence[int],
     is_done: Callable[[int], bool],
     cache: SampleCache | None,
+    clock: ShotClock,
 ) -> Iterator[tuple[int, Picture]]:
     """Number and picture of every frame that is not done."""
     is_shot = len(numbers) > 1 and has_neighbours(scene, request)
@@ -186,10 +201,11 @@ def _render_pictures(
         request = request.with_settings(temporal_radius=0)
     if is_shot or cache or request.deadline is not None:
         try:
-            yield from render_shot(scene, request, numbers, is_done, cache)
+            yield from render_shot(scene, request, numbers, is_done, cache, clock)
         except NetworkFailed as error:
             raise _network_error(error, scene, output, error.number or 0) from error
         return
+    clock.add(0, sum(not is_done(number) for number in numbers))
     for number in numbers:
         if not is_done(number):
             yield number, _picture(scene, request, output, number)

@@ -14,6 +14,7 @@ from typing import Any
 from xrds_core.accumulation.camera import Camera
 from xrds_core.errors import SceneError
 from xrds_core.frame_source import FrameSource, Neighbourhood, finish_frames
+from xrds_core.progress import ShotClock
 from xrds_core.shot import Shot, place_of
 
 from ..cycles import session
@@ -37,6 +38,7 @@ def render_shot(
     frames: Sequence[int],
     is_done: Callable[[int], bool] = lambda _: False,
     cache: SampleCache | None = None,
+    clock: ShotClock | None = None,
 ) -> Iterator[tuple[int, Picture]]:
     """Render frames of a scene, each with its neighbours' samples, in order.
 
@@ -44,7 +46,8 @@ def render_shot(
     needed. A `cache` stores the samples of every frame rendered; what it has already is
     not rendered again, and may lie beyond the ends of these frames. Where Cycles has a
     card, a frame is finished while the next one is sampled. Yields numbers and
-    pictures; the scene stays at the last frame rendered. Raises what `render` raises.
+    pictures; the scene stays at the last frame rendered. A `clock` tells the time left
+    once the caller has noted each frame as finished. Raises what `render` raises.
     """
     todo = tuple(number for number in frames if not is_done(number))
     request = request.in_shot(len(todo))
@@ -55,7 +58,9 @@ def render_shot(
     shot = Shot(todo, radius, cuts(scene, there), others=there)
     if not cache:
         method.begin_shot(scene, shot)
-    source = _SceneFrames(scene, method, frames, shot, is_done, cache)
+    clock = clock or ShotClock()
+    clock.add(len(_loaded(shot)), len(todo))
+    source = _SceneFrames(scene, method, frames, shot, is_done, cache, clock)
     # more samples of a frame are rendered, and judged, before it is finished
     beside = method.pace is None and samples_on_card(scene)
     finish = partial(_finished, method)
@@ -72,8 +77,15 @@ class _SceneFrames(FrameSource[Sampled]):
     shot: Shot
     finished: Callable[[int], bool]
     cache: SampleCache | None
+    clock: ShotClock
 
     def load(self, number: int) -> Sampled | None:
+        try:
+            return self._load(number)
+        finally:
+            self.clock.sampled()
+
+    def _load(self, number: int) -> Sampled | None:
         if self.cache and (cached := self.cache.read(number)):
             return cached
         if number not in self.numbers:
@@ -100,6 +112,12 @@ class _SceneFrames(FrameSource[Sampled]):
             return render_more(engine, depsgraph, self.method.request, place, part)
 
         return call_engine(self.scene, work)
+
+
+def _loaded(shot: Shot) -> set[int]:
+    """The frames of a shot, and those that they reuse."""
+    beside = (shot.neighbours(number) for number in shot.frames)
+    return {*shot.frames}.union(*beside)
 
 
 def _finished(method: Method, frame: Neighbourhood[Sampled]) -> tuple[int, Picture]:
