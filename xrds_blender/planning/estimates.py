@@ -118,12 +118,13 @@ def estimates(
     return [Estimate(m, below[m], seconds(each)) for m, each in able.items()]
 
 
-def automatic(here: Capabilities) -> Mode:
+def automatic(has_denoiser: bool) -> Mode:
     """The mode that is taken where none is chosen: full size wherever it can work.
 
-    It is the best at any number of samples; what was measured says so.
+    That needs our denoiser. It is the best at any number of samples; what was measured
+    says so.
     """
-    return Mode.FULL_SIZE if here.denoiser else Mode.CYCLES_ONLY
+    return Mode.FULL_SIZE if has_denoiser else Mode.CYCLES_ONLY
 
 
 def _curve(settings: Settings, here: Capabilities, errors: ErrorModel) -> Curve | None:

@@ -13,7 +13,7 @@ from ..planning.request import Request
 from ..planning.settings import Denoising, Mode, Settings
 from ..scene.contents import stands_still
 from . import history
-from .loading import capabilities
+from .loading import has_library
 from .pace.same_picture import obstacle
 from .sampling import has_neighbours
 
@@ -81,8 +81,7 @@ def in_mode(request: Request, mode: Mode) -> Request:
     if mode is Mode.AUTOMATIC:
         # which Cycles alone cannot keep
         paced = request.deadline is not None or request.time_budget is not None
-        here = capabilities(request.machine.weights)
-        mode = Mode.FULL_SIZE if paced else estimating.automatic(here)
+        mode = estimating.automatic(paced or has_library())
         request = request.with_settings(denoising=BEST)
     if mode is Mode.CYCLES_ONLY:
         return request.with_settings(mode=mode, temporal_radius=0)

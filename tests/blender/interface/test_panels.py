@@ -391,7 +391,7 @@ def test_a_large_scene_is_looked_at_after_the_panel_was_drawn(
     monkeypatch.setattr(scene_cache, "bpy", fake)
     assert not scene_cache.is_animation(scene)  # not known yet
     assert scene_cache._look_later() > 0.0  # not quiet yet
-    monkeypatch.setattr(scene_cache, "_QUIET", 0.0)
+    FILE.of(scene_cache._Cache).quiet = 0.0
     assert scene_cache._look_later() is None
     assert scene_cache.is_animation(scene)
     scene_cache.forget()

@@ -69,7 +69,7 @@ def test_what_cannot_work_is_left_out_and_named() -> None:
 @pytest.mark.parametrize("samples", [1, 2, 16, 4096])
 def test_full_size_is_the_best_mode_where_it_can_work(samples: int) -> None:
     each = found(replace(REQUESTED, samples=samples))
-    assert automatic(ALL) is Mode.FULL_SIZE
+    assert automatic(ALL.denoiser) is Mode.FULL_SIZE
     assert max(d for e in each.values() if (d := e.decibels) is not None) == 0.0
 
 
@@ -106,7 +106,7 @@ def test_nothing_is_said_of_what_was_not_measured() -> None:
 def test_without_any_denoiser_cycles_alone_is_taken() -> None:
     bare = replace(ALL, denoiser=False, cycles_denoiser=False)
     each = found(REQUESTED, bare, SceneSettings(16, None))
-    assert automatic(bare) is Mode.CYCLES_ONLY
+    assert automatic(bare.denoiser) is Mode.CYCLES_ONLY
     assert each[Mode.X2].decibels is None  # measured with a denoised small picture
 
 

@@ -58,7 +58,7 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
             layout.separator()
         shot = scene_cache.is_shot(scene, request)
         estimated = estimates(scene, request.settings, here, shot)
-        mode_table.draw(layout, scene, here, automatic(here), estimated)
+        mode_table.draw(layout, scene, here, automatic(here.denoiser), estimated)
         layout.use_property_split = True
         layout.use_property_decorate = False
         _draw_choices(layout, scene, request, here)

@@ -1,7 +1,8 @@
 """What the panel knows of a scene: looked at after a change, never while it draws.
 
 To look at a scene of thousands of objects takes longer than a drawing may. So that
-waits until no change has come for a while; small scenes are looked at at once.
+waits until no change has come for a while, the longer the more it takes; small scenes
+are looked at at once.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ if TYPE_CHECKING:
     from ...rendering.advice import Line
 
 _SMALL = 200  # objects of a file that is looked at at once
-_QUIET = 0.5  # seconds without a change
+# Seconds without a change, and how many times as long as a look took.
+_QUIET, _LONGER = 0.5, 20.0
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class _Cache:
     stale: set[tuple[str, str]] = field(default_factory=set)
     wanted: set[tuple[str, str]] = field(default_factory=set)
     changed: float = 0.0
+    quiet: float = _QUIET
 
 
 def forget() -> None:
@@ -60,7 +63,7 @@ def seen(scene: Any, layer: Any) -> Seen | None:
         else:
             cache.wanted.add(key)
             if not bpy.app.timers.is_registered(_look_later):
-                bpy.app.timers.register(_look_later, first_interval=_QUIET)
+                bpy.app.timers.register(_look_later, first_interval=cache.quiet)
     return cache.seen.get(key)
 
 
@@ -102,15 +105,17 @@ def _look(scene: Any, layer: Any) -> None:
 def _look_later() -> float | None:
     """For Blender's timers: look at what was asked for, once it is quiet."""
     cache = FILE.of(_Cache)
-    quiet = time.perf_counter() - cache.changed
-    if quiet < _QUIET:
-        return _QUIET - quiet
+    started = time.perf_counter()
+    quiet = started - cache.changed
+    if quiet < cache.quiet:
+        return cache.quiet - quiet
     for scene_name, layer_name in cache.wanted:
         scene = bpy.data.scenes.get(scene_name)
         layer = scene and scene.view_layers.get(layer_name)
         if layer is not None:
             _look(scene, layer)
     cache.wanted.clear()
+    cache.quiet = max(_QUIET, _LONGER * (time.perf_counter() - started))
     redraw()
     return None
 
