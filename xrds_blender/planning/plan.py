@@ -7,8 +7,8 @@ differences are measured against.
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from xrds_core.progress import duration
 
@@ -24,6 +24,7 @@ __all__ = [
     "GuideRender",
     "Plan",
     "SceneFacts",
+    "Strength",
     "after",
     "cycles_only",
     "deadline",
@@ -59,7 +60,7 @@ CRISP_SAMPLES = 2
 CRYPTOMATTE_SAMPLES = 16
 
 
-_SHOWN = 6  # cuts that are named; more would not help a reader
+_SHOWN = 6  # cuts and objects that are named; more would not help a reader
 
 
 @dataclass(frozen=True)
@@ -280,24 +281,43 @@ def _part(facts: Facts, share: float) -> float | None:
 # --- Shots ---------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class Strength:
+    """How much neighbours count: in the scene, and times that on objects, by name.
+
+    That of the scene is keyed where it may be another one in other frames.
+    """
+
+    of_scene: float = 1.0
+    is_keyed: bool = False
+    of_objects: Mapping[str, float] = field(default_factory=dict)
+
+
 def neighbours(
-    facts: Facts, radius: int, cuts: Collection[int] = ()
+    facts: Facts,
+    radius: int,
+    cuts: Collection[int] = (),
+    strength: Strength | None = None,
 ) -> tuple[Decision, ...]:
     """The decisions of a shot whose frames reuse samples of `radius` to each side.
 
     `cuts` are the frames at which another camera begins.
     """
-    name, scene = "accumulation", facts.scene
+    name, scene, strength = "accumulation", facts.scene, strength or Strength()
+    if not (strength.of_scene or strength.is_keyed):
+        reason = "their strength is 0: each frame is alone"
+        return (Decision(name, "none", reason),)
     if not facts.reprojects:
         reason = "this panorama cannot be reprojected: each frame is alone"
         return (Decision(name, "none", reason),)
     value = f"{radius} frames to each side"
+    rest = *_strength(facts, strength), *_cuts(cuts)
     if not scene.moving:
         reason = "nothing moves: frames differ in noise alone, and every sample counts"
-        return (Decision(name, value, reason), *_cuts(cuts))
+        return (Decision(name, value, reason), *rest)
     reason = "pixels are found again by depth, cameras and motion, if the light agrees"
     decisions = Decision(name, value, reason), _images(facts), *_in_part(scene)
-    return (*decisions, *_cuts(cuts))
+    return (*decisions, *rest)
 
 
 def same_picture(samples: int) -> Decision:
@@ -349,13 +369,29 @@ def _in_part(scene: SceneFacts) -> tuple[Decision, ...]:
     return (Decision("left out by pixel", ", ".join(present), reason),)
 
 
+def _strength(facts: Facts, strength: Strength) -> Iterator[Decision]:
+    if strength.is_keyed or strength.of_scene != 1.0:
+        value = f"{strength.of_scene:.2g}{', keyed' if strength.is_keyed else ''}"
+        yield Decision("strength", value, "so much do neighbours count, 1 being all")
+    if strength.of_objects:
+        named = [f"{name} {value:.2g}" for name, value in strength.of_objects.items()]
+        reason = "so much do neighbours count where the camera sees them"
+        if facts.scale > 1:
+            reason = "not used: above scale 1 that of the scene counts alone"
+        yield Decision("strength of objects", _name_some(named), reason)
+
+
+def _name_some(names: Sequence[str]) -> str:
+    more = len(names) - _SHOWN
+    return ", ".join(names[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
+
+
 def _cuts(cuts: Collection[int]) -> tuple[Decision, ...]:
     if not cuts:
         return ()
-    shown = ", ".join(map(str, sorted(cuts)[:_SHOWN]))
-    more = "" if len(cuts) <= _SHOWN else f" and {len(cuts) - _SHOWN} more"
+    shown = _name_some([str(cut) for cut in sorted(cuts)])
     reason = "a marker binds another camera: nothing is reused across"
-    return (Decision("cuts", f"frame {shown}{more}", reason),)
+    return (Decision("cuts", f"frame {shown}", reason),)
 
 
 @dataclass(frozen=True)

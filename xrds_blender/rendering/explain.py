@@ -9,10 +9,11 @@ from typing import Any
 
 from ..cycles.view import picture_size
 from ..planning.estimates import resolved, shot_memory
-from ..planning.plan import deadline, neighbours, same_picture
+from ..planning.plan import Strength, deadline, neighbours, same_picture
 from ..planning.request import Request
 from ..scene.contents import cuts, frame_range
 from ..scene.remarks import remarks
+from ..scene.strength import is_keyed, strength_of, weak_objects
 from .blender_job import call_engine
 from .facts import find_facts
 from .history import scene_settings
@@ -52,7 +53,8 @@ def _described(
     facts = find_facts(depsgraph, request.settings)
     decisions = (*timed.decisions, *request.plan(facts).decisions)
     if radius and len(shot) > 1:
-        decisions += neighbours(facts, radius, cuts(scene, shot))
+        strength = _strength(depsgraph, request)
+        decisions += neighbours(facts, radius, cuts(scene, shot), strength)
     if can_save(scene, request, len(shot)):
         decisions += (same_picture(scene.cycles.samples),)
     if request.deadline is not None:
@@ -68,3 +70,12 @@ def _described(
         "decisions": [asdict(each) for each in decisions],
         "remarks": remarks(scene, request),
     }
+
+
+def _strength(depsgraph: Any, request: Request) -> Strength:
+    scene, weak = depsgraph.scene_eval, weak_objects(depsgraph.ids)
+    return Strength(
+        strength_of(scene, request),
+        is_keyed(scene, request),
+        {item.name: item.xrds_strength for item in weak},
+    )

@@ -555,6 +555,7 @@ def test_presets_hold_all_settings() -> None:
     from xrds_blender.interface import presets
 
     held = set(presets.XRDS_OT_preset_add.preset_values) - {"scene.cycles.samples"}
+    held.add("scene.xrds.strength")  # of what the shot shows, and may be keyed
     names = set(properties.XRDSSettings.bl_rna.properties.keys()) - {"rna_type", "name"}
     assert held == {f"scene.xrds.{name}" for name in names}
 

@@ -183,8 +183,8 @@ def _format_bytes(size: float) -> str:
 UNKNOWN = "Known after a first render of a frame"
 EXPECTED = "Expected from the renders of this file so far"
 ALONE = (
-    "Frames of this camera, or without a temporal radius, cannot use each other's "
-    "samples: each is rendered by itself"
+    "Frames of this camera, or without a temporal radius and strength, cannot use each "
+    "other's samples: each is rendered by itself"
 )
 STILLS = "Frames help each other in animations, not in single images"
 

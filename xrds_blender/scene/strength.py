@@ -1,0 +1,52 @@
+"""How much the samples of neighbour frames count: in a scene, and on its objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from ..planning.request import Request
+
+_PATH = "xrds.strength"
+SEEN = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD"}
+"""Types of objects that a camera's ray may hit; a volume has no surface."""
+
+
+def strength_of(scene: Any, request: Request) -> float:
+    """How much neighbours count in the frame that a scene is at, 0 to 1."""
+    requested = request.settings.strength
+    return float(scene.xrds.strength) if requested is None else requested
+
+
+def neighbours_count(scene: Any, request: Request) -> bool:
+    """Whether neighbours count at all, in any frame."""
+    return is_keyed(scene, request) or strength_of(scene, request) > 0.0
+
+
+def is_keyed(scene: Any, request: Request) -> bool:
+    """Whether keyframes or a driver of the scene decide how much neighbours count."""
+    data = scene.animation_data
+    if data is None or request.settings.strength is not None:
+        return False
+    strips = (strip for track in data.nla_tracks for strip in track.strips)
+    actions = [data.action, *(strip.action for strip in strips)]
+    curves = [c for action in actions if action for c in _find_curves(action)]
+    return any(curve.data_path == _PATH for curve in (*curves, *data.drivers))
+
+
+def _find_curves(action: Any) -> Iterator[Any]:
+    if not hasattr(action, "layers"):  # before Blender 4.4
+        yield from action.fcurves
+        return
+    for layer in action.layers:
+        for strip in layer.strips:
+            for bag in strip.channelbags:
+                yield from bag.fcurves
+
+
+def weak_objects(items: Iterable[Any]) -> list[Any]:
+    """Those of some data-blocks that are objects on which neighbours count less."""
+    import bpy
+
+    objects = (item for item in items if isinstance(item, bpy.types.Object))
+    return [x for x in objects if x.type in SEEN and x.xrds_strength < 1.0]
