@@ -17,6 +17,7 @@ from xrds_core.arrays import Array
 
 from ..internals import spare_passes
 from ..internals.borrowed import Borrowed
+from ..scene.strength import shows_indices
 from . import session
 from .layer_session import LayerSession
 from .samples import render_once
@@ -36,6 +37,10 @@ def sample_strengths(
 
     name = "Object Index" if bpy.app.version >= (5,) else "IndexOB"
     layer_name = depsgraph.view_layer_eval.name
+    # what is synced for this render is of use to the next one, but for these
+    render = depsgraph.scene_eval.render
+    is_apart = render.use_motion_blur or render.use_persistent_data
+    is_apart = is_apart or shows_indices(depsgraph)
     with LayerSession(engine, depsgraph) as layer, Borrowed() as borrowed:
         layer.hold_still()
         spare_passes.add(engine, layer_name, name, "X")
@@ -46,7 +51,8 @@ def sample_strengths(
         try:
             clock = render_once(engine, depsgraph, samples=1, seed=seed, noisy=True)
         finally:
-            session.free(engine)
+            if is_apart:
+                session.free(engine)
         passes = layer.all_passes()
     indices = {view: passes[view, name][..., 0] for view in layer.views}
     return {view: _strengths(index) for view, index in indices.items()}, clock
@@ -58,8 +64,10 @@ def _set_indices(borrowed: Borrowed, items: Sequence[Any]) -> None:
 
     for item in items:
         if isinstance(item, bpy.types.Object):
-            index = round((1.0 - item.xrds_strength) * _LEVELS)
-            borrowed.set(item, pass_index=index)
+            strength = item.xrds_strength
+            # for NaN, too, which a script may set
+            weakness = 1.0 - strength if strength < 1.0 else 0.0
+            borrowed.set(item, pass_index=round(weakness * _LEVELS))
 
 
 def _strengths(index: Array) -> Array:

@@ -38,7 +38,7 @@ from ..internals.borrowed import Borrowed
 from ..planning.plan import Decision
 from ..planning.request import Request
 from ..scene.contents import scene_facts, shapes_move, stands_still
-from ..scene.strength import neighbours_count, strength_of, weak_objects
+from ..scene.strength import neighbours_count, weak_objects
 from . import stages
 from .stopping import finish_samples
 
@@ -354,8 +354,7 @@ def noisy_frame(
     Cancelled when the user stops it, and what `sampling_of` does.
     """
     how = sampling_of(engine, depsgraph, request, place)
-    counts = not how.is_alone and strength_of(depsgraph.scene_eval, request) > 0.0
-    if not counts or not weak_objects(depsgraph.ids):
+    if not weak_objects(depsgraph.ids):
         return _sampled_frame(engine, depsgraph, request, how)
     # else Cycles would free the dependency graph after the first render
     with LayerSession(engine, depsgraph):

@@ -15,7 +15,8 @@ SEEN = {"MESH", "CURVE", "SURFACE", "FONT", "META", "CURVES", "POINTCLOUD"}
 def strength_of(scene: Any, request: Request) -> float:
     """How much neighbours count in the frame that a scene is at, 0 to 1."""
     requested = request.settings.strength
-    return float(scene.xrds.strength) if requested is None else requested
+    own = scene.xrds.strength if requested is None else requested
+    return own if own < 1.0 else 1.0  # for NaN, too, which a script may set
 
 
 def neighbours_count(scene: Any, request: Request) -> bool:
@@ -50,3 +51,23 @@ def weak_objects(items: Iterable[Any]) -> list[Any]:
 
     objects = (item for item in items if isinstance(item, bpy.types.Object))
     return [x for x in objects if x.type in SEEN and x.xrds_strength < 1.0]
+
+
+def shows_indices(depsgraph: Any) -> bool:
+    """Whether the objects' indices are in a pass, or a shader may read them."""
+    import bpy
+
+    if depsgraph.view_layer_eval.use_pass_object_index:
+        return True
+    kind = bpy.types.NodeTree
+    trees = (
+        x if isinstance(x, kind) else getattr(x, "node_tree", None)
+        for x in depsgraph.ids
+    )
+    return any(_reads_index(node) for tree in trees if tree for node in tree.nodes)
+
+
+def _reads_index(node: Any) -> bool:
+    if node.type == "ATTRIBUTE":
+        return bool(node.attribute_name == "pass_index")
+    return node.type in {"OBJECT_INFO", "SCRIPT"}
