@@ -322,14 +322,15 @@ def _find_lacking_areas(share: Array, is_exact: bool) -> list[_Area]:
 
     All of it if it `is_exact`: a part of a picture is denoised a little otherwise.
     """
+    whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
+    if is_exact:
+        return [_Area(whole, whole, whole)]
     if (share == share.flat[0]).all() and float(share.flat[0]) in (0.0, 1.0):
         return []
     blocks = rectangles(block_means(np.less(share, 1.0)) > 0.0)
     areas = [_make_area(rectangle, share.shape) for rectangle in blocks]
-    seen = sum(share[area.around].size for area in areas)
-    if not is_exact and seen < _PART * share.size:
+    if sum(share[area.around].size for area in areas) < _PART * share.size:
         return areas
-    whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
     return [_Area(whole, whole, whole)]
 
 
