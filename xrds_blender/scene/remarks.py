@@ -67,8 +67,9 @@ def _without_light(scene: Any, request: Request) -> Iterator[str]:
 def _without_strength(scene: Any, request: Request) -> Iterator[str]:
     """Above scale 1 frames have neighbours, but no pass tells their objects."""
     settings = request.settings
-    weak = [item.name for item in weak_objects(scene.objects)]
-    if weak and settings.is_enlarged and settings.temporal_radius:
+    if not (settings.is_enlarged and settings.temporal_radius):
+        return
+    if weak := [item.name for item in weak_objects(scene.objects)]:
         yield f"the strength of {_join_names(weak)} counts at --scale 1 alone"
 
 
