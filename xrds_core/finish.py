@@ -176,13 +176,15 @@ def finish_frame(
     region: tuple[slice, slice] | None = None,
     accumulated: Accumulated | None = None,
     light: Sequence[LightPart] = (),
+    strength: float = 1.0,
 ) -> Finished:
     """Accumulate the samples of neighbour frames on a frame and denoise it.
 
     Where a frame has few samples, and few are reused, the picture is that of the frame
     alone, also denoised: next to pixels of many samples a denoiser mistakes the noise
     of few for detail. Where that is a small part of the picture, that part alone is
-    denoised again.
+    denoised again. Pixels at which neighbours do not count at all are those of the
+    frame alone to the bit.
 
     Parameters
     ----------
@@ -203,6 +205,8 @@ def finish_frame(
         The frame with its neighbours' samples, if it is known already.
     light : sequence of LightPart
         AOVs and light passes to denoise as well.
+    strength : float
+        How much neighbours count, as in `accumulate`.
 
     Returns
     -------
@@ -216,12 +220,15 @@ def finish_frame(
     """
     started = time.perf_counter()
     if accumulated is None:
-        accumulated = accumulate(own, neighbours, movement)
+        accumulated = accumulate(own, neighbours, movement, strength=strength)
     region = region or (slice(None), slice(None))
     areas: list[_Area] = []
-    if neighbours:
-        share = _find_weights(accumulated, own)[region]
-        areas = _find_lacking_areas(share)
+    uncounted = np.broadcast_to(own.strengths(strength) == 0.0, own.shape)
+    is_exact = bool(uncounted[region].any())
+    if neighbours and not uncounted.all():
+        share = np.where(uncounted, np.float32(0.0), _find_weights(accumulated, own))
+        share = share[region]
+        areas = _find_lacking_areas(share, is_exact)
     denoise_started = time.perf_counter()
     parts = 1 + len(areas)
     passes = _Passes.of(accumulated, light, region)
@@ -229,7 +236,9 @@ def finish_frame(
     denoised = passes.denoised(denoiser, callbacks[0])
     again_started = time.perf_counter()
     if areas:
-        alone = _fill_holes(accumulate(own, []), accumulated)
+        alone = accumulate(own, [])
+        if not is_exact:
+            alone = alone.filled(accumulated)
         lacking = _Passes.of(alone, light, region, like=denoised.parts)
         mixed = denoised.radiance.copy()
         for area, done in zip(areas, callbacks[1:], strict=True):
@@ -312,15 +321,20 @@ class _Area(NamedTuple):
     within: Rectangle
 
 
-def _find_lacking_areas(share: Array) -> list[_Area]:
-    """Return where the frame alone is needed, too; nowhere if one picture is enough."""
+def _find_lacking_areas(share: Array, is_exact: bool) -> list[_Area]:
+    """Return where the frame alone is needed, too; nowhere if one picture is enough.
+
+    All of it if it `is_exact`: a part of a picture is denoised a little otherwise.
+    """
+    whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
+    if is_exact:
+        return [_Area(whole, whole, whole)]
     if (share == share.flat[0]).all() and float(share.flat[0]) in (0.0, 1.0):
         return []
     blocks = rectangles(block_means(np.less(share, 1.0)) > 0.0)
     areas = [_make_area(rectangle, share.shape) for rectangle in blocks]
     if sum(share[area.around].size for area in areas) < _PART * share.size:
         return areas
-    whole = (slice(0, share.shape[0]), slice(0, share.shape[1]))
     return [_Area(whole, whole, whole)]
 
 
@@ -333,34 +347,6 @@ def _make_area(blocks: Rectangle, shape: tuple[int, ...]) -> _Area:
         around.append(slice(before, min(last + AROUND, side)))
         within.append(slice(first - before, last - before))
     return _Area(*((x[0], x[1]) for x in (place, around, within)))
-
-
-def _fill_holes(alone: Accumulated, accumulated: Accumulated) -> Accumulated:
-    """Return the frame alone, its pixels without samples filled by reused ones."""
-    holes = alone.samples == 0.0
-    if not holes.any():
-        return alone
-
-    def fill(own: Array | None, reused: Array | None) -> Array | None:
-        if own is None or reused is None:
-            return None
-        return np.where(holes if own.ndim == 2 else holes[..., None], reused, own)
-
-    albedo = fill(alone.albedo, accumulated.albedo)
-    normal = fill(alone.normal, accumulated.normal)
-    assert albedo is not None
-    assert normal is not None
-    return replace(
-        alone,
-        radiance=fill(alone.radiance, accumulated.radiance),
-        albedo=albedo,
-        normal=normal,
-        alpha=fill(alone.alpha, accumulated.alpha),
-        parts={
-            name: np.where(holes[..., None], accumulated.parts[name], part)
-            for name, part in alone.parts.items()
-        },
-    )
 
 
 class _Passes(NamedTuple):

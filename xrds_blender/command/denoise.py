@@ -12,7 +12,7 @@ from xrds_core.shot_files.pass_names import PASSES, PassNames
 
 from ..planning.settings import QUALITIES
 from . import arguments
-from .options import add_light, add_read_limit
+from .options import add_light, add_read_limit, add_strength
 
 SPACES = ("camera", "world")
 
@@ -40,6 +40,7 @@ def add_denoise(commands: Any) -> argparse.ArgumentParser:
         metavar="N",
         help="neighbour frames on each side whose samples are reused (default: 4)",
     )
+    add_strength(command, "1", 1.0)
     add(
         "--denoise",
         choices=QUALITIES,
@@ -181,6 +182,7 @@ def _denoise(options: argparse.Namespace) -> dict[str, Any]:
         denoiser,
         frames=options.frames,
         radius=options.temporal_radius,
+        strength=options.strength,
         reading=reading,
         resume=options.resume,
         say=warn,

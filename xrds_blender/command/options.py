@@ -46,6 +46,7 @@ def add_request(command: argparse.ArgumentParser) -> None:
         help="neighbour frames on each side whose samples are reused (default: 4 for "
         "several frames)",
     )
+    add_strength(command, "as the file says")
     add(
         "--guide-samples",
         type=arguments.positive,
@@ -74,6 +75,20 @@ def add_request(command: argparse.ArgumentParser) -> None:
     )
     add_light(command)
     add_network(command, _RENDER_DEVICE_HELP)
+
+
+def add_strength(
+    command: argparse.ArgumentParser, default: str, value: float | None = None
+) -> None:
+    """Add how much neighbours count."""
+    command.add_argument(
+        "--strength",
+        type=arguments.share,
+        default=value,
+        metavar="S",
+        help="how much the samples of neighbour frames count, from 0 to 1 "
+        f"(default: {default})",
+    )
 
 
 def add_light(command: argparse.ArgumentParser) -> None:

@@ -27,6 +27,7 @@ from ..rendering.sampling import has_neighbours
 from ..rendering.shot import cache_samples, render_shot
 from ..scene.contents import frame_range, moves_in_time
 from ..scene.remarks import missing, remarks
+from ..scene.strength import neighbours_count
 from . import picture_file
 from .picture_file import is_whole
 from .scene_file import AS_SAVED, SceneChoice, frames_of, open_scene
@@ -233,6 +234,11 @@ def _open_cache(
     choice: SceneChoice,
 ) -> SampleCache:
     """The cache of samples; raises UsageError where no frame could use them."""
+    if not neighbours_count(scene, request):
+        raise UsageError(
+            "neighbours have a strength of 0: leave out --sample-cache, or give "
+            "another --strength"
+        )
     if not has_neighbours(scene, request):
         raise UsageError(
             "frames of such a panoramic camera cannot reuse samples: leave out "

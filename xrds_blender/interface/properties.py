@@ -187,6 +187,17 @@ class XRDSSettings(bpy.types.PropertyGroup):
         "after it, give it their samples. More give less noise and flicker and take "
         "more memory; 0 renders every frame by itself",
     )
+    strength: FloatProperty(
+        name="Strength",
+        translation_context=CONTEXT,
+        default=1.0,
+        min=0.0,
+        max=1.0,
+        subtype="FACTOR",
+        description="How much the samples of neighbouring frames count: 0 renders "
+        "every frame by itself. Objects have a strength of their own in their "
+        "properties, which counts as well. It can be animated",
+    )
     animation: EnumProperty(
         name="Animations Keep",
         translation_context=CONTEXT,
@@ -259,6 +270,20 @@ class XRDSSettings(bpy.types.PropertyGroup):
         """Whether a time budget chooses the samples."""
         budget = self.use_time_budget and self.animation != DEADLINE
         return self.mode == Mode.AUTOMATIC and budget
+
+
+OBJECT_STRENGTH = FloatProperty(
+    name="Strength",
+    translation_context=CONTEXT,
+    default=1.0,
+    min=0.0,
+    max=1.0,
+    subtype="FACTOR",
+    override={"LIBRARY_OVERRIDABLE"},
+    description="How much the samples of neighbouring frames count where the camera "
+    "sees this object, times the scene's strength: 0 for what looks wrong in a shot",
+)
+"""Of each object; instances have that of the object that is instanced."""
 
 
 def request_of(settings: XRDSSettings) -> Request:

@@ -29,6 +29,7 @@ def register(package: str = "xrds_blender") -> None:
     session.functions()
     bpy.utils.register_class(properties.XRDSSettings)
     bpy.types.Scene.xrds = bpy.props.PointerProperty(type=properties.XRDSSettings)
+    bpy.types.Object.xrds_strength = properties.OBJECT_STRENGTH
     bpy.utils.register_class(engine.XRDSRender)
     engine_override.register()  # before those who ask for a scene's engine
     thread_guard.register()
@@ -62,6 +63,7 @@ def unregister() -> None:
     thread_guard.unregister()
     engine_override.unregister()
     bpy.utils.unregister_class(engine.XRDSRender)
+    del bpy.types.Object.xrds_strength
     del bpy.types.Scene.xrds
     bpy.utils.unregister_class(properties.XRDSSettings)
     PROCESS.of(_State).is_registered = False

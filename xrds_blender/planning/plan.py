@@ -7,8 +7,8 @@ differences are measured against.
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 from xrds_core.progress import duration
 
@@ -24,6 +24,7 @@ __all__ = [
     "GuideRender",
     "Plan",
     "SceneFacts",
+    "Strength",
     "after",
     "cycles_only",
     "deadline",
@@ -58,6 +59,9 @@ BOUNCE_SHARE = 0.12
 CRISP_SAMPLES = 2
 # Cryptomatte counts what covers a pixel by samples: fewer give ragged masks.
 CRYPTOMATTE_SAMPLES = 16
+
+
+_SHOWN = 6  # objects that are named; more would not help a reader
 
 
 @dataclass(frozen=True)
@@ -278,18 +282,36 @@ def _part(facts: Facts, share: float) -> float | None:
 # --- Shots ---------------------------------------------------------------------------
 
 
-def neighbours(facts: Facts, radius: int) -> tuple[Decision, ...]:
+@dataclass(frozen=True)
+class Strength:
+    """How much neighbours count: in the scene, and times that on objects, by name.
+
+    That of the scene is keyed where it may be another one in other frames.
+    """
+
+    of_scene: float = 1.0
+    is_keyed: bool = False
+    of_objects: Mapping[str, float] = field(default_factory=dict)
+
+
+def neighbours(
+    facts: Facts, radius: int, strength: Strength | None = None
+) -> tuple[Decision, ...]:
     """The decisions of a shot whose frames reuse samples of `radius` to each side."""
-    name, scene = "accumulation", facts.scene
+    name, scene, strength = "accumulation", facts.scene, strength or Strength()
+    if not (strength.of_scene or strength.is_keyed):
+        reason = "their strength is 0: each frame is alone"
+        return (Decision(name, "none", reason),)
     if not facts.reprojects:
         reason = "this panorama cannot be reprojected: each frame is alone"
         return (Decision(name, "none", reason),)
     value = f"{radius} frames to each side"
+    rest = tuple(_strength(facts, strength))
     if not scene.moving:
         reason = "nothing moves: frames differ in noise alone, and every sample counts"
-        return (Decision(name, value, reason),)
+        return (Decision(name, value, reason), *rest)
     reason = "pixels are found again by depth, cameras and motion, if the light agrees"
-    return Decision(name, value, reason), _images(facts)
+    return Decision(name, value, reason), _images(facts), *rest
 
 
 def same_picture(samples: int) -> Decision:
@@ -339,6 +361,20 @@ def reused_less(scene: SceneFacts) -> list[str]:
         HAIR: scene.hair,
     }
     return [sentence for sentence, is_there in causes.items() if is_there]
+
+
+def _strength(facts: Facts, strength: Strength) -> Iterator[Decision]:
+    if strength.is_keyed or strength.of_scene != 1.0:
+        value = f"{strength.of_scene:.2g}{', keyed' if strength.is_keyed else ''}"
+        yield Decision("strength", value, "so much do neighbours count, 1 being all")
+    if strength.of_objects:
+        named = [f"{name} {value:.2g}" for name, value in strength.of_objects.items()]
+        reason = "so much do neighbours count where the camera sees them"
+        if facts.scale > 1:
+            reason = "not used: above scale 1 that of the scene counts alone"
+        more = len(named) - _SHOWN
+        value = ", ".join(named[:_SHOWN]) + (f" and {more} more" if more > 0 else "")
+        yield Decision("strength of objects", value, reason)
 
 
 @dataclass(frozen=True)

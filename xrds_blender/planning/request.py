@@ -22,6 +22,7 @@ _RANGES = {
     "seed": (0, 2**31 - 1),
     "threads": (1, 1024),
     "temporal_radius": (0, 1000),
+    "strength": (0, 1),
     "memory_limit": (0, 2**63 - 1),
     "exposure": (1e-30, 1e30),
 }

@@ -114,6 +114,7 @@ class Settings:
     samples of `temporal_radius` frames before and after are reused, and `share` is how
     much of the samples a frame takes; with a noise threshold, of those it asks for.
     Under a still camera they `begin` after so many of the shot's; None is by its place.
+    `strength` is how much neighbours count, 0 to 1; None leaves the scene's own.
     """
 
     mode: Mode = Mode.FULL_SIZE
@@ -124,6 +125,7 @@ class Settings:
     temporal_radius: int = 0
     share: float = 1.0
     begin: int | None = None
+    strength: float | None = None
 
     @property
     def scale(self) -> int:
@@ -169,7 +171,8 @@ class Settings:
     def family(self) -> Settings:
         """All but how many samples, and nothing that the mode does not use."""
         if self.is_enlarged:
-            return replace(self, samples=None, temporal_radius=0, share=1.0)
+            alone = replace(self, samples=None, temporal_radius=0, share=1.0)
+            return replace(alone, strength=None)
         return Settings(self.mode, None, self.denoising, "", 0)
 
     @property

@@ -12,6 +12,7 @@ from typing import Any
 
 from xrds_core.frames import in_words
 
+from ..cycles.view import can_track
 from ..planning.plan import SceneFacts, reused_less
 from ..planning.request import Request
 from ..scene.camera_path import whips
@@ -60,7 +61,7 @@ def advice_of_request(scene: Any, request: Request, frames: int) -> list[Line]:
         return [(NO_CAMERA, {})]
     lines: list[Line] = []
     radius = request.settings.temporal_radius
-    if frames > 1 and radius and not has_neighbours(scene, request):
+    if frames > 1 and radius and not can_track(scene):
         lines.append((ALONE, {}))
     elif frames > 1 and request.same_picture:
         reason = obstacle(scene, request, frames)

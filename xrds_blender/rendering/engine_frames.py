@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from xrds_core.arrays import Array
@@ -18,6 +18,7 @@ from xrds_core.shot import Shot
 from ..cycles import session
 from ..cycles.passes import CyclesPasses
 from ..scene.contents import cuts, frame_range, requested_passes
+from ..scene.strength import strength_of
 from . import stages
 from .methods import Method, completed
 from .pace.more import Part, render_more
@@ -131,7 +132,7 @@ class EngineFrames(FrameSource[Sampled]):
         go_to(call.engine, call.depsgraph, frame.number)
         if self.method.lacks(frame.own, others):
             self.ahead.pop(frame.number, None)  # its own passes are rendered now
-            own = self._sample(between=False)
+            own = replace(self._sample(between=False), strength=frame.own.strength)
             return own, own
 
         def more(part: Part) -> Any:
@@ -146,7 +147,9 @@ class EngineFrames(FrameSource[Sampled]):
         call = self._call
         assert call is not None
         go_to(call.engine, call.depsgraph, number)
+        strength = strength_of(call.depsgraph.scene_eval, self.method.request)
         sampled = self._sample(self.window.shot.is_between(number))
+        sampled = replace(sampled, strength=strength)
         stages.end_sampling()
         if number >= call.number != call.last:
             self.ahead[number] = call.passes.all_passes()

@@ -10,10 +10,11 @@ from typing import Any
 from ..cycles.view import picture_size
 from ..planning.estimates import resolved, shot_memory
 from ..planning.offers import Offers, cycles_line, in_english, offer_line, source_line
-from ..planning.plan import deadline, neighbours, same_picture
+from ..planning.plan import Strength, deadline, neighbours, same_picture
 from ..planning.request import Request
 from ..scene.contents import frame_range
 from ..scene.remarks import remarks
+from ..scene.strength import is_keyed, strength_of, weak_objects
 from .advice import advice
 from .blender_job import call_engine
 from .facts import find_facts
@@ -55,7 +56,7 @@ def _described(
     facts = find_facts(depsgraph, request.settings)
     decisions = (*timed.decisions, *request.plan(facts).decisions)
     if radius and is_shot:
-        decisions += neighbours(facts, radius)
+        decisions += neighbours(facts, radius, _strength(depsgraph, request))
     if can_save(scene, request, len(shot)):
         decisions += (same_picture(scene.cycles.samples),)
     if request.deadline is not None:
@@ -84,3 +85,12 @@ def _summary(found: Offers) -> list[str]:
     """What the animation takes, and what XRDS offers: the lines of the panel."""
     offered = (offer_line(offer, found.animation) for offer in found.offers)
     return [cycles_line(found), *offered, source_line(found)]
+
+
+def _strength(depsgraph: Any, request: Request) -> Strength:
+    scene, weak = depsgraph.scene_eval, weak_objects(depsgraph.ids)
+    return Strength(
+        strength_of(scene, request),
+        is_keyed(scene, request),
+        {item.name: item.xrds_strength for item in weak},
+    )

@@ -108,7 +108,9 @@ class FullSize(Method):
         else:
             neighbours = self._neighbours(own, others, view)
             gathered = own.gathered.get(view)
-            picture = self.finish_stored(frame, neighbours, report, gathered, own.light)
+            picture = self.finish_stored(
+                frame, neighbours, report, gathered, own.light, own.strength
+            )
         settings = picture.settings
         assert settings is not None
         samples = own.samples or settings.samples
@@ -121,7 +123,9 @@ class FullSize(Method):
     ) -> Accumulated:
         """One view with the samples of its neighbours."""
         neighbours = self._neighbours(own, others, view)
-        return accumulate(own.views[view], neighbours, self._movement)
+        return accumulate(
+            own.views[view], neighbours, self._movement, strength=own.strength
+        )
 
     def radiance(
         self,
@@ -138,6 +142,7 @@ class FullSize(Method):
             self._movement,
             region=region,
             accumulated=own.gathered.get(view),
+            strength=own.strength,
         )
         return finished.picture[..., :3]
 
@@ -158,6 +163,7 @@ class FullSize(Method):
         report: Report | None = None,
         gathered: Accumulated | None = None,
         light: Sequence[LightPart] = (),
+        strength: float = 1.0,
     ) -> Picture:
         """The picture of a packed frame with the samples of its neighbours."""
         finished = finish_frame(
@@ -168,6 +174,7 @@ class FullSize(Method):
             report,
             accumulated=gathered,
             light=light,
+            strength=strength,
         )
         accumulated = finished.accumulated
         picture = self._picture(

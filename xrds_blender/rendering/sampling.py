@@ -22,7 +22,9 @@ from xrds_core.errors import Cancelled, SceneError
 from xrds_core.exr.channels import Channels
 
 from ..cycles import session
-from ..cycles.halves import sample_halves, sample_motion
+from ..cycles.halves import sample_halves, sample_motion, seconds_of
+from ..cycles.layer_session import LayerSession
+from ..cycles.object_strength import sample_strengths
 from ..cycles.samples import (
     COUNTS,
     GEOMETRY,
@@ -36,6 +38,7 @@ from ..internals.borrowed import Borrowed
 from ..planning.plan import Decision
 from ..planning.request import Request
 from ..scene.contents import scene_facts, shapes_move, stands_still
+from ..scene.strength import neighbours_count, weak_objects
 from . import stages
 from .stopping import finish_samples
 
@@ -59,6 +62,7 @@ class Sampled:
     `gathered` are views with their neighbours' samples, where that is known already.
     Where `samples` per pixel were requested it has these; else `share` is how much of
     the file's. `decisions` say why. `light` are the parts of it that views hold.
+    Neighbours count with a `strength`, beside that of each pixel.
     """
 
     number: int
@@ -69,6 +73,7 @@ class Sampled:
     share: float = 1.0
     decisions: tuple[Decision, ...] = ()
     light: tuple[LightPart, ...] = ()
+    strength: float = 1.0
 
     def neighbours(self, view: str, frames: Sequence[Sampled]) -> list[Any]:
         """That view of other frames, and this frame's other views."""
@@ -188,9 +193,11 @@ def subset_at(place: int, radius: int) -> int:
 def has_neighbours(scene: Any, request: Request) -> bool:
     """Whether frames of a shot are to use, and can use, each other's samples.
 
-    Not under most panoramic cameras.
+    Not under most panoramic cameras, nor where these count for nothing.
     """
     if request.settings.is_cycles_only or not request.settings.temporal_radius:
+        return False
+    if not neighbours_count(scene, request):
         return False
     return scene.camera is not None and can_track(scene)
 
@@ -347,6 +354,20 @@ def noisy_frame(
     Cancelled when the user stops it, and what `sampling_of` does.
     """
     how = sampling_of(engine, depsgraph, request, place)
+    if not weak_objects(depsgraph.ids):
+        return _sampled_frame(engine, depsgraph, request, how)
+    # else Cycles would free the dependency graph after the first render
+    with LayerSession(engine, depsgraph):
+        strengths, clock = sample_strengths(engine, depsgraph, how.own_seed)
+        frames, seconds = _sampled_frame(engine, depsgraph, request, how)
+    frames = {v: replace(x, strength=strengths[v]) for v, x in frames.items()}
+    more = seconds_of([clock])
+    return frames, {stage: seconds[stage] + more[stage] for stage in seconds}
+
+
+def _sampled_frame(
+    engine: Any, depsgraph: Any, request: Request, how: Sampling
+) -> tuple[dict[str, Frame], dict[str, float]]:
     layer_name = depsgraph.view_layer_eval.name  # Cycles may free it as it renders
     settings = request.settings
     stages.begin(engine, how.named(stages.SAMPLES), 1, 2)

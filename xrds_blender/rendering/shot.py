@@ -7,7 +7,7 @@ along with what they show, and the sum is denoised once and, above scale 1, enla
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -22,6 +22,7 @@ from ..cycles.session import samples_on_card
 from ..cycles.view import cameras_of
 from ..planning.request import Request
 from ..scene.contents import cuts
+from ..scene.strength import is_keyed, neighbours_count, strength_of
 from . import stages
 from .blender_job import call_engine
 from .methods import Method, completed
@@ -51,6 +52,8 @@ def render_shot(
     """
     todo = tuple(number for number in frames if not is_done(number))
     request = request.in_shot(len(todo))
+    if cache is None and not neighbours_count(scene, request):
+        request = request.with_settings(temporal_radius=0)
     method = method_of(request, None if cache is None else cache.write)
     radius = request.settings.temporal_radius
     cached = cache.beside(frames, radius) if cache else []
@@ -86,12 +89,16 @@ class _SceneFrames(FrameSource[Sampled]):
             self.clock.sampled()
 
     def _load(self, number: int) -> Sampled | None:
-        if self.cache and (cached := self.cache.read(number)):
-            return cached
-        if number not in self.numbers:
-            return None
-        between = self.shot.is_between(number)
-        return _sample(self.scene, self.method, self.numbers, number, between)
+        sampled = self.cache.read(number) if self.cache else None
+        if sampled is None:
+            if number not in self.numbers:
+                return None
+            between = self.shot.is_between(number)
+            sampled = _sample(self.scene, self.method, self.numbers, number, between)
+        elif is_keyed(self.scene, self.method.request):
+            self.scene.frame_set(number)
+        strength = strength_of(self.scene, self.method.request)
+        return replace(sampled, strength=strength)
 
     def is_done(self, frame: Neighbourhood[Sampled]) -> bool:
         return self.finished(frame.number)
@@ -100,6 +107,7 @@ class _SceneFrames(FrameSource[Sampled]):
         number, others = frame.number, list(frame.neighbours.values())
         if self.method.lacks(frame.own, others):
             own = _sample(self.scene, self.method, self.numbers, number)
+            own = replace(own, strength=frame.own.strength)
             return own, own
         return completed(self.method, frame.own, others, partial(self._more, number))
 

@@ -166,7 +166,12 @@ class SuperResolution(Method):
             assert self._denoiser is not None
             neighbours = own.neighbours(view, others)
             inputs = accumulated_inputs(
-                inputs, neighbours, self.settings, self._denoiser, self._movement
+                inputs,
+                neighbours,
+                self.settings,
+                self._denoiser,
+                self._movement,
+                own.strength,
             )
         started = time.perf_counter()
         try:
@@ -453,12 +458,16 @@ def accumulated_inputs(
     settings: Settings,
     denoiser: Denoiser,
     movement: Movement,
+    strength: float = 1.0,
 ) -> Inputs:
-    """What the network takes of a view, with the samples of its neighbours."""
+    """What the network takes of a view, with the samples of its neighbours.
+
+    These count with a `strength`.
+    """
     started = time.perf_counter()
     light = [frame.light for frame in others]
-    accumulated = accumulate(own.light, light, movement)
-    guides = accumulated_guides(own, others, movement)
+    accumulated = accumulate(own.light, light, movement, strength=strength)
+    guides = accumulated_guides(own, others, movement, strength)
     done = time.perf_counter()
     beauty = _denoised(own, accumulated, denoiser)
     seconds = {
@@ -486,8 +495,13 @@ def _denoised(own: View, accumulated: Accumulated, denoiser: Denoiser) -> Beauty
     return own.place.beauty(denoised.radiance, accumulated.radiance)
 
 
-def accumulated_guides(own: View, others: Sequence[View], movement: Movement) -> Guides:
-    """Guides with the samples of other frames; the richest of those of one name."""
+def accumulated_guides(
+    own: View, others: Sequence[View], movement: Movement, strength: float = 1.0
+) -> Guides:
+    """Guides with the samples of other frames; the richest of those of one name.
+
+    A frame without guides of its own has them of others, whatever their `strength`.
+    """
     others = [frame for frame in others if frame.guides is not None]
     if own.guide_name is not None:
         name = own.guide_name
@@ -500,7 +514,8 @@ def accumulated_guides(own: View, others: Sequence[View], movement: Movement) ->
         number = own.light.number
         beside = sorted(neighbours, key=lambda frame: abs(frame.number - number))[:2]
         target = reprojected_placeholder(number, own.camera, beside)
-    accumulated = accumulate(target, neighbours, movement)
+        strength = 1.0
+    accumulated = accumulate(target, neighbours, movement, strength=strength)
     assert accumulated.alpha is not None
     # their own number: where nothing is accumulated there are no more
     samples = max(1, int(target.samples))

@@ -7,9 +7,11 @@ by a parent or a constraint, is not judged.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
+
+from .keyframes import curves
 
 _PART = 0.5  # of the width that is seen; less than half of the frame then stays in view
 _EULER, _QUATERNION = "rotation_euler", "rotation_quaternion"
@@ -20,11 +22,15 @@ def whips(scene: Any, frames: Sequence[int]) -> list[int]:
     camera = scene.camera
     if camera is None or camera.parent or camera.constraints:
         return []
-    curves = {(x.data_path, x.array_index): x for x in _curves(camera)}
-    if not any(path in (_EULER, _QUATERNION) for path, _ in curves):
+    data = camera.animation_data
+    if data is None or data.action is None:
+        return []
+    found = curves(data.action, getattr(data, "action_slot", None))
+    by_path = {(x.data_path, x.array_index): x for x in found}
+    if not any(path in (_EULER, _QUATERNION) for path, _ in by_path):
         return []
     limit = _PART * camera.data.angle
-    views = ((number, _rotation(camera, curves, number)) for number in frames)
+    views = ((number, _rotation(camera, by_path, number)) for number in frames)
     return [
         number
         for (_, before), (number, now) in pairwise(views)
@@ -32,23 +38,7 @@ def whips(scene: Any, frames: Sequence[int]) -> list[int]:
     ]
 
 
-def _curves(item: Any) -> Iterator[Any]:
-    """The F-curves of an object; from Blender 4.4 on they lie in layers of slots."""
-    data = item.animation_data
-    if data is None or data.action is None:
-        return
-    action = data.action
-    if not hasattr(action, "layers"):
-        yield from action.fcurves
-        return
-    for layer in action.layers:
-        for strip in layer.strips:
-            channels = strip.channelbag(data.action_slot) if data.action_slot else None
-            if channels is not None:
-                yield from channels.fcurves
-
-
-def _rotation(camera: Any, curves: dict[tuple[str, int], Any], number: int) -> Any:
+def _rotation(camera: Any, by_path: dict[tuple[str, int], Any], number: int) -> Any:
     """The camera's rotation in a frame, as a quaternion."""
     mode = camera.rotation_mode
     if mode == "AXIS_ANGLE":
@@ -56,7 +46,7 @@ def _rotation(camera: Any, curves: dict[tuple[str, int], Any], number: int) -> A
     path = _QUATERNION if mode == "QUATERNION" else _EULER
     value = getattr(camera, path).copy()
     for index in range(len(value)):
-        curve = curves.get((path, index))
+        curve = by_path.get((path, index))
         if curve is not None:
             value[index] = curve.evaluate(number)
     return value.normalized() if mode == "QUATERNION" else value.to_quaternion()

@@ -8,6 +8,7 @@ from typing import Any
 from ..planning.request import Request
 from .contents import compositor_of, has_light
 from .outer_files import OuterFile, outer_files
+from .strength import weak_objects
 
 # Nodes without which a compositor gives the render itself.
 _PLAIN = {"R_LAYERS", "COMPOSITE", "VIEWER", "GROUP_OUTPUT", "FRAME", "REROUTE"}
@@ -17,7 +18,12 @@ _MOST_NAMED = 3
 
 def remarks(scene: Any, request: Request) -> list[str]:
     """A line for each thing that the pictures will not show though the file asks."""
-    return [*_find_left_out(scene), *_without_light(scene, request), *missing()]
+    return [
+        *_find_left_out(scene),
+        *_without_light(scene, request),
+        *_without_strength(scene, request),
+        *missing(),
+    ]
 
 
 def _find_left_out(scene: Any) -> Iterator[str]:
@@ -56,6 +62,15 @@ def _without_light(scene: Any, request: Request) -> Iterator[str]:
             f"view layer {layer.name!r} has no passes of light: --passes adds none; "
             "switch them on in the file"
         )
+
+
+def _without_strength(scene: Any, request: Request) -> Iterator[str]:
+    """Above scale 1 frames have neighbours, but no pass tells their objects."""
+    settings = request.settings
+    if not (settings.is_enlarged and settings.temporal_radius):
+        return
+    if weak := [item.name for item in weak_objects(scene.objects)]:
+        yield f"the strength of {_join_names(weak)} counts at --scale 1 alone"
 
 
 def missing() -> Iterator[str]:

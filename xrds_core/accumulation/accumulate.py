@@ -10,9 +10,9 @@ by a similarity weight: do both frames show the same light?
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,12 +23,13 @@ from .camera import is_shot_cut
 from .coarse_rejection import tile_weights
 from .local_filters import find_ranges
 from .object_motion import Movement
+from .passes import weighted_mean
 from .reprojection import pair
 from .virtual_images import find_images
 from .weighted_sums import Aligned, Means, Reprojected, Work, light_for_albedo
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from ..arrays import Array
     from .frame import Stored
@@ -76,17 +77,42 @@ class Accumulated:
     frames: tuple[int, ...]
     parts: Mapping[str, Array] = field(default_factory=dict)
 
+    def merged(
+        self, other: Accumulated, merge: Callable[[Array, Array], Array]
+    ) -> Accumulated:
+        """Return what a function makes of each pass of this and of another one."""
+
+        def both(name: str) -> Any:
+            pair = getattr(self, name), getattr(other, name)
+            return None if pair[0] is None or pair[1] is None else merge(*pair)
+
+        names = ("radiance", "albedo", "normal", "alpha")
+        parts = {k: merge(part, other.parts[k]) for k, part in self.parts.items()}
+        return replace(self, **{name: both(name) for name in names}, parts=parts)
+
+    def filled(self, other: Accumulated) -> Accumulated:
+        """Return this with another's passes where it has no samples."""
+        holes = self.samples == 0.0
+        if not holes.any():
+            return self
+
+        def fill(own: Array, reused: Array) -> Array:
+            return np.where(holes if own.ndim == 2 else holes[..., None], reused, own)
+
+        return self.merged(other, fill)
+
 
 def accumulate(
     target: Stored,
     others: Sequence[Stored],
     movement: Movement | None = None,
     threads: int | None = None,
+    strength: float = 1.0,
 ) -> Accumulated:
     """Accumulate the samples of neighbour frames on the pixels of a frame.
 
-    No samples are reused across a shot cut. Without neighbours the result is the target
-    as it is stored.
+    No samples are reused across a shot cut. Without neighbours, and at pixels where
+    these do not count, the result is the target as it is stored.
 
     Parameters
     ----------
@@ -99,6 +125,9 @@ def accumulate(
     threads : int, optional
         Number of threads, one for each processor by default. The result does not depend
         on it.
+    strength : float
+        How much neighbours count, times the target's own strength: a factor, from 0 to
+        1, of their part in the mean.
 
     Returns
     -------
@@ -110,7 +139,8 @@ def accumulate(
     PictureError
         If the frames hold different passes.
     """
-    others = same_shot(target, others)
+    strengths = target.strengths(strength)
+    others = same_shot(target, others) if strengths.any() else []
     groups = _prepare_neighbours(target, others, movement or Movement(), threads)
     usual = light_for_albedo(target) if others and target.has_light else 0.0
     pairs = [
@@ -130,7 +160,29 @@ def accumulate(
     requested = sum(frame.samples for frame in others) * height * width
     rejected = 1.0 - means.reused / requested if requested else 0.0
     frames = tuple(sorted({target.number, *(frame.number for frame in others)}))
-    return _unpack_means(target, means, lit, rejected, frames)
+    accumulated = _unpack_means(target, means, lit, rejected, frames)
+    if not others or (strengths == 1.0).all():
+        return accumulated
+    return _weaken(accumulated, accumulate(target, [], threads=threads), strengths)
+
+
+def _weaken(
+    accumulated: Accumulated, alone: Accumulated, strength: Array
+) -> Accumulated:
+    """Return the mean in which the neighbours' part is so many times what it was.
+
+    An error of theirs is as many times smaller. The frame's own samples count as
+    before, so there are as many as would leave neighbours this part of the mean.
+    """
+    # in a hole there is nothing but the neighbours' samples
+    own = np.where(alone.samples > 0.0, alone.samples, accumulated.samples)
+    with np.errstate(invalid="ignore"):  # where no frame has any
+        part = strength * (1.0 - own / accumulated.samples)
+        samples = np.where(strength == 1.0, accumulated.samples, own / (1.0 - part))
+    mixed = accumulated.merged(
+        alone.filled(accumulated), partial(weighted_mean, share=strength)
+    )
+    return replace(mixed, samples=np.nan_to_num(samples))
 
 
 def _find_lit_parts(target: Stored, others: Sequence[Stored]) -> tuple[str, ...]:

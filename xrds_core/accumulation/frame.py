@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..arrays import LARGEST_HALF
+from ..arrays import LARGEST_HALF, floats
 from ..errors import PictureError
 from ..native import structures
 from ..native.library import Arrays, bands, in_threads, library
@@ -165,6 +165,12 @@ def pack_vectors(vector: Array) -> NDArray[np.float16]:
     Vectors beyond the range of half floats are useless anyway and become infinite.
     """
     return _to_halves(vector, keeps_infinities=True)[0]
+
+
+def pack_strength(strength: Array) -> NDArray[np.float16]:
+    """Pack strengths (H, W) as float16 (H W,); they are 1 where they are not known."""
+    known = np.nan_to_num(strength.ravel(), nan=1.0)
+    return np.clip(known, 0.0, 1.0).astype(np.float16)
 
 
 def pack_counts(counts: Array) -> NDArray[np.float16]:
@@ -342,6 +348,8 @@ class Stored:
         Whether nothing at all moves or changes from frame to frame.
     counts : (H W,) float16 array or None
         Samples of each pixel, where they differ.
+    strength : (H W,) float16 array or None
+        How much samples of neighbours count at each pixel, where that is not 1 for all.
     noise : Noise or None
         Estimated noise; None for a frame of guides alone.
     image : (H W,) float32 array or None
@@ -362,6 +370,7 @@ class Stored:
     vector: NDArray[np.float16] | None = None
     still: bool = False
     counts: NDArray[np.float16] | None = None
+    strength: NDArray[np.float16] | None = None
     noise: Noise | None = None
     image: Array | None = None
     parts: Mapping[str, NDArray[np.float16] | None] = field(default_factory=dict)
@@ -383,6 +392,12 @@ class Stored:
         0, or 1 + which of the 3x3 pixels around has the nearest surface.
         """
         return find_rims(self.inverse_depth, self.shape, self.camera.orthographic)
+
+    def strengths(self, of_frame: float = 1.0) -> Array:
+        """How much neighbours count, (H, W) or one number; `of_frame` is a factor."""
+        if self.strength is None:
+            return np.asarray(of_frame, np.float32)
+        return floats(self.strength).reshape(self.shape) * np.float32(of_frame)
 
     @property
     def is_empty(self) -> bool:
@@ -447,6 +462,7 @@ def store(frame: Frame) -> Stored:
         vector=None if frame.vector is None else pack_vectors(frame.vector),
         still=frame.still,
         counts=None if frame.counts is None else pack_counts(frame.counts),
+        strength=None if frame.strength is None else pack_strength(frame.strength),
         noise=noise,
         image=_find_virtual_image(frame),
         parts=pack_parts(frame.parts),

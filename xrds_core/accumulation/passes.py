@@ -54,6 +54,7 @@ LAYOUT = {
     "vector": Layout((4,), "Vector", "XYZW", Joined.FIRST),
     "path_length": Layout((), "Denoising Depth", "Z", is_full=True),
     "counts": Layout((), "XRDS Samples", "X", Joined.SUM),
+    "strength": Layout((), "XRDS Strength", "X", Joined.FIRST),
 }
 """By the name of the field."""
 
@@ -87,6 +88,8 @@ class Passes:
         show (Cycles' `Denoising Depth`).
     counts : (H, W) ndarray, optional
         Samples of each pixel, where they differ.
+    strength : (H, W) ndarray, optional
+        How much samples of neighbour frames count at each pixel, 0 to 1; 1 without it.
     parts : mapping of str to (H, W, 3) ndarray
         Light that the radiance is made of, and colours, by name.
     """
@@ -99,6 +102,7 @@ class Passes:
     vector: Array | None = None
     path_length: Array | None = None
     counts: Array | None = None
+    strength: Array | None = None
     parts: Mapping[str, Array] = field(default_factory=dict)
 
     @property

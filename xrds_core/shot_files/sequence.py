@@ -202,6 +202,7 @@ def denoise_sequence(
     *,
     frames: Iterable[int] | None = None,
     radius: int | None = None,
+    strength: float = 1.0,
     reading: Reading | None = None,
     resume: bool = False,
     say: Say = lambda _: None,
@@ -220,6 +221,8 @@ def denoise_sequence(
     radius : int, optional
         How many frames before and after are neighbours; by default what the files
         recommend, or 4.
+    strength : float
+        How much neighbours count, 0 to 1, times what a pass of the files says.
     reading : Reading, optional
         Options for reading.
     resume : bool
@@ -241,11 +244,15 @@ def denoise_sequence(
         If no frame can be read, the first lacks passes, or an output cannot be written;
         outputs before it are complete.
     """
+    if not 0.0 <= strength <= 1.0:
+        raise UsageError(f"strength is {strength}; it must be from 0 to 1")
     numbers = _choose_numbers(files, frames, say)
     existing = _existing_frames(files.source, numbers)
     files.check(numbers, existing)
+    if not strength:
+        radius = 0
     radius = radius if "#" in Path(files.source).name else radius or 0  # or one frame
-    recipe = _make_recipe(files, reading or Reading(), denoiser)
+    recipe = _make_recipe(files, reading or Reading(), denoiser, strength)
     loader = Loader(files.source, recipe, reusable=radius != 0, say=say)
     loader.look(numbers, set(existing))
     readable = [n for n in numbers if n not in loader.failed]
@@ -258,7 +265,7 @@ def denoise_sequence(
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
-    source = _Frames(files, denoiser, shot, loader, recipe, resume, say)
+    source = _Frames(files, denoiser, shot, loader, recipe, resume, say, strength)
     entries = [x for x in finish_frames(shot, source, source.finish) if x is not None]
     source.selection.report()
     return {
@@ -286,6 +293,7 @@ class _Frames(FrameSource[FrameFile]):
     recipe: Recipe
     resume: bool
     say: Say
+    strength: float
     selection: NeighbourSelection = field(init=False)
     movement: Movement = field(default_factory=Movement)
     clock: Clock = field(default_factory=Clock)
@@ -331,6 +339,7 @@ class _Frames(FrameSource[FrameFile]):
                 self.movement,
                 region=region,
                 light=file.light,
+                strength=self.strength,
             )
             views[view] = file, done.within(within)
         finished = views[""][1]
@@ -355,9 +364,12 @@ class _Frames(FrameSource[FrameFile]):
         return self.recipe.digest(states, number)
 
 
-def _make_recipe(files: Files, reading: Reading, denoiser: Denoiser) -> Recipe:
+def _make_recipe(
+    files: Files, reading: Reading, denoiser: Denoiser, strength: float
+) -> Recipe:
     settings = denoiser.quality, files.picture_only, files.crop
-    return Recipe(files.patterns, reading, settings)
+    of_strength = () if strength == 1.0 else (strength,)
+    return Recipe(files.patterns, reading, (*settings, *of_strength))
 
 
 def _find_done(

@@ -69,6 +69,7 @@ VALUES = {
     "--scale": "4",
     "--scene": "other",
     "--seed": "7",
+    "--strength": "0.5",
     "--temporal-radius": "2",
     "--threads": "3",
     "--time-budget": "9",

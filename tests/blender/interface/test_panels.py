@@ -100,6 +100,7 @@ def test_unregister_takes_everything_back() -> None:
         assert not [p for p in found if "XRDS" in p.COMPAT_ENGINES]
         assert not hasattr(bpy.types, "XRDS_PT_settings")
         assert not hasattr(bpy.types.Scene, "xrds")
+        assert not hasattr(bpy.types.Object, "xrds_strength")
     finally:
         xrds_blender.register()
     assert hasattr(bpy.types, "XRDS_PT_settings")
@@ -188,6 +189,51 @@ def test_each_way_shows_its_own_settings(way: str, named: set[str]) -> None:
     assert "use_time_budget" not in told
     presets = {"fast", "balanced", "paper"} if way == "x2" else set()
     assert {"preset", "balanced", "paper"} & told == presets - {"fast"}
+
+
+def test_strength_is_shown_where_frames_reuse_each_other() -> None:
+    settings = bpy.context.scene.xrds
+    for mode, radius, shows in (
+        ("full_size", 4, True),
+        ("full_size", 0, False),
+        ("x2", 4, True),
+        ("cycles_only", 4, False),
+    ):
+        settings.mode, settings.temporal_radius = mode, radius
+        assert ("strength" in drawn(panels.XRDS_PT_settings)) == shows
+    context = Context()
+    for data, shows in ((bpy.data.meshes.new("Mesh"), True), (None, False)):
+        context.object = bpy.data.objects.new("Object", data)
+        assert panels.XRDS_PT_object.poll(context) == shows
+    layout = Layout()
+    panels.XRDS_PT_object.draw(SimpleNamespace(layout=layout), context)
+    assert layout.drawn == ["xrds_strength"]
+
+
+def test_an_objects_strength_is_saved_and_overridden(tmp_path: Path) -> None:
+    item = bpy.data.objects.new("Flag", bpy.data.meshes.new("Flag"))
+    bpy.context.scene.collection.objects.link(item)
+    assert item.xrds_strength == 1.0
+    item.xrds_strength = 0.25
+    path = str(tmp_path / "flag.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    with bpy.data.libraries.load(path, link=True) as (_, into):
+        into.objects = ["Flag"]
+    (linked,) = into.objects
+    assert linked.xrds_strength == 0.25
+    bpy.context.scene.collection.objects.link(linked)
+    own = linked.override_create(remap_local_usages=True)
+    own.xrds_strength = 0.5
+    own.override_library.operations_update()
+    told = [x.rna_path for x in own.override_library.properties]
+    assert told == ["xrds_strength"]
+    other = str(tmp_path / "shot.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=other)
+    bpy.ops.wm.open_mainfile(filepath=other)
+    flags = [x for x in bpy.data.objects if x.name == "Flag"]
+    values = {x.library is None: x.xrds_strength for x in flags}
+    assert values == {True: 0.5, False: 0.25}
 
 
 def test_other_networks_are_offered_where_their_weights_are(
@@ -634,6 +680,7 @@ def test_presets_hold_all_settings() -> None:
     from xrds_blender.interface import presets
 
     held = set(presets.XRDS_OT_preset_add.preset_values) - {"scene.cycles.samples"}
+    held.add("scene.xrds.strength")  # of what the shot shows, and may be keyed
     names = set(properties.XRDSSettings.bl_rna.properties.keys()) - {"rna_type", "name"}
     assert held == {f"scene.xrds.{name}" for name in names}
 

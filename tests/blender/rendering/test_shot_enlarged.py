@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,8 @@ from xrds_blender.command.render_file import render_file
 from xrds_blender.cycles.passes import CyclesPasses
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
-from xrds_blender.rendering import super_resolution
+from xrds_blender.rendering import shot, super_resolution
+from xrds_blender.rendering.render import method_of
 from xrds_core.errors import XRDSError
 from xrds_core.superres.upscaler import Upscaler
 
@@ -265,3 +267,24 @@ def test_what_was_rendered_is_kept_where_the_network_fails(
         render(moving, "shot")
     low = moving.parent / "shot" / "1_low.exr"
     assert picture(low).shape == (24, 33, 3)
+
+
+def test_how_much_neighbours_count(moving: Path, network: list[Any]) -> None:
+    """Both light and guides have as much of them."""
+    bpy.ops.wm.open_mainfile(filepath=str(moving))
+    scene = bpy.context.scene
+    method = method_of(render_request(2, guide_samples=1, temporal_radius=1))
+    first, own, last = (shot._sample(scene, method, [1, 2, 3], n) for n in (1, 2, 3))
+    samples = []
+    for strength in (0.0, 0.5, 1.0):
+        weak = replace(own, strength=strength)
+        made = method.finish(weak, [first, last], "", lambda _: True)
+        samples.append(made.temporal.mean_samples)
+    method.finish(own, [], "", lambda _: True)
+    assert samples[0] == 1.0
+    assert 1.2 < samples[1] < 0.8 * samples[2]
+    none, half, whole, alone = network[0].calls
+    for name in ("radiance", "albedo"):
+        assert np.array_equal(none[name], alone[name])
+        assert not np.array_equal(half[name], whole[name])
+        assert not np.array_equal(half[name], alone[name])

@@ -74,6 +74,38 @@ def test_files_give_the_picture_that_frames_in_memory_give(
     assert np.abs(ours - truth).mean() < 0.8 * np.abs(alone - truth).mean()
 
 
+def test_how_much_neighbours_count(shot: Path, denoiser: Denoiser) -> None:
+    """A pass says it for each pixel, an option for all of them."""
+    strength = np.ones((shots.HEIGHT, shots.WIDTH), np.float32)
+    strength[:20] = 0.0
+    names = CYCLES | {"strength": "ViewLayer.XRDS Strength.X"}
+    for number in NUMBERS:
+        weak = replace(frame(number), strength=strength)
+        write(shot / "weak", weak, names)
+    denoise(shot, denoiser, "alone", radius=0)
+    denoise(shot, denoiser, "shared")
+    denoise(shot, denoiser, "mixed", source="weak/####.exr")
+    denoise(shot, denoiser, "none", strength=0.0)
+    denoise(shot, denoiser, "half", strength=0.5)
+    alone, shared, mixed, none, half = (
+        picture(shot / name / "0003.exr")
+        for name in ("alone", "shared", "mixed", "none", "half")
+    )
+    np.testing.assert_array_equal(mixed[:20], alone[:20])
+    assert np.abs(mixed - shared)[30:].mean() < 0.5 * np.abs(alone - shared)[30:].mean()
+    np.testing.assert_array_equal(none, alone)
+    truth = shots.view(3, frame(3).camera).colour
+    errors = [np.square(x - truth).mean() for x in (alone, half, shared)]
+    assert errors == sorted(errors, reverse=True)
+
+
+@pytest.mark.parametrize("strength", [-0.1, 1.1, float("nan")])
+def test_what_is_no_strength(shot: Path, denoiser: Denoiser, strength: float) -> None:
+    with pytest.raises(UsageError, match="must be from 0 to 1"):
+        denoise(shot, denoiser, strength=strength)
+    assert not (shot / "out").exists()
+
+
 def test_chunks_give_the_frames_that_one_go_gives(
     shot: Path, denoiser: Denoiser
 ) -> None:
@@ -601,6 +633,7 @@ def replaced(shot: Path) -> dict[str, Any]:
         (late, [3, 4, 5]),
         (replaced, [3, 4, 5]),
         (lambda shot: {"radius": 0}, [1, 2, 3, 4, 5]),
+        (lambda shot: {"strength": 0.5}, [1, 2, 3, 4, 5]),
         (lambda shot: {"reading": Reading(samples=64)}, [1, 2, 3, 4, 5]),
         (lambda shot: {"reading": Reading(normal_space="world")}, [1, 2, 3, 4, 5]),
         (lambda shot: {"to": {"picture_only": True}}, [1, 2, 3, 4, 5]),

@@ -17,6 +17,7 @@ from ...planning.estimates import Capabilities, missing
 from ...planning.request import Request
 from ...planning.settings import MODES, Mode
 from ...rendering.loading import weights_headers
+from ...scene.strength import weak_objects
 
 LIGHTS = ("diffuse", "glossy", "transmission")
 
@@ -60,6 +61,10 @@ def _has_freestyle(scene: Any) -> bool:
     return bool(scene.render.use_freestyle)
 
 
+def _has_weak_objects(scene: Any) -> bool:
+    return bool(scene.xrds.temporal_radius and weak_objects(scene.objects))
+
+
 _NOTES: tuple[tuple[Callable[[Any], bool], str], ...] = (
     (
         _uses_light_passes,
@@ -78,6 +83,10 @@ _NOTES: tuple[tuple[Callable[[Any], bool], str], ...] = (
     (
         _has_freestyle,
         "Freestyle draws its lines at full size, over the finished picture",
+    ),
+    (
+        _has_weak_objects,
+        "The strength of objects counts at Full Size alone, that of the scene always",
     ),
 )
 

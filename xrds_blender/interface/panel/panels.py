@@ -18,6 +18,7 @@ from ...rendering import history
 from ...rendering.loading import capabilities
 from ...rendering.modes import estimates
 from ...scene.contents import has_light
+from ...scene.strength import SEEN
 from .. import live_picture, operators, presets, translations
 from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
@@ -89,6 +90,8 @@ def _draw_choices(
         _offer(column, settings, "preset", offered)
     if not request.settings.is_cycles_only:
         layout.prop(settings, "temporal_radius")
+        if request.settings.temporal_radius:
+            layout.prop(settings, "strength")
     if request.settings.mode is Mode.FULL_SIZE and request.settings.temporal_radius:
         layout.prop(settings, "animation")
         if settings.animation == DEADLINE:
@@ -185,6 +188,24 @@ class XRDS_PT_advanced(_RenderPanel, bpy.types.Panel):
         _switched(layout, settings, "use_exposure", "exposure")
 
 
+class XRDS_PT_object(_RenderPanel, bpy.types.Panel):
+    """What an object is to have otherwise than the scene, among its properties."""
+
+    bl_label = "XRDS"
+    bl_context = "object"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        item = getattr(context, "object", None)
+        return super().poll(context) and item is not None and item.type in SEEN
+
+    def draw(self, context: bpy.types.Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(context.object, "xrds_strength")
+
+
 class XRDS_PT_forecast(_RenderPanel, bpy.types.Panel):
     """What the next render will do."""
 
@@ -252,6 +273,7 @@ CLASSES = (
     XRDS_PT_advanced,
     XRDS_PT_forecast,
     XRDS_PT_last_render,
+    XRDS_PT_object,
     XRDS_PT_under_cycles,
     XRDS_PT_under_others,
 )
