@@ -11,7 +11,15 @@ import bpy
 from ..cycles import session
 from ..internals import engine_override
 from ..internals.lifetimes import PROCESS, RENDER_JOB
-from . import engine, live_picture, operators, preferences, properties, thread_guard
+from . import (
+    engine,
+    live_picture,
+    operators,
+    preferences,
+    properties,
+    thread_guard,
+    try_frame,
+)
 from .panel import panels
 
 
@@ -35,6 +43,7 @@ def register(package: str = "xrds_blender") -> None:
     live_picture.register()
     preferences.register(package)
     operators.register()
+    try_frame.register()
     panels.register()
     for handlers in _render_jobs():
         handlers.append(_forget_frames)
@@ -56,6 +65,7 @@ def unregister() -> None:
     for handlers in _render_jobs():
         handlers.remove(_forget_frames)
     panels.unregister()
+    try_frame.unregister()
     operators.unregister()
     preferences.unregister()
     live_picture.unregister()

@@ -57,10 +57,15 @@ class _Run:
 
 @dataclass
 class Current:
-    """The render that goes on, if any, and what of an animation is left after it."""
+    """The render that goes on, if any, and what of an animation is left after it.
+
+    Of a longer job it is a `share`, and so much was done `before`.
+    """
 
     run: _Run | None = None
     frames_left: str = ""
+    before: float = 0.0
+    share: float = 1.0
 
 
 @dataclass
@@ -104,6 +109,13 @@ def begin_frame(number: int, left: int, seconds: float | None = None) -> None:
     RENDER_JOB.of(Current).frames_left = f"Frame {number} ({rest}). "
 
 
+def begin_part(text: str, before: float, share: float) -> None:
+    """Note which part of a longer job has begun, and what of the job it is."""
+    end()
+    state = RENDER_JOB.of(Current)
+    state.frames_left, state.before, state.share = text, before, share
+
+
 def reporter(engine: Any) -> Callable[[float], bool]:
     """Notes how far a stage is, from 0 to 1; False once the user has stopped it."""
 
@@ -123,6 +135,7 @@ def end() -> None:
     if state.run is not None and state.run.reported >= 1.0:
         _learn(state.run, time.perf_counter())
     state.run, state.frames_left = None, ""
+    state.before, state.share = 0.0, 1.0
 
 
 def current() -> str | None:
@@ -141,12 +154,13 @@ def show() -> None:
 
     For the main thread, while the engine renders.
     """
-    run = RENDER_JOB.of(Current).run
+    state = RENDER_JOB.of(Current)
+    run = state.run
     if run is None:
         return
     spent, left = time.perf_counter() - run.start, _left(run)
     part = 0.0 if left is None else spent / max(spent + left, 1e-6)
-    run.engine.update_progress(part)
+    run.engine.update_progress(state.before + state.share * part)
 
 
 def _learn(run: _Run, now: float) -> None:

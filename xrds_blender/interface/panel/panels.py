@@ -18,7 +18,7 @@ from ...rendering import history
 from ...rendering.loading import capabilities
 from ...rendering.modes import estimates
 from ...scene.contents import has_light
-from .. import live_picture, operators, presets, translations
+from .. import live_picture, operators, presets, translations, try_frame
 from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
 from . import cycles_panels, mode_table, paragraph, summary
@@ -60,6 +60,7 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
             summary.draw(layout, context, expected)
             layout.separator()
         mode_table.draw(layout, scene, here, automatic(here), estimated)
+        try_frame.draw_try(layout, context)
         layout.use_property_split = True
         layout.use_property_decorate = False
         _draw_choices(layout, scene, request, here)
@@ -121,6 +122,7 @@ class XRDS_PT_under_cycles(bpy.types.Panel):
             estimated = estimates(scene, request.settings, here, shot)
             expected = summary.expected(scene, request, here, estimated)
             summary.draw(layout, context, expected)
+            try_frame.draw_try(layout, context)
         operators.draw(layout.column(align=True))
 
 
