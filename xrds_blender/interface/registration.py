@@ -12,6 +12,7 @@ from ..cycles import session
 from ..internals import engine_override
 from ..internals.lifetimes import PROCESS, RENDER_JOB
 from . import (
+    denoise_files,
     engine,
     live_picture,
     operators,
@@ -44,6 +45,7 @@ def register(package: str = "xrds_blender") -> None:
     preferences.register(package)
     operators.register()
     try_frame.register()
+    denoise_files.register()
     panels.register()
     for handlers in _render_jobs():
         handlers.append(_forget_frames)
@@ -65,6 +67,7 @@ def unregister() -> None:
     for handlers in _render_jobs():
         handlers.remove(_forget_frames)
     panels.unregister()
+    denoise_files.unregister()
     try_frame.unregister()
     operators.unregister()
     preferences.unregister()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import bpy
@@ -87,7 +88,8 @@ class XRDS_OT_try_frame(bpy.types.Operator):
         labels = label(tried.cycles), label(tried.xrds)
         image = split.show((tried.cycles.pixels, tried.xrds.pixels), labels)
         if not bpy.app.background:
-            _open_image(context, image)
+            # not in here: Blender forgets to end what opens a window
+            bpy.app.timers.register(partial(_open_image, context.window, image))
         for note in (*tried.notes, "; ".join(labels)):
             self.report({"INFO"}, f"XRDS: {note}")
         return {"FINISHED"}
@@ -145,26 +147,28 @@ def _return_to_slot(before: int | None) -> None:
         image.render_slots.active_index = before
 
 
-def _open_image(context: bpy.types.Context, image: Any) -> None:
+def _open_image(window: Any, image: Any) -> None:
     """Show the image in an Image Editor, in a new window where none is open."""
-    window = context.window
     areas = [x for x in window.screen.areas if x.ui_type == "IMAGE_EDITOR"]
     if areas:
         area = max(areas, key=lambda x: x.width * x.height)
     else:
-        bpy.ops.wm.window_new()
-        window = context.window_manager.windows[-1]
+        with bpy.context.temp_override(window=window):
+            bpy.ops.wm.window_new()
+        window = bpy.context.window_manager.windows[-1]
         area = window.screen.areas[0]
         area.ui_type = "IMAGE_EDITOR"
     area.spaces.active.image = image
+    # once a new window has its size
+    bpy.app.timers.register(partial(_fit, window, area), first_interval=_LOOKS)
 
-    def fit() -> None:  # once a new window has its size
-        region = next(x for x in area.regions if x.type == "WINDOW")
-        with bpy.context.temp_override(window=window, area=area, region=region):
-            bpy.ops.image.view_all(fit_view=True)
-            bpy.ops.xrds.move_split("INVOKE_DEFAULT")
 
-    bpy.app.timers.register(fit, first_interval=_LOOKS)
+def _fit(window: Any, area: Any) -> None:
+    """Show the whole image, and let its line be dragged."""
+    region = next(x for x in area.regions if x.type == "WINDOW")
+    with bpy.context.temp_override(window=window, area=area, region=region):
+        bpy.ops.image.view_all(fit_view=True)
+        bpy.ops.xrds.move_split("INVOKE_DEFAULT")
 
 
 def draw_try(layout: Any, context: bpy.types.Context) -> None:
