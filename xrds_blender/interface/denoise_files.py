@@ -290,8 +290,12 @@ def _report(operator: bpy.types.Operator, work: Work) -> set[str]:
 
 def draw_entry(self: Any, context: bpy.types.Context) -> None:
     """Draw the entry of the Render menu."""
-    self.layout.operator_context = "INVOKE_DEFAULT"
-    self.layout.operator(XRDS_OT_denoise_files.bl_idname, icon="FILE_FOLDER")
+    self.layout.operator(
+        XRDS_OT_denoise_files.bl_idname,
+        text=translated("Denoise Rendered Frames…"),
+        icon="FILE_FOLDER",
+        translate=False,
+    )
 
 
 CLASSES = XRDS_OT_denoise_files, XRDS_OT_watch_denoising

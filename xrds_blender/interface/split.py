@@ -79,6 +79,9 @@ class XRDS_OT_move_split(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
+        running = context.window.modal_operators if context.window else ()
+        if any(each.bl_idname == cls.__name__ for each in running):
+            return False
         return _is_shown(context.space_data)
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -168,7 +168,8 @@ def _fit(window: Any, area: Any) -> None:
     region = next(x for x in area.regions if x.type == "WINDOW")
     with bpy.context.temp_override(window=window, area=area, region=region):
         bpy.ops.image.view_all(fit_view=True)
-        bpy.ops.xrds.move_split("INVOKE_DEFAULT")
+        if bpy.ops.xrds.move_split.poll():
+            bpy.ops.xrds.move_split("INVOKE_DEFAULT")
 
 
 def draw_try(layout: Any, context: bpy.types.Context) -> None:
