@@ -259,16 +259,19 @@ class _Trial:
         """
         own, spent = self._sample(FEWEST, self.number, "measuring")
         _, finishing, _ = self._finish(self.request, own, others)
-        tried = [(FEWEST, spent)]
+        budget, tried = seconds - finishing, [(FEWEST, spent)]
+        frames = [own]
         for _ in range(_GUESSES):
             count = tried[-1][0]
-            wanted = wanted_samples(seconds - finishing, tried)
+            wanted = wanted_samples(budget, tried)
             if abs(wanted - count) <= max(_ALIKE * count, 0.5):
                 break
             left = len(self.numbers) * seconds
             own, spent = self._sample(wanted, self.number, f"{wanted} samples", left)
             tried.append((wanted, spent))
-        return self._request(tried[-1][0]), own, spent
+            frames.append(own)
+        best = min(range(len(tried)), key=lambda i: abs(tried[i][1] - budget))
+        return self._request(tried[best][0]), frames[best], tried[best][1]
 
     def _request(self, samples: int) -> Request:
         return self.request.with_settings(samples=samples)
