@@ -17,7 +17,7 @@ from ..planning.estimates import resolved
 from ..planning.settings import Mode
 from ..rendering import history
 from ..rendering.blender_job import Job
-from ..rendering.try_frame import Way, work_of
+from ..rendering.try_frame import FEWEST, Way, work_of
 from . import split
 from .panel import summary
 from .panel.paragraph import translated
@@ -193,11 +193,15 @@ def expected_wait(scene: Any, frames: int) -> float | None:
 
     None where no frame of the scene has been rendered yet.
     """
-    settings = replace(
-        request_of(scene.xrds).settings, mode=Mode.CYCLES_ONLY, denoising=None
+    settings, known = request_of(scene.xrds).settings, history.scene_settings(scene)
+    cycles = replace(settings, mode=Mode.CYCLES_ONLY, denoising=None)
+    fewest = replace(settings, mode=Mode.FULL_SIZE, samples=FEWEST)
+    first, least = (
+        history.seconds(scene, resolved(each, known)) for each in (cycles, fewest)
     )
-    known = history.seconds(scene, resolved(settings, history.scene_settings(scene)))
-    return None if known is None else known * (frames + 1)
+    if first is None:
+        return None
+    return first + frames * max(first, least or 0.0)
 
 
 def register() -> None:
