@@ -187,21 +187,18 @@ class _Trial:
         self._finish(self.request, other, others)
         cycles = self._render_by_cycles()
         request, own, sampled = self._choose(cycles.seconds, others)
-        left = cycles.seconds
+        samples = request.settings.own_samples or FEWEST
         frames, seconds = [], [sampled]
         for place, number in enumerate(x for x in self.numbers if x != self.number):
-            rest = (len(self.numbers) - 1 - place) * left
-            what = f"frame {number}, {request.settings.samples} samples"
-            frame, spent = self._sample(
-                request.settings.samples or 0, number, what, rest
-            )
+            left = (len(self.numbers) - 1 - place) * cycles.seconds
+            what = f"frame {number}, {samples} samples"
+            frame, spent = self._sample(samples, number, what, left)
             frames.append(frame)
             seconds.append(spent)
         self._begin("denoising")
         pixels, finishing, used = self._finish(request, own, frames)
         session.write_combined(self.engine, layer, pixels)
         spent = sum(seconds) / len(seconds) + finishing
-        samples = request.settings.samples or 0
         ours = Way("XRDS", next(iter(pixels.values())), samples, spent, finishing)
         if samples == FEWEST and spent > (1 + _ALIKE) * cycles.seconds:
             self.notes.append(
@@ -221,6 +218,7 @@ class _Trial:
 
     def _render_by_cycles(self) -> Way:
         """The frame as the file has it, but denoised."""
+        go_to(self.engine, self.depsgraph, self.number)
         scene, layer = self.depsgraph.scene_eval, self.depsgraph.view_layer_eval
         cycles = scene.cycles
         _, samples = subset_of_file(cycles, session.samples_of(self.depsgraph))

@@ -15,6 +15,8 @@ pytest.importorskip("mitsuba_oidn")
 from xrds_blender.cycles import session
 from xrds_blender.planning.request import Request, render_request
 from xrds_blender.rendering import try_frame as module
+from xrds_blender.rendering.render import render
+from xrds_blender.rendering.shot import render_shot
 from xrds_blender.rendering.split import draw_split, line_width, split_picture
 from xrds_blender.rendering.try_frame import FEWEST, try_frame, wanted_samples
 from xrds_core.errors import Cancelled, SceneError
@@ -59,6 +61,34 @@ def test_both_ways_of_one_frame(scene: Any) -> None:
     assert tried.xrds.samples >= FEWEST
     assert "Denoise is off" in tried.notes[0]
     assert lines[-1] == "frame 2: denoising"
+
+
+def test_cycles_picture_is_cycles_own(scene: Any) -> None:
+    """Of this frame, to the bit."""
+    scene.cycles.use_denoising, scene.cycles.samples = True, 3
+    for number in (1, 3):  # neighbours see it from far aside
+        scene.camera.location.x = number
+        scene.camera.keyframe_insert("location", frame=number)
+    scene.frame_set(2)
+    tried = try_frame(scene, request())
+    own = render(scene, plain=True)
+    np.testing.assert_array_equal(tried.cycles.pixels, own.pixels)
+    assert tried.notes == tuple(x for x in tried.notes if "too short" in x)
+
+
+@pytest.mark.parametrize("still", [False, True])
+def test_our_picture_is_that_of_a_shot(scene: Any, still: bool) -> None:
+    if still:  # frames then continue one sequence
+        scene.camera.animation_data_clear()
+        cube = bpy.data.objects["Red"]
+        for number in (1, 5):
+            cube.location.x = 0.1 * number
+            cube.keyframe_insert("location", frame=number)
+        scene.frame_set(2)
+    tried = try_frame(scene, request())
+    shot = request().with_settings(samples=tried.xrds.samples)
+    pictures = dict(render_shot(scene, shot, [1, 2, 3]))
+    np.testing.assert_array_equal(tried.xrds.pixels, pictures[2].pixels)
 
 
 def test_no_frame_is_sampled_twice_where_the_time_is_short(
