@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from .errors import UsageError
@@ -88,6 +88,28 @@ def _find_numbered(pattern: str) -> list[tuple[str, int]]:
     name = re.compile(f"{before}(-?[0-9]+){after}")
     matches = (name.fullmatch(path.name) for path in folder.iterdir())
     return [(match[0], int(match[1])) for match in matches if match]
+
+
+def find_sequences(names: Iterable[str]) -> dict[str, list[int]]:
+    """Return the patterns of names of files, and the frame numbers of each, in order.
+
+    The last digits of a name are its number. A name without any is its own pattern,
+    and has no numbers.
+    """
+    found: dict[tuple[str, str], list[str]] = {}
+    patterns: dict[str, list[int]] = {}
+    for name in names:
+        path = Path(name)
+        match = re.fullmatch(r"(.*?)(\d+)(\D*)", path.stem)
+        if match is None:
+            patterns[name] = []
+        else:
+            ends = match[1], match[3] + path.suffix
+            found.setdefault(ends, []).append(match[2])
+    for (before, after), numbers in found.items():
+        pattern = before + "#" * min(map(len, numbers)) + after
+        patterns[pattern] = sorted(map(int, numbers))
+    return patterns
 
 
 def in_words(numbers: Sequence[int]) -> str:

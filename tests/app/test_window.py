@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sequences
 from program import Window
 
 pytestmark = pytest.mark.timeout(3600)
@@ -322,6 +323,81 @@ stages and 'frame 2' in (stages.current() or '')
     window.settle()
     window.shot("10_stopped_animation")
     leave_picture(window)
+
+
+def test_a_frame_is_tried_and_the_line_dragged(window: Window) -> None:
+    """As the panel's button does it; the picture opens in a window of its own."""
+    small_scene(window, 4)
+    window.ask("bpy.data.scenes[0].frame_set(2)")
+    before = settings(window)
+    window.ask("bpy.ops.xrds.try_frame('INVOKE_DEFAULT')")
+    window.wait(f"{MODAL} == ['XRDS_OT_move_split']")
+    window.settle()
+    window.shot("10_try")
+    assert settings(window) == before
+    assert window.ask("bpy.data.scenes[0].frame_current") == 2
+    left, right = window.ask(PICTURE_ON_SCREEN)
+    middle = (left + right) // 2, 400
+    window.drag(middle, ((left + middle[0]) // 2, 400))
+    window.shot("10_try_dragged")
+    assert window.ask(LINE) == pytest.approx(SIZE[0] / 4, abs=3)
+    window.key("Escape")
+    window.wait(f"not {MODAL}", 60)
+    window.ask(
+        """
+other = bpy.context.window_manager.windows[-1]
+with bpy.context.temp_override(window=other):
+    bpy.ops.wm.window_close()
+"""
+    )
+
+
+MODAL = """[
+    each.bl_idname for other in bpy.context.window_manager.windows
+    for each in other.modal_operators if each.bl_idname.startswith('XRDS')]"""
+LINE = """
+from xrds_blender.interface import split
+from xrds_blender.internals.lifetimes import FILE
+FILE.of(split.Shown).place
+"""
+PICTURE_ON_SCREEN = """
+other = bpy.context.window_manager.windows[-1]
+region = next(r for r in other.screen.areas[0].regions if r.type == 'WINDOW')
+corners = [region.view2d.view_to_region(x, 0, clip=False)[0] for x in (0.0, 1.0)]
+[other.x + region.x + corner for corner in corners]
+"""
+
+
+def test_rendered_frames_are_denoised_beside_the_window(window: Window) -> None:
+    """Chosen in the file browser; Esc stops, and the next time does the rest."""
+    folder = window.program.share / "noisy"
+    for number in range(1, 7):
+        sequences.write(folder, sequences.frame(number))
+    where = f"directory={window.program.seen(folder)!r} + '/'"
+    window.ask(f"bpy.ops.xrds.denoise_files('INVOKE_DEFAULT', {where})")
+    window.wait(f"{BROWSER} is not None", 60)
+    window.settle()
+    window.shot("10_denoise_files")
+    window.ask(
+        f"""
+area, other = {BROWSER}, bpy.context.window_manager.windows[-1]
+with bpy.context.temp_override(window=other, area=area):
+    bpy.ops.file.execute()
+"""
+    )
+    window.move(400, 620)
+    window.key("Escape")
+    window.wait(f"not {MODAL}")
+    assert "XRDS was stopped; frames denoised into" in window.log
+    window.ask(f"bpy.ops.xrds.denoise_files('EXEC_DEFAULT', {where})")
+    window.wait(f"not {MODAL}")
+    window.shot("10_denoised_files")
+    assert len(list((folder / "denoised").glob("*.exr"))) == 6
+
+
+BROWSER = """next((
+    a for a in bpy.context.window_manager.windows[-1].screen.areas
+    if a.type == 'FILE_BROWSER'), None)"""
 
 
 def test_the_compositors_result_is_saved(window: Window) -> None:

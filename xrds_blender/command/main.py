@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 from xrds_core.errors import UsageError, finished
 from xrds_core.version import package_version
 
-from . import cameras, console, denoise, info, render, upscale
+from . import cameras, console, denoise, info, render, try_frame, upscale
 from .console import no_lines
 
 EXAMPLES = {
@@ -25,6 +25,10 @@ EXAMPLES = {
         "xrds render shot.blend --frame 7 --samples 64 -o still.png",
     ),
     "plan": ("xrds plan shot.blend -a", "xrds plan shot.blend --frame 7 --scale 2"),
+    "try": (
+        "xrds try shot.blend --frame 40 -o try.webp",
+        "xrds try shot.blend --resolution 960x540 -o try.png",
+    ),
     "denoise": (
         "xrds denoise 'noisy/####.exr' -o 'frames/####.exr'",
         "xrds denoise 'noisy/####.exr' -o 'frames/####.exr' --frames 1-48 --passes all",
@@ -134,6 +138,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
     added = (
         render.add_render,
         render.add_plan,
+        try_frame.add_try,
         denoise.add_denoise,
         cameras.add_cameras,
         upscale.add_upscale,

@@ -21,7 +21,7 @@ from . import arguments
 from .scene_file import SceneChoice
 
 DEVICE_HELP = "where the network runs: auto, cpu, cuda, cuda:1, metal"
-_RENDER_DEVICE_HELP = (
+RENDER_DEVICE_HELP = (
     "where the picture is denoised, and above scale 1 the network runs: auto, cpu, "
     "cuda, cuda:1, metal; Cycles renders where the file says"
 )
@@ -74,7 +74,7 @@ def add_request(command: argparse.ArgumentParser) -> None:
         help="seed of Cycles' noise, in place of the file's",
     )
     add_light(command)
-    add_network(command, _RENDER_DEVICE_HELP)
+    add_network(command, RENDER_DEVICE_HELP)
 
 
 def add_strength(

@@ -20,6 +20,9 @@ from xrds_core.files import replacing
 from xrds_core.frames import check_pattern, frame_path
 
 SUFFIXES = (".exr", ".png")
+SHOWN = {".png": "PNG", ".webp": "WEBP", ".jpg": "JPEG", ".jpeg": "JPEG"}
+"""Blender's kinds of files that hold a picture as it is shown."""
+_QUALITY = 95  # of those that lose some; of 100
 
 
 def check_output(
@@ -113,31 +116,48 @@ def save(
 def _write_png(
     path: Path, radiance: Array, alpha: Array, scene: Any, metadata: Mapping[str, str]
 ) -> None:
+    with _as_shown(path, radiance, alpha, scene) as unfinished:
+        if png_size(unfinished) != alpha.shape[::-1]:
+            raise PictureError(f"cannot write {path}: is the disk full?")
+        add(unfinished, metadata)
+
+
+def save_as_shown(path: Path, pixels: Array, scene: Any) -> None:
+    """Write a picture (H, W, 4) as Blender shows it, all at once or not at all.
+
+    The path ends in one of SHOWN. Raises PictureError if it cannot be written.
+    """
+    with _as_shown(path, pixels[..., :3], pixels[..., 3], scene) as unfinished:
+        if not unfinished.stat().st_size:
+            raise PictureError(f"cannot write {path}: is the disk full?")
+
+
+@contextmanager
+def _as_shown(path: Path, radiance: Array, alpha: Array, scene: Any) -> Iterator[Path]:
+    """Yield a file that takes the place of `path` at the end."""
     if not path.parent.is_dir():  # Blender would make it anew, wherever that is by now
         raise PictureError(f"cannot write {path}: its folder no longer exists")
     try:
         with replacing(path) as unfinished:
-            _save_png(unfinished, radiance, alpha, scene)
-            if png_size(unfinished) != alpha.shape[::-1]:
-                raise PictureError(f"cannot write {path}: is the disk full?")
-            add(unfinished, metadata)
+            _save(unfinished, SHOWN[path.suffix.lower()], radiance, alpha, scene)
+            yield unfinished
     except OSError as error:
         raise PictureError(f"cannot write {path}: {error.strerror}") from error
 
 
-def _save_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
-    """Let Blender apply the scene's view transform and write the file."""
+def _save(path: Path, kind: str, radiance: Array, alpha: Array, scene: Any) -> None:
+    """Let Blender apply the scene's view transform and write a file of a kind."""
     import bpy
 
     height, width = alpha.shape
-    if _png_mode(scene) == "BW":  # as Blender's renders: grey before the view transform
+    if _colours(scene) == "BW":  # as Blender's renders: grey before the view transform
         radiance = np.repeat(luminance(radiance)[..., None], 3, axis=2)
     image = bpy.data.images.new("xrds", width, height, alpha=True, float_buffer=True)
     try:
         image.alpha_mode = "PREMUL"
         rows = np.dstack((radiance, alpha))[::-1]  # Blender's first row is the lowest
         image.pixels.foreach_set(np.ascontiguousarray(rows, np.float32).ravel())
-        with _png_settings(scene):
+        with _settings_for(kind, scene):
             image.save_render(str(path.resolve()), scene=scene)
     except RuntimeError as error:
         reason = " ".join(str(error).removeprefix("Error:").split())
@@ -146,7 +166,7 @@ def _save_png(path: Path, radiance: Array, alpha: Array, scene: Any) -> None:
         bpy.data.images.remove(image)
 
 
-def _png_mode(scene: Any) -> str:
+def _colours(scene: Any) -> str:
     settings = scene.render.image_settings
     if settings.file_format == "PNG" or settings.color_mode == "BW":
         return str(settings.color_mode)
@@ -154,16 +174,18 @@ def _png_mode(scene: Any) -> str:
 
 
 @contextmanager
-def _png_settings(scene: Any) -> Iterator[None]:
-    """Ask Blender for PNG: of the file's colours and bits where it is for PNG.
+def _settings_for(kind: str, scene: Any) -> Iterator[None]:
+    """Ask Blender for a kind of file: of the file's colours and bits if it is for PNG.
 
     Else with alpha where the film is transparent.
     """
     settings = scene.render.image_settings
+    colours = _colours(scene)
     wanted = {
         "media_type": "IMAGE",  # from Blender 5.0 on, and to be set before the format
-        "file_format": "PNG",
-        "color_mode": _png_mode(scene),
+        "file_format": kind,
+        "color_mode": "RGB" if kind == "JPEG" and colours == "RGBA" else colours,
+        "quality": _QUALITY,
     }
     wanted = {name: value for name, value in wanted.items() if hasattr(settings, name)}
     # the format decides which depths there are

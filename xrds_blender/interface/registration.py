@@ -11,7 +11,16 @@ import bpy
 from ..cycles import session
 from ..internals import engine_override
 from ..internals.lifetimes import PROCESS, RENDER_JOB
-from . import engine, live_picture, operators, preferences, properties, thread_guard
+from . import (
+    denoise_files,
+    engine,
+    live_picture,
+    operators,
+    preferences,
+    properties,
+    thread_guard,
+    try_frame,
+)
 from .panel import panels
 
 
@@ -36,6 +45,8 @@ def register(package: str = "xrds_blender") -> None:
     live_picture.register()
     preferences.register(package)
     operators.register()
+    try_frame.register()
+    denoise_files.register()
     panels.register()
     for handlers in _render_jobs():
         handlers.append(_forget_frames)
@@ -57,6 +68,8 @@ def unregister() -> None:
     for handlers in _render_jobs():
         handlers.remove(_forget_frames)
     panels.unregister()
+    denoise_files.unregister()
+    try_frame.unregister()
     operators.unregister()
     preferences.unregister()
     live_picture.unregister()

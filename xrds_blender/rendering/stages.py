@@ -59,11 +59,16 @@ class _Run:
 
 @dataclass
 class Current:
-    """The render that goes on, if any, and the frames of its animation."""
+    """The render that goes on, if any, and the frames of its animation.
+
+    Of a longer job, which `head` names, it is a `share`, and so much was done `before`.
+    """
 
     run: _Run | None = None
-    frame: str = ""
+    head: str = ""
     clock: ShotClock | None = None
+    before: float = 0.0
+    share: float = 1.0
 
 
 @dataclass
@@ -106,7 +111,7 @@ def begin_animation(to_sample: int, to_finish: int) -> None:
 
 def begin_frame(number: int, of: int) -> None:
     """Note which frame of an animation has begun, and the number of the last."""
-    RENDER_JOB.of(Current).frame = f"frame {number} of {of}, "
+    RENDER_JOB.of(Current).head = f"frame {number} of {of}"
 
 
 def end_sampling() -> None:
@@ -121,6 +126,13 @@ def end_frame() -> None:
     clock = RENDER_JOB.of(Current).clock
     if clock is not None:
         clock.finished()
+
+
+def begin_part(text: str, before: float, share: float) -> None:
+    """Note which part of a longer job has begun, and what of the job it is."""
+    end()
+    state = RENDER_JOB.of(Current)
+    state.head, state.before, state.share = text, before, share
 
 
 def reporter(engine: Any) -> Callable[[float], bool]:
@@ -141,7 +153,8 @@ def end() -> None:
     state = RENDER_JOB.of(Current)
     if state.run is not None and state.run.reported >= 1.0:
         _learn(state.run, time.perf_counter())
-    state.run, state.frame = None, ""
+    state.run, state.head = None, ""
+    state.before, state.share = 0.0, 1.0
 
 
 def current() -> str | None:
@@ -150,10 +163,10 @@ def current() -> str | None:
     run = state.run
     if run is None:
         return None
-    if state.clock is not None:
-        left = state.clock.left()
+    if state.head:
+        left = None if state.clock is None else state.clock.left()
         time_left = "" if left is None else f", all frames in {duration(left)}"
-        return f"XRDS: {state.frame}{run.stage.lower()}{time_left}"
+        return f"XRDS: {state.head}, {run.stage.lower()}{time_left}"
     left = _left(run)
     time_left = "" if left is None else f", {_clock(left)} left"
     return f"XRDS {run.number}/{run.of}: {run.stage}{time_left}"
@@ -173,7 +186,7 @@ def show() -> None:
         return
     spent, left = time.perf_counter() - run.start, _left(run)
     part = 0.0 if left is None else spent / max(spent + left, 1e-6)
-    run.engine.update_progress(part)
+    run.engine.update_progress(state.before + state.share * part)
 
 
 def _learn(run: _Run, now: float) -> None:

@@ -27,7 +27,7 @@ from ..frames import (
     in_words,
     misnamed,
 )
-from ..progress import Clock
+from ..progress import Callback, Clock, Progress
 from ..shot import Shot
 from ..version import package_version
 from .frame_file import FrameFile, Reading
@@ -206,6 +206,7 @@ def denoise_sequence(
     reading: Reading | None = None,
     resume: bool = False,
     say: Say = lambda _: None,
+    progress: Callback | None = None,
 ) -> dict[str, Any]:
     """Denoise the frames of a sequence, each with its neighbours' samples, in order.
 
@@ -230,6 +231,8 @@ def denoise_sequence(
         they are now.
     say : callable
         Takes a line about a frame that is finished, left out, or not reusable.
+    progress : callable, optional
+        Takes the fraction of all frames that is done; False as its result cancels.
 
     Returns
     -------
@@ -243,6 +246,8 @@ def denoise_sequence(
     PictureError
         If no frame can be read, the first lacks passes, or an output cannot be written;
         outputs before it are complete.
+    Cancelled
+        If `progress` requests it; outputs that are there are complete.
     """
     if not 0.0 <= strength <= 1.0:
         raise UsageError(f"strength is {strength}; it must be from 0 to 1")
@@ -265,7 +270,17 @@ def denoise_sequence(
     if first is None and not done:
         raise PictureError(f"no frame can be read: {loader.failed[numbers[0]]}")
     shot = Shot(tuple(n for n in readable if n not in done), radius, others=beside)
-    source = _Frames(files, denoiser, shot, loader, recipe, resume, say, strength)
+    source = _Frames(
+        files,
+        denoiser,
+        shot,
+        loader,
+        recipe,
+        resume,
+        say,
+        Progress(progress),
+        strength,
+    )
     entries = [x for x in finish_frames(shot, source, source.finish) if x is not None]
     source.selection.report()
     return {
@@ -293,6 +308,7 @@ class _Frames(FrameSource[FrameFile]):
     recipe: Recipe
     resume: bool
     say: Say
+    progress: Progress
     strength: float
     selection: NeighbourSelection = field(init=False)
     movement: Movement = field(default_factory=Movement)
@@ -303,6 +319,8 @@ class _Frames(FrameSource[FrameFile]):
         self.selection = NeighbourSelection(self.say)
 
     def load(self, number: int) -> FrameFile | None:
+        self.progress.monitor(0.0)
+        self.progress.check()
         return self.loader.load(number)
 
     def is_done(self, frame: Neighbourhood[FrameFile]) -> bool:
@@ -327,6 +345,7 @@ class _Frames(FrameSource[FrameFile]):
     def _finish(self, frame: Neighbourhood[FrameFile]) -> dict[str, Any]:
         number, own = frame.number, frame.own
         views, others = {}, {}
+        self.progress.begin_stage(1.0 / len(self.shot.frames))
         for view, file in {"": own, **own.others}.items():
             others[view] = self.selection.select(
                 number, file, _neighbours_in_view(frame, view)
@@ -337,6 +356,7 @@ class _Frames(FrameSource[FrameFile]):
                 others[view],
                 self.denoiser,
                 self.movement,
+                self.progress.monitor,
                 region=region,
                 light=file.light,
                 strength=self.strength,

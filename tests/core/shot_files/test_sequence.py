@@ -22,7 +22,7 @@ pytest.importorskip("mitsuba_oidn")
 from xrds_core.accumulation.frame import store
 from xrds_core.accumulation.object_motion import Movement
 from xrds_core.denoising import Denoiser
-from xrds_core.errors import NotReusable, PictureError, Unfit, UsageError
+from xrds_core.errors import Cancelled, NotReusable, PictureError, Unfit, UsageError
 from xrds_core.finish import finish_frame
 from xrds_core.shot_files.frame_file import Reading, read_frame
 from xrds_core.shot_files.pass_names import PassNames
@@ -117,6 +117,28 @@ def test_chunks_give_the_frames_that_one_go_gives(
         name = f"{number:04d}.exr"
         whole, part = (picture(shot / x / name) for x in ("out", "chunks"))
         np.testing.assert_array_equal(whole, part)
+
+
+def test_a_stop_inside_a_frame_leaves_whole_files_and_a_resume_goes_on(
+    shot: Path, denoiser: Denoiser
+) -> None:
+    parts: list[float] = []
+
+    def stop(part: float) -> bool:
+        parts.append(part)
+        return part < 0.5
+
+    with pytest.raises(Cancelled):
+        denoise(shot, denoiser, radius=1, progress=stop)
+    assert parts == sorted(parts)
+    assert 0.4 < parts[-2] < 0.5 <= parts[-1] < 0.6  # in the third of five
+    names = sorted(path.name for path in (shot / "out").iterdir())
+    assert names == ["0001.exr", "0002.exr"]
+    parts.clear()
+    told = denoise(shot, denoiser, radius=1, resume=True, progress=parts.append)
+    assert told["kept"] == [1, 2]
+    assert [entry["frame"] for entry in told["frames"]] == [3, 4, 5]
+    assert 0.99 < parts[-1] <= 1.0
 
 
 class Counting:

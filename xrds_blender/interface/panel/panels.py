@@ -19,7 +19,7 @@ from ...rendering.loading import capabilities
 from ...rendering.modes import estimates
 from ...scene.contents import has_light
 from ...scene.strength import SEEN
-from .. import live_picture, operators, presets, translations
+from .. import live_picture, operators, presets, translations, try_frame
 from ..properties import DEADLINE, request_of
 from ..translations import CONTEXT
 from . import animation, cycles_panels, mode_table, paragraph, scene_cache, summary
@@ -60,6 +60,8 @@ class XRDS_PT_settings(_RenderPanel, bpy.types.Panel):
         shot = scene_cache.is_shot(scene, request)
         estimated = estimates(scene, request.settings, here, shot)
         mode_table.draw(layout, scene, here, automatic(here.denoiser), estimated)
+        if shot:
+            try_frame.draw_try(layout, scene, request)
         layout.use_property_split = True
         layout.use_property_decorate = False
         _draw_choices(layout, scene, request, here)
@@ -124,9 +126,12 @@ class XRDS_PT_under_cycles(_OtherEnginePanel, bpy.types.Panel):
     engines = {cycles_panels.CYCLES}
 
     def draw(self, context: bpy.types.Context) -> None:
-        request = request_of(context.scene.xrds)
-        if scene_cache.is_animation(context.scene):
+        scene = context.scene
+        request = request_of(scene.xrds)
+        if scene_cache.is_animation(scene):
             animation.draw(self.layout, context, request)
+        if scene_cache.is_shot(scene, request):
+            try_frame.draw_try(self.layout, scene, request)
         operators.draw(self.layout.column(align=True))
 
 
