@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from statistics import median
 
 from .errors import Cancelled
 
@@ -88,7 +90,7 @@ class Clock:
         return f"{took:.1f} s; {left} left, about {rest}"
 
 
-_NEWEST = 0.2  # weight of the newest piece in what is expected of the next
+_NEWEST = 5  # pieces whose median is expected of the next: a few are far dearer
 
 
 class _Work:
@@ -96,13 +98,12 @@ class _Work:
 
     def __init__(self, left: int, seconds: float | None) -> None:
         self.left, self.seconds = left, seconds
-        self._done = 0
+        self._newest: deque[float] = deque(maxlen=_NEWEST)
 
     def add(self, seconds: float) -> None:
-        self._done += 1
         self.left = max(self.left - 1, 0)
-        before = 0.0 if self.seconds is None else self.seconds
-        self.seconds = before + max(1.0 / self._done, _NEWEST) * (seconds - before)
+        self._newest.append(seconds)
+        self.seconds = median(self._newest)
 
 
 class ShotClock:

@@ -282,18 +282,20 @@ def learn(
     return replace(now, **means)
 
 
+_OF_NO_STAGE = {"total", "load"}  # nor is what is loaded loaded again
+
+
 def _learn_frame(
     before: Measured, settings: Settings, seconds: Mapping[str, float], model: Model
 ) -> Measured:
-    stages = {stage: x for stage, x in seconds.items() if stage != "total"}
-    parts = sum(stages.values())
+    parts = sum(x for stage, x in seconds.items() if stage not in _OF_NO_STAGE)
     now = before
     if seconds["accumulate"]:
         # the frames ahead count in the total of the first one
         now = replace(before, reuse=seconds["accumulate"] + seconds["again"])
         fixed = seconds["sync"] + seconds["write"]
     else:
-        whole = max(seconds["total"], parts)
+        whole = max(seconds["total"] - seconds["load"], parts)
         now = replace(before, totals={**before.totals, settings: whole})
         fixed = seconds["sync"] + seconds["write"] + whole - parts
     now = replace(now, fixed=fixed)

@@ -97,17 +97,16 @@ def offers(animation: Animation, curve: Curve, figures: ShotFigures) -> Offers:
 
 
 def _same_picture(animation: Animation, figures: ShotFigures) -> Offer:
-    of_camera = figures.of_camera(animation.is_still)
     share = animation.share
     if share is None:
-        of_samples = of_camera.share.at(animation.samples)
-        share = of_camera.threshold_share if animation.has_threshold else of_samples
+        of_samples = figures.share.at(animation.samples)
+        share = figures.threshold_share if animation.has_threshold else of_samples
     samples = share * animation.samples
     seconds = animation.seconds(samples)
     if seconds is not None:
         seconds += figures.measuring * animation.samples * animation.sample
     is_measured = animation.share is not None
-    flicker = of_camera.same_flicker
+    flicker = figures.of_camera(animation.is_still).same_flicker
     return Offer(Kind.PICTURE, seconds, samples, 0.0, flicker, is_measured)
 
 

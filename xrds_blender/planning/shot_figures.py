@@ -46,16 +46,12 @@ class Points:
 class CameraFigures:
     """What was measured under cameras that move, or that stand still, at radius 4.
 
-    Beside the frame alone: `gain` in dB of PSNR, and `flicker` as a ratio, by samples.
-    Of *Same Picture*, beside the file's own samples: the `share` of them that frames
-    take on the mean by samples, under a noise threshold `threshold_share`, and
-    `same_flicker`.
+    Beside the frame alone: `gain` in dB of PSNR, and `flicker` as a ratio, by samples;
+    `same_flicker` of *Same Picture* beside Cycles with the file's samples.
     """
 
     gain: Points
     flicker: Points
-    share: Points
-    threshold_share: float
     same_flicker: float
 
 
@@ -63,13 +59,17 @@ class CameraFigures:
 class ShotFigures:
     """All of them; `by_radius` is what a radius gains, over radius 4.
 
-    Measuring in *Same Picture* takes as many samples as `measuring` frames of the
-    file. `accumulate`: seconds for each neighbour, and `again`: the part of the picture
-    that is denoised a second time, over the seconds of our denoiser of quality high.
+    In *Same Picture* late frames take a `share` of the file's samples, by these, under
+    a noise threshold `threshold_share`; a camera that stands still may take less. Its
+    measuring takes as many samples as `measuring` frames of the file. `accumulate`:
+    seconds for each neighbour, and `again`: the part of the picture that is denoised a
+    second time, over the seconds of our denoiser of quality high.
     """
 
     moving: CameraFigures
     still: CameraFigures
+    share: Points
+    threshold_share: float
     by_radius: Points
     measuring: float
     accumulate: float
@@ -103,14 +103,14 @@ def shipped() -> ShotFigures:
         return CameraFigures(
             gain=Points.of(entry["gain"]),
             flicker=Points.of(entry["flicker"]),
-            share=Points.of(entry["share"]),
-            threshold_share=entry["threshold_share"],
             same_flicker=entry["same_flicker"],
         )
 
     return ShotFigures(
         camera("moving"),
         camera("still"),
+        Points.of(content["share"]),
+        content["threshold_share"],
         Points.of(content["by_radius"]),
         content["measuring"],
         content["accumulate"],

@@ -52,9 +52,10 @@ class Picture:
 
     `radiance` (H, W, 3) is premultiplied by `alpha` (H, W); `albedo` and `normal`
     (H, W, 3) and `low_resolution` (h, w, 3) are None for Cycles alone. `seconds` by
-    stage: total, sync, beauty, accumulate, denoise, again (what of the frame alone is
-    denoised as well), guides, network, write; Cycles reports its denoising and sampling
-    as one, so `beauty` holds both then. `peak_memory`
+    stage: total, load (what a first render waits for), sync, beauty, accumulate,
+    denoise, again (what of the frame alone is denoised as well), guides, network,
+    write; Cycles reports its denoising and sampling as one, so `beauty` holds both
+    then. `peak_memory`
     is the largest in bytes that the process has taken so far; `device` is what the
     network ran on, empty for Cycles alone; `settings` are what it was rendered
     by, as a time budget chose them; `views` (H, W, 4) are all views of stereo by name;

@@ -133,9 +133,12 @@ def render_alone(
             if alone.settings.is_enlarged and torch_folder.loaded() is None:
                 stages.begin(engine, stages.LOADING, 0)  # which takes some seconds
             # first: missing weights are to cost no render
+            loading = time.perf_counter()
             method = method_of(timed.request, timed=timed)
+            loading = time.perf_counter() - loading
             own = method.sample(engine, depsgraph)
             picture = _finish(engine, layer.name, method, own)
+            picture.seconds["load"] = loading
     finally:
         stages.end()
     return _remembered(picture, layer, start)

@@ -36,9 +36,7 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
     ]
     even = [x for x in same if not x["noise_threshold"]]
     noisy = [x for x in same if x["noise_threshold"]]
-    locked = results.read("shots/locked-off.json")  # of 64 samples
-    late = [x["share"] for x in locked["frames"] if x["share"] < 0.5]  # not measured
-    still_share = _mean(late)
+    locked = results.read("shots/locked-off.json")
     locked_flicker = (
         locked["flicker"]["same_picture"] / locked["flicker"]["cycles_oidn"]
     )
@@ -46,16 +44,14 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
         "source": (
             "gain: gallery of small shots, 320x180, middle frame of nine beside the "
             "frame alone; flicker: the gallery's under a camera that stands still, "
-            "seven scenes under one that pans; share: Same Picture, late frames of 21, "
-            "and of 100 under a camera that stands still; accumulate: 1080p"
+            "seven scenes under one that pans; share: Same Picture, late frames of 21 "
+            "under a camera that pans; accumulate: 1080p"
         ),
         "moving": {
             "gain": _means(
                 (x for x in gallery if x["shot"] not in stills), lambda x: x["gain"]
             ),
             "flicker": _means(pan, lambda x: x["flicker"] / x["flicker_alone"]),
-            "share": _means(even, lambda x: x["late_share"]),
-            "threshold_share": _mean(x["late_share"] for x in noisy),
             "same_flicker": _mean(_flicker_ratios(results.same_picture, same)),
         },
         "still": {
@@ -63,10 +59,10 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
                 (x for x in gallery if x["shot"] in stills), lambda x: x["gain"]
             ),
             "flicker": _means(flicker, lambda x: x["flicker"]),
-            "share": {"64": still_share},
-            "threshold_share": still_share,
             "same_flicker": round(locked_flicker, 3),
         },
+        "share": _means(even, lambda x: x["late_share"]),
+        "threshold_share": _mean(x["late_share"] for x in noisy),
         "by_radius": {
             str(radius): _mean(
                 fmean(x["gain"] for x in results.shot_rows("pan", n, radius))

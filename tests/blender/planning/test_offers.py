@@ -33,13 +33,18 @@ from xrds_lab.pages.shot_figures import figures
 MOVING = CameraFigures(
     gain=Points.of({4: 3.0, 64: 2.0}),
     flicker=Points.of({4: 0.6, 64: 0.8}),
-    share=Points.of({16: 0.25, 64: 0.5}),
-    threshold_share=0.6,
     same_flicker=0.98,
 )
-STILL = replace(MOVING, share=Points.of({64: 0.125}), same_flicker=0.4)
+STILL = replace(MOVING, same_flicker=0.4)
 FIGURES = ShotFigures(
-    MOVING, STILL, Points.of({1: 0.4, 4: 1.0}), 2.0, accumulate=0.01, again=0.2
+    MOVING,
+    STILL,
+    share=Points.of({16: 0.25, 64: 0.5}),
+    threshold_share=0.6,
+    by_radius=Points.of({1: 0.4, 4: 1.0}),
+    measuring=2.0,
+    accumulate=0.01,
+    again=0.2,
 )
 CURVE = Curve.of({1: 30.0, 16: 38.0, 64: 42.0})
 # A frame of 64 samples: in Cycles 64 + 6 s, in XRDS 64 + 4 s.
@@ -59,7 +64,7 @@ def test_the_same_picture_takes_a_share_of_the_samples() -> None:
     here = found(replace(SHOT, share=0.25))[Kind.PICTURE]
     assert (here.samples, here.is_measured) == (16, True)
     still = found(replace(SHOT, is_still=True))[Kind.PICTURE]
-    assert (still.samples, still.flicker) == (8, 0.4)
+    assert (still.samples, still.flicker) == (32, 0.4)
     adaptive = found(replace(SHOT, has_threshold=True))
     assert adaptive[Kind.PICTURE].samples == pytest.approx(0.6 * 64)
     assert Kind.TIME not in adaptive  # what its samples are is not known
@@ -157,9 +162,9 @@ def test_neighbours_are_expected_before_a_shot_was_rendered() -> None:
 
     model = budget.shipped()
     ours = Settings(Mode.FULL_SIZE, 16, Denoising.XRDS_HIGH)
-    still = {"sync": 1.0, "beauty": 16.0, "denoise": 5.0, "total": 23.0}
+    still = {"sync": 1.0, "beauty": 16.0, "denoise": 5.0, "load": 2.0, "total": 25.0}
     known = learn(None, ours, 1000, still, model)
-    assert known.fixed == 2.0  # what no stage has counts
+    assert known.fixed == 2.0  # what no stage has counts, but loading
     alone = known.seconds(ours, 1000, model)
     assert alone == 23.0
     expected = alone + 5.0 * (8 * shipped().accumulate + shipped().again)

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 Row = tuple[str, str]
 MOST_ROWS = 6
 _STAGES = {
+    "load": "Loading",
     "sync": "Scene",
     "beauty": "Samples",
     "accumulate": "Neighbouring Frames",
