@@ -62,8 +62,9 @@ class ShotFigures:
     In *Same Picture* late frames take a `share` of the file's samples, by these, under
     a noise threshold `threshold_share`; a camera that stands still may take less. Its
     measuring takes as many samples as `measuring` frames of the file. `accumulate`:
-    seconds for each neighbour, and `again`: the part of the picture that is denoised a
-    second time, over the seconds of our denoiser of quality high.
+    seconds for each neighbour, over those of our denoiser of quality high, and `again`:
+    how often a part of the picture is denoised a second time, which small ones are as a
+    whole.
     """
 
     moving: CameraFigures

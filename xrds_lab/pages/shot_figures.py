@@ -75,7 +75,7 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
             (x["mean_share"] - x["late_share"]) * _SAME_FRAMES for x in same
         ),
         "accumulate": _accumulating(results),
-        "again": _mean(x["twice"] for x in gallery),
+        "again": _mean(x["twice"] > 0.0 for x in gallery),
     }
 
 
