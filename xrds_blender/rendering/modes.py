@@ -71,8 +71,8 @@ def offers_of(scene: Any, request: Request, frames: int) -> Offers:
         obstacle=obstacle(scene, request, frames),
         share=history.share(scene),
     )
-    model = budget.shipped()
-    curve = model.errors.full_size[BEST]
+    curves = budget.shipped().errors.full_size
+    curve = curves.get(BEST) or next(iter(curves.values()))
     return offers(animation, curve, shot_figures.shipped())
 
 

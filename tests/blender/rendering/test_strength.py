@@ -21,6 +21,7 @@ from xrds_blender.rendering.blender_job import call_engine
 from xrds_blender.rendering.explain import explain
 from xrds_blender.rendering.render import method_of
 from xrds_blender.rendering.sampling import has_neighbours, noisy_frame
+from xrds_blender.scene.keyframes import curves
 from xrds_blender.scene.remarks import remarks
 from xrds_blender.scene.strength import strength_of
 from xrds_core.errors import UsageError
@@ -72,6 +73,8 @@ def animated(scene: Any, folder: Path) -> dict[int, Mapping[str, np.ndarray]]:
     """The files that the engine writes of an animation, by frame: their channels."""
     scene.render.engine = "XRDS"
     settings = scene.render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "MULTI_LAYER_IMAGE"
     settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
     scene.render.filepath = str(folder / "#.exr")
     RENDER_JOB.end()
@@ -236,7 +239,7 @@ def test_an_objects_strength_can_be_keyed(life: Any, red: Any) -> None:
     for number, value in ((1, 0.0), (3, 0.5)):
         red.xrds_strength = value
         red.keyframe_insert("xrds_strength", frame=number)
-    for curve in red.animation_data.action.fcurves:
+    for curve in curves(red.animation_data.action):
         for point in curve.keyframe_points:
             point.interpolation = "LINEAR"
     seen = [np.min(strengths(life, number)) for number in FRAMES]
