@@ -53,7 +53,8 @@ class Animation:
     of a frame in Cycles, and in XRDS it takes `fixed` seconds and so many for each
     `sample`: None where nothing is known. `radius` frames before and after are reused;
     0 where they cannot be. `obstacle` says why *Same Picture* is not possible, and
-    `share` how much of the samples it took here.
+    `share` how much of the samples it took here. It `is_noisy` where Cycles does not
+    denoise it.
     """
 
     frames: int
@@ -64,6 +65,7 @@ class Animation:
     radius: int = 0
     is_still: bool = False
     has_threshold: bool = False
+    is_noisy: bool = False
     obstacle: str = ""
     share: float | None = None
 
@@ -180,10 +182,10 @@ def cycles_line(found: Offers, say: Say = in_english) -> str:
             "This animation, {frames} frames: one frame (F12) tells its time",
             frames=frames,
         )
-    time = duration(found.cycles)
-    return say(
-        "This animation in Cycles, {frames} frames: {time}", frames=frames, time=time
-    )
+    sentence = "This animation in Cycles, {frames} frames: {time}"
+    if found.animation.is_noisy:
+        sentence = "This animation in Cycles, not denoised, {frames} frames: {time}"
+    return say(sentence, frames=frames, time=duration(found.cycles))
 
 
 def offer_line(offer: Offer, animation: Animation, say: Say = in_english) -> str:

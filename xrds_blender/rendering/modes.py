@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from ..cycles import session
 from ..planning import budget, shot_figures
 from ..planning import estimates as estimating
 from ..planning.estimates import Capabilities, Estimate, resolved
@@ -67,6 +68,7 @@ def offers_of(scene: Any, request: Request, frames: int) -> Offers:
         sample=sample,
         radius=radius,
         is_still=bool(radius) and stands_still(scene.camera),
+        is_noisy=not (scene.cycles.use_denoising and session.has_denoiser()),
         has_threshold=scene.cycles.use_adaptive_sampling,
         obstacle=obstacle(scene, request, frames),
         share=history.share(scene),

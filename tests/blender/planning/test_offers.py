@@ -101,6 +101,8 @@ def test_frames_that_cannot_use_each_other_have_no_offer() -> None:
 def test_sentences() -> None:
     whole = offers(SHOT, CURVE, FIGURES)
     assert cycles_line(whole) == "This animation in Cycles, 100 frames: 1 h 57 min"
+    noisy = replace(whole, animation=replace(SHOT, is_noisy=True))
+    assert "in Cycles, not denoised, 100 frames" in cycles_line(noisy)
     same, in_time = (offer_line(x, SHOT) for x in whole.offers)
     assert same == "The same picture: 62 min, 32 samples a frame"
     assert in_time == (
