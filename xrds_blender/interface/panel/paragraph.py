@@ -16,7 +16,7 @@ def draw(
 ) -> None:
     """Draw a translated sentence, as wide as a share of the region."""
     system = context.preferences.system
-    width = share * context.region.width - MARGIN * system.ui_scale
+    width = share * (context.region.width - MARGIN * system.ui_scale)
     column = layout.column(align=True)
     column.scale_y = 0.8
     for line in lines(text, width, _measure(context)):
