@@ -175,7 +175,7 @@ def _fit(window: Any, area: Any) -> None:
 def draw_try(layout: Any, scene: Any, request: Request) -> None:
     """Draw the button, with what the wait will be."""
     text = translated("Try on This Frame")
-    wait = expected_wait(scene, 2 * request.settings.temporal_radius + 1)
+    wait = expected_wait(scene, request)
     if wait is not None:
         time = duration(wait)
         text = translated("Try on This Frame (about {time})", time=time)
@@ -184,12 +184,13 @@ def draw_try(layout: Any, scene: Any, request: Request) -> None:
     )
 
 
-def expected_wait(scene: Any, frames: int) -> float | None:
-    """Seconds that a try will about take: Cycles' frame, and as many of XRDS.
+def expected_wait(scene: Any, request: Request) -> float | None:
+    """Seconds that a try will about take: Cycles' frame, and those of XRDS.
 
     None where no frame of the scene has been rendered yet.
     """
-    settings, known = request_of(scene.xrds).settings, history.scene_settings(scene)
+    settings, known = request.settings, history.scene_settings(scene)
+    frames = 2 * settings.temporal_radius + 1
     cycles = replace(settings, mode=Mode.CYCLES_ONLY, denoising=None)
     fewest = replace(settings, mode=Mode.FULL_SIZE, samples=FEWEST)
     first, least = (

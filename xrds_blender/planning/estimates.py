@@ -134,11 +134,12 @@ def _curve(settings: Settings, here: Capabilities, errors: ErrorModel) -> Curve 
         return errors.curves.get(wanted)
     if not here.any_denoiser:
         return None  # measured with a denoised low-resolution picture
-    wanted = replace(wanted, denoising=DEFAULT_DENOISING)
     alike = {
         family.guide_samples: curve
         for family, curve in errors.curves.items()
-        if replace(family, guide_samples=wanted.guide_samples) == wanted
+        if family.mode is wanted.mode
+        and family.preset == wanted.preset
+        and family.denoising is DEFAULT_DENOISING
     }
     enough = [n for n in alike if n <= wanted.guide_samples]
     return alike[max(enough)] if enough else None
