@@ -30,14 +30,12 @@ COPIED = (
 )
 # Left out: what starts a Python of its own.
 MODULES = (
-    "choosing/selecting",
-    "choosing/shot_budget",
     "cycles/live",
     "cycles/low_camera",
     "cycles/passes",
-    "frame/guide_cache",
-    "frame/guide_changes",
-    "frame/record",
+    "rendering/guide_cache",
+    "rendering/guide_changes",
+    "rendering/record",
     "interface/engine",
     "interface/panels",
     "interface/translations",
@@ -46,12 +44,14 @@ MODULES = (
     "internals/spare_passes",
     "planning/omissions",
     "scene/guide_key",
-    "shot/alpha",
-    "shot/features",
-    "shot/full_size",
-    "shot/shot",
-    "shot/shot_enlarged",
-    "shot/unchanged",
+    "rendering/alpha",
+    "rendering/features",
+    "rendering/full_size",
+    "rendering/shot",
+    "rendering/shot_enlarged",
+    "rendering/strength",
+    "rendering/try_frame",
+    "rendering/unchanged",
 )
 Verdicts = dict[str, str]
 
