@@ -27,11 +27,12 @@ from ..planning.request import MOST_SAMPLES, Request
 from ..planning.settings import DEFAULT_DENOISING, Mode
 from ..scene.contents import cuts, frame_range, moves_in_time
 from ..scene.strength import strength_of
-from . import stages
+from . import history, stages
 from .blender_job import call_engine
 from .engine_frames import go_to
 from .full_size import FullSize
 from .methods import CyclesOnly, Method
+from .picture import joined
 from .sampling import Sampled, has_neighbours
 
 CYCLES = "CYCLES"
@@ -175,12 +176,14 @@ class _Trial:
     number: int = field(init=False)
     notes: list[str] = field(default_factory=list)
     _parts: int = 0  # that have begun
+    _stages: dict[str, float] = field(default_factory=dict)  # of the last finishing
 
     def __post_init__(self) -> None:
         self.number = self.depsgraph.scene_eval.frame_current
 
     def render(self) -> Tried:
-        layer = self.depsgraph.view_layer_eval.name
+        known = history.layer_of(self.depsgraph)  # Cycles may free the scene
+        layer = known.name
         near = min(self.numbers, key=lambda n: (n == self.number, abs(n - self.number)))
         # what only the first render and the first denoising wait for counts for nobody
         other, _ = self._sample(FEWEST, near, "warming up")
@@ -199,6 +202,7 @@ class _Trial:
         self._begin("denoising")
         pixels, finishing, used = self._finish(request, own, frames)
         session.write_combined(self.engine, layer, pixels)
+        history.remember(known, request.settings, {**own.seconds, **self._stages})
         spent = sum(seconds) / len(seconds) + finishing
         ours = Way("XRDS", next(iter(pixels.values())), samples, spent, finishing)
         if samples == FEWEST and spent > (1 + _ALIKE) * cycles.seconds:
@@ -302,5 +306,6 @@ class _Trial:
         }
         spent = time.perf_counter() - started
         first = next(iter(pictures.values()))
+        self._stages = joined(pictures, {}).seconds
         frames = first.temporal.frames if first.temporal else (own.number,)
         return {view: x.pixels for view, x in pictures.items()}, spent, frames

@@ -14,6 +14,8 @@ pytest.importorskip("mitsuba_oidn")
 
 from xrds_blender.cycles import session
 from xrds_blender.planning.request import Request, render_request
+from xrds_blender.planning.settings import Denoising, Mode, Settings
+from xrds_blender.rendering import history
 from xrds_blender.rendering import try_frame as module
 from xrds_blender.rendering.render import render
 from xrds_blender.rendering.shot import render_shot
@@ -61,6 +63,8 @@ def test_both_ways_of_one_frame(scene: Any) -> None:
     assert tried.xrds.samples >= FEWEST
     assert "Denoise is off" in tried.notes[0]
     assert lines[-1] == "frame 2: denoising"
+    full = Settings(Mode.FULL_SIZE, 4, Denoising.XRDS_HIGH)
+    assert history.seconds(scene, full, 1) > history.seconds(scene, full) > 0.0
 
 
 def test_cycles_picture_is_cycles_own(scene: Any) -> None:
