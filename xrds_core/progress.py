@@ -84,10 +84,16 @@ class Clock:
         now = time.perf_counter()
         took, self._last = now - self._last, now
         self._done += 1
-        if not left:
-            return f"{took:.1f} s"
-        rest = duration((now - self._start) / self._done * left)
-        return f"{took:.1f} s; {left} left, about {rest}"
+        rest = (now - self._start) / self._done * left
+        return f"{took:.1f} s{what_is_left(left, rest)}"
+
+
+def what_is_left(count: int, seconds: float | None) -> str:
+    """Return how many pieces are left, to end a line; nothing after the last one."""
+    if not count:
+        return ""
+    time_left = "" if seconds is None else f", about {duration(seconds)}"
+    return f"; {count} left{time_left}"
 
 
 _NEWEST = 5  # pieces whose median is expected of the next: a few are far dearer

@@ -13,7 +13,7 @@ from xrds_core.errors import PictureError, UsageError, XRDSError, finished, warn
 from xrds_core.exr.openexr_io import FLOAT_ZIP, Encoding
 from xrds_core.files import check_folder
 from xrds_core.frames import frame_path, in_words
-from xrds_core.progress import Clock, ShotClock, duration
+from xrds_core.progress import Clock, ShotClock, duration, what_is_left
 
 from ..cycles.settings import subset_of_file
 from ..cycles.view import picture_size
@@ -131,12 +131,9 @@ def _make_notes(scene: Any, request: Request, output: str | None) -> list[str]:
 
 def _say_frame(entry: dict[str, Any], numbers: Sequence[int], clock: ShotClock) -> None:
     """Print which frame was written, and what is left."""
-    left, seconds = sum(n > entry["frame"] for n in numbers), clock.left()
-    rest = f"; {left} left" if left else ""
-    if left and seconds is not None:
-        rest += f", about {duration(seconds)}"
+    left = what_is_left(sum(n > entry["frame"] for n in numbers), clock.left())
     took = duration(entry["seconds"]["total"])
-    warn(f"frame {entry['frame']}: {entry['output']}, {took}{rest}")
+    warn(f"frame {entry['frame']}: {entry['output']}, {took}{left}")
 
 
 def _kept(numbers: Sequence[int], written: Sequence[dict[str, Any]]) -> list[int]:

@@ -86,7 +86,7 @@ def frames_of(
 
     Raises UsageError where `animation`, the file's range, are others than `frames`.
     """
-    whole_range = frame_range(scene)
+    whole_range = list(frame_range(scene))
     if animation and frames and list(frames) != whole_range:
         raise UsageError(
             f"-a are frames {in_words(whole_range)} of the file, but other frames are "

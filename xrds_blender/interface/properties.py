@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
@@ -150,6 +152,16 @@ _PASSES = [
 ]
 
 
+_STRENGTH: dict[str, Any] = {
+    "name": "Strength",
+    "translation_context": CONTEXT,
+    "default": 1.0,
+    "min": 0.0,
+    "max": 1.0,
+    "subtype": "FACTOR",
+}
+
+
 class XRDSSettings(bpy.types.PropertyGroup):
     """How the engine XRDS renders a scene."""
 
@@ -188,12 +200,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         "more memory; 0 renders every frame by itself",
     )
     strength: FloatProperty(
-        name="Strength",
-        translation_context=CONTEXT,
-        default=1.0,
-        min=0.0,
-        max=1.0,
-        subtype="FACTOR",
+        **_STRENGTH,
         description="How much the samples of neighbouring frames count: 0 renders "
         "every frame by itself. Objects have a strength of their own in their "
         "properties, which counts as well. It can be animated",
@@ -273,12 +280,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
 
 
 OBJECT_STRENGTH = FloatProperty(
-    name="Strength",
-    translation_context=CONTEXT,
-    default=1.0,
-    min=0.0,
-    max=1.0,
-    subtype="FACTOR",
+    **_STRENGTH,
     override={"LIBRARY_OVERRIDABLE"},
     description="How much the samples of neighbouring frames count where the camera "
     "sees this object, times the scene's strength: 0 for what looks wrong in a shot",

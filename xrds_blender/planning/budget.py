@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from bisect import bisect_right
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -69,6 +69,15 @@ class Costs:
         return seconds + guides + self.network[settings.network]
 
 
+def value_at(count: float, counts: Sequence[int], values: Sequence[float]) -> float:
+    """The value at a count above 0: linear in log2 of it, flat beyond both ends."""
+    after = bisect_right(counts, count)
+    if after in {0, len(counts)}:
+        return values[max(after - 1, 0)]
+    (low, high), (first, last) = (x[after - 1 : after + 1] for x in (counts, values))
+    return first + math.log2(count / low) / math.log2(high / low) * (last - first)
+
+
 @dataclass(frozen=True)
 class Curve:
     """PSNR in dB over sample counts, never falling; linear in log2 of the count.
@@ -81,14 +90,7 @@ class Curve:
 
     def at(self, count: float) -> float:
         """PSNR at a count of at least the first."""
-        after = bisect_right(self.samples, count)
-        if after in {0, len(self.samples)}:
-            return self.psnr[max(after - 1, 0)]
-        (low, high), (least, most) = (
-            values[after - 1 : after + 1] for values in (self.samples, self.psnr)
-        )
-        share = math.log2(count / low) / math.log2(high / low)
-        return least + share * (most - least)
+        return value_at(count, self.samples, self.psnr)
 
     @property
     def last_slope(self) -> float:

@@ -274,7 +274,6 @@ def learn(
         now = replace(now, share=share)
     if frame == 1:
         return now
-
     means: dict[str, Any] = {}
     for name in ("fixed", "beauty", "guide", "denoise", "reuse", "share"):
         old, new = getattr(before, name), getattr(now, name)

@@ -171,8 +171,9 @@ class Settings:
     def family(self) -> Settings:
         """All but how many samples, and nothing that the mode does not use."""
         if self.is_enlarged:
-            alone = replace(self, samples=None, temporal_radius=0, share=1.0)
-            return replace(alone, strength=None)
+            return replace(
+                self, samples=None, temporal_radius=0, share=1.0, strength=None
+            )
         return Settings(self.mode, None, self.denoising, "", 0)
 
     @property

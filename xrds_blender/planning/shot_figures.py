@@ -7,13 +7,13 @@ neither Blender nor torch is needed here.
 from __future__ import annotations
 
 import json
-import math
-from bisect import bisect_left
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+from .budget import value_at
 
 FILE = Path(__file__).with_name("shots.json")
 
@@ -33,13 +33,7 @@ class Points:
 
     def at(self, count: float) -> float:
         """The value at a count above 0."""
-        after = bisect_left(self.counts, count)
-        if after in {0, len(self.counts)}:
-            return self.values[max(after - 1, 0)]
-        (low, high), (first, last) = (
-            x[after - 1 : after + 1] for x in (self.counts, self.values)
-        )
-        return first + math.log2(count / low) / math.log2(high / low) * (last - first)
+        return value_at(count, self.counts, self.values)
 
 
 @dataclass(frozen=True)

@@ -66,11 +66,16 @@ def advice_of_request(scene: Any, request: Request, frames: int) -> list[Line]:
     elif frames > 1 and request.same_picture:
         reason = obstacle(scene, request, frames)
         lines += [(reason, {})] if reason else []
-    if request.light:
-        used = (layer for layer in scene.view_layers if layer.use)
-        bare = [layer.name for layer in used if not has_light(layer)]
-        lines += [(NO_LIGHT, {"layer": name}) for name in bare]
     return lines
+
+
+def advice_of_passes(scene: Any, request: Request) -> list[Line]:
+    """Lines on layers without light; commands have a remark of their own on theirs."""
+    if scene.camera is None or not request.light:
+        return []
+    used = (layer for layer in scene.view_layers if layer.use)
+    bare = [layer.name for layer in used if not has_light(layer)]
+    return [(NO_LIGHT, {"layer": name}) for name in bare]
 
 
 def advice_of_shot(scene: Any, facts: SceneFacts, frames: Sequence[int]) -> list[Line]:

@@ -132,9 +132,8 @@ def seconds(scene: Any, settings: Settings, radius: int = 0) -> float | None:
 
 def share(scene: Any) -> float | None:
     """How much of the file's samples frames took in the last *Same Picture*."""
-    shares = [known.share for known in _measured(scene) if known]
-    known = [share for share in shares if share is not None]
-    return max(known, default=None)
+    shares = (known.share for known in _measured(scene) if known)
+    return max((share for share in shares if share is not None), default=None)
 
 
 def _measured(scene: Any) -> list[Measured | None]:

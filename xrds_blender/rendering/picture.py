@@ -55,12 +55,11 @@ class Picture:
     stage: total, load (what a first render waits for), sync, beauty, accumulate,
     denoise, again (what of the frame alone is denoised as well), guides, network,
     write; Cycles reports its denoising and sampling as one, so `beauty` holds both
-    then. `peak_memory`
-    is the largest in bytes that the process has taken so far; `device` is what the
-    network ran on, empty for Cycles alone; `settings` are what it was rendered
-    by, as a time budget chose them; `views` (H, W, 4) are all views of stereo by name;
-    `parts` (H, W, 3) of its light by the names of their passes, `view_parts` those of
-    all views.
+    then. `peak_memory` is the largest in bytes that the process has taken so far;
+    `device` is what the network ran on, empty for Cycles alone; `settings` are what it
+    was rendered by, as a time budget chose them; `views` (H, W, 4) are all views of
+    stereo by name; `parts` (H, W, 3) of its light by the names of their passes,
+    `view_parts` those of all views.
     """
 
     radiance: Array

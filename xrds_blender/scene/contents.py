@@ -207,14 +207,9 @@ def stands_still(camera: Any) -> bool:
     return not any(_is_animated(owner) for owner in owners)
 
 
-def frame_range(scene: Any) -> list[int]:
+def frame_range(scene: Any) -> range:
     """Numbers of the frames that Blender would render as the animation."""
-    return list(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
-
-
-def frame_count(scene: Any) -> int:
-    """How many these are."""
-    return len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+    return range(scene.frame_start, scene.frame_end + 1, scene.frame_step)
 
 
 def moves_in_time(scene: Any) -> bool:

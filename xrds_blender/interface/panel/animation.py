@@ -17,9 +17,9 @@ from ...planning.offers import (
 )
 from ...planning.request import Request
 from ...planning.settings import Mode
-from ...rendering.advice import advice_of_request
+from ...rendering.advice import advice_of_passes, advice_of_request
 from ...rendering.modes import offers_of
-from ...scene.contents import frame_count
+from ...scene.contents import frame_range
 from ..translations import CONTEXT
 from . import paragraph, scene_cache
 from .paragraph import translated
@@ -53,7 +53,7 @@ _TEXT = 0.8  # of the row, beside its button
 def draw(layout: Any, context: Any, request: Request) -> None:
     """Draw what the scene's animation takes, and the offers."""
     scene = context.scene
-    found = offers_of(scene, request, frame_count(scene))
+    found = offers_of(scene, request, len(frame_range(scene)))
     column = layout.column(align=True)
     paragraph.draw(column, context, cycles_line(found, translated))
     for offer in found.offers:
@@ -76,8 +76,9 @@ def notes(scene: Any, request: Request) -> Iterator[str]:
     known = scene_cache.seen(scene, scene.view_layers[0])
     if known is None:
         return
-    frames = frame_count(scene) if scene_cache.is_animation(scene) else 1
+    frames = len(frame_range(scene)) if scene_cache.is_animation(scene) else 1
     lines = advice_of_request(scene, request, frames)
+    lines += advice_of_passes(scene, request)
     if scene_cache.is_shot(scene, request):
         lines += known.of_shot
     for sentence, values in [*lines, *known.of_scene]:

@@ -291,7 +291,6 @@ def _forget_facts(*_: object) -> None:
 
 @persistent
 def _forget_file(*_: object) -> None:
-    scene_cache.forget()
     FILE.end()
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import bpy
 
@@ -17,10 +17,6 @@ from ..properties import DENOISE
 from . import scene_cache
 from .mode_table import NAMES
 from .paragraph import translated
-
-if TYPE_CHECKING:
-    pass
-
 
 Row = tuple[str, str]
 MOST_ROWS = 6
