@@ -27,15 +27,17 @@ class Overlap(Generic[T]):
         self._begun: Future[T] | None = None
 
     def put(self, work: Callable[[], T]) -> Iterator[T]:
-        """Begin some work; yields what the piece before it has made.
+        """Begin some work once the piece before it is done; yields what that has made.
 
         What that piece raises is raised here.
         """
         if self._pool is None:
             yield work()
             return
-        yield from self.rest()
-        self._begun = self._pool.submit(work)
+        before = self._begun
+        made = [] if before is None else [before.result()]
+        self._begun = self._pool.submit(work)  # beside what is done with the result
+        yield from made
 
     def rest(self) -> Iterator[T]:
         """Yield what the last piece makes, if there is one."""

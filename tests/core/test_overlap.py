@@ -35,6 +35,15 @@ def test_one_piece_runs_beside_what_goes_on_here() -> None:
         assert all(overlap.rest())
 
 
+def test_the_next_piece_has_begun_when_a_result_is_taken() -> None:
+    begun = threading.Event()
+    with Overlap[bool](True) as overlap:
+        assert list(overlap.put(lambda: True)) == []
+        for _ in overlap.put(lambda: begun.set() or True):
+            assert begun.wait(600)
+        assert list(overlap.rest()) == [True]
+
+
 def test_an_error_of_a_piece_reaches_the_one_who_takes_it() -> None:
     def fail() -> int:
         raise RuntimeError("no memory")

@@ -34,6 +34,7 @@ def row(part: str, seconds: float, cores: int) -> dict[str, Any]:
 
 def test_ratios_are_in_denoisings() -> None:
     seconds = {"accumulate": 1.0, "denoise": 10.0, "alone": 11.0, "shot": 13.0}
+    seconds["card"] = 14.3
     one, two = ratios(
         [
             *(row(part, x, 1) for part, x in {**seconds, "sums": 0.8}.items()),
@@ -42,6 +43,7 @@ def test_ratios_are_in_denoisings() -> None:
     )
     assert one["accumulate"] == pytest.approx(0.1)
     assert one["shot_over_alone"] == pytest.approx(0.2)
+    assert one["card"] == pytest.approx(1.1)
     assert (one["efficiency"], two["efficiency"]) == (1.0, 0.8)
 
 

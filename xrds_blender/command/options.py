@@ -148,9 +148,10 @@ def _add_samples(command: argparse.ArgumentParser) -> None:
     )
     add(
         "--same-picture",
-        action="store_true",
+        action=argparse.BooleanOptionalAction,
         help="frames of a shot as the file's own samples make them, from fewer where "
-        "neighbours help; at scale 1",
+        "neighbours help and that is sooner, as by default at scale 1; else cleaner "
+        "ones of all samples",
     )
     add(
         "--deadline",
@@ -272,6 +273,8 @@ def request_of(options: argparse.Namespace) -> Request:
     given["temporal_radius"] = _temporal_radius(options)
     if options.noise_threshold is not None:  # the most, as `SceneChoice` has it
         del given["samples"]
+    if options.same_picture is None:
+        del given["same_picture"]
     return render_request(**given)
 
 

@@ -6,6 +6,7 @@ import dataclasses
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,10 @@ from xrds_core.errors import PictureError, UsageError, XRDSError, finished, warn
 from xrds_core.exr.openexr_io import FLOAT_ZIP, Encoding
 from xrds_core.files import check_folder
 from xrds_core.frames import frame_path, in_words
+from xrds_core.overlap import Overlap
 from xrds_core.progress import Clock, ShotClock, duration, what_is_left
 
+from ..cycles.session import samples_on_card
 from ..cycles.settings import subset_of_file
 from ..cycles.view import picture_size
 from ..planning.request import Request
@@ -98,16 +101,26 @@ def render_file(
     def is_done(number: int) -> bool:  # anew: others may be writing the same frames
         return resume and is_whole(frame_path(str(output), number), size)
 
-    written, last, clock = [], None, ShotClock()
+    written: list[dict[str, Any]] = []
+    last, clock = None, ShotClock()
+
+    def note(entry: dict[str, Any]) -> None:
+        finished.append(entry)
+        clock.finished()
+        if numbers[1:]:
+            _say_frame(entry, numbers, clock)
+        written.append(entry)
+
     if output is not None:
-        for number, last in _render_pictures(
-            scene, request, output, numbers, is_done, cache, clock
-        ):
-            entry = _write(scene, output, number, last, request, encoding)
-            clock.finished()
-            if numbers[1:]:
-                _say_frame(entry, numbers, clock)
-            written.append(entry)
+        with Overlap[dict[str, Any]](_writes_behind(scene, output)) as writing:
+            for number, last in _render_pictures(
+                scene, request, output, numbers, is_done, cache, clock
+            ):
+                work = partial(_write, scene, output, number, last, request, encoding)
+                for entry in writing.put(work):
+                    note(entry)
+            for entry in writing.rest():
+                note(entry)
     if cache:
         _cache_others(scene, request, numbers, cache)
     return {
@@ -119,6 +132,15 @@ def render_file(
         "samples": cache and cache.report(numbers),
         "remarks": notes,
     }
+
+
+def _writes_behind(scene: Any, output: str) -> bool:
+    """Whether a file is written while the next frame is sampled, on a card.
+
+    Blender's own writing, and scenes that move, are for its own thread alone.
+    """
+    is_exr = Path(output).suffix.lower() == ".exr"
+    return samples_on_card(scene) and is_exr and not scene.animation_data
 
 
 def _make_notes(scene: Any, request: Request, output: str | None) -> list[str]:
@@ -307,7 +329,7 @@ def _write(
     seconds = dict(picture.seconds)
     seconds["write"] += written
     seconds["total"] += written
-    entry = {
+    return {
         "frame": number,
         "output": str(target),
         "seconds": seconds,
@@ -316,8 +338,6 @@ def _write(
         "share": settings.share,
         "peak_memory": picture.peak_memory,
     }
-    finished.append(entry)
-    return entry
 
 
 def _view_suffix(scene: Any, view: str) -> str:

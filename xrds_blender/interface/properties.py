@@ -113,7 +113,7 @@ _ANIMATIONS = [
         "Same Picture, Sooner",
         "Frames look as the file's own samples make them, sooner: each takes as many "
         "samples as it needs beside those of its neighbours. How many is measured in "
-        "the first frame, and where neighbours are of no use all are taken",
+        "the first frames, and where fewer are hardly sooner all are taken",
     ),
     (
         SAME_TIME,
@@ -209,7 +209,7 @@ class XRDSSettings(bpy.types.PropertyGroup):
         name="Animations Keep",
         translation_context=CONTEXT,
         items=_ANIMATIONS,
-        default=SAME_TIME,
+        default=SAME_PICTURE,
         description="What an animation keeps of the file's settings: neighbouring "
         "frames' samples make it quicker, or better",
     )

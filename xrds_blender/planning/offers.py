@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from xrds_core.pace.savings import LEAST
 from xrds_core.progress import duration
 
 from .budget import Curve
@@ -91,7 +92,7 @@ def offers(animation: Animation, curve: Curve, figures: ShotFigures) -> Offers:
     if not animation.radius:
         return Offers(animation, cycles, ())
     same = None if animation.obstacle else _same_picture(animation, figures)
-    if same and same.seconds and cycles and same.seconds > (1.0 - _SAME) * cycles:
+    if same and same.seconds and cycles and same.seconds > (1.0 - LEAST) * cycles:
         same = None
     in_time = _in_time(animation, curve, figures)
     found = same, in_time or _same_samples(animation, figures)

@@ -58,8 +58,8 @@ class Request:
     a folder for guides beside those in memory; each render of the same view adds its
     samples to them until they are `guide_limit`. `finish_stopped` leaves what there is
     in the result when the user stops the render. A shot that is to have the
-    `same_picture` as the file's own settings takes fewer samples where it can; one
-    with a `deadline` takes as many as fit into these seconds, as a frame with a
+    `same_picture` as the file's own settings takes fewer samples where that is sooner;
+    one with a `deadline` takes as many as fit into these seconds, as a frame with a
     `time_budget` does. `passes` are the parts of the light that are finished as well,
     as in `Wanted`, and `light_aovs` further ones.
     """
@@ -72,7 +72,7 @@ class Request:
     guide_cache: str | Path | None = None
     guide_limit: int = 0
     finish_stopped: bool = False
-    same_picture: bool = False
+    same_picture: bool = True
     deadline: float | None = None
     time_budget: float | None = None
     passes: tuple[str, ...] = (NONE,)

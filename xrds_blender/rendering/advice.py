@@ -17,7 +17,7 @@ from ..planning.plan import SceneFacts, reused_less
 from ..planning.request import Request
 from ..scene.camera_path import whips
 from ..scene.contents import compositor_of, cuts, has_light
-from .pace.same_picture import obstacle
+from .pace.obstacles import obstacle
 from .sampling import has_neighbours
 
 Line = tuple[str, dict[str, object]]

@@ -20,7 +20,7 @@ from .blender_job import call_engine
 from .facts import find_facts
 from .history import scene_settings, seconds
 from .modes import offers_of
-from .pace.same_picture import can_save
+from .pace.obstacles import can_save
 from .sampling import has_neighbours
 from .time_budget import Timed, in_time
 

@@ -15,7 +15,7 @@ from ..planning.settings import Denoising, Mode, Settings
 from ..scene.contents import stands_still
 from . import history
 from .loading import has_library
-from .pace.same_picture import obstacle
+from .pace.obstacles import obstacle
 from .sampling import has_neighbours
 
 BEST = Denoising.XRDS_HIGH

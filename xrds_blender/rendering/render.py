@@ -169,7 +169,7 @@ def _render_in_animation(engine: Any, depsgraph: Any, request: Request) -> Pictu
             raise
         others = list(frame.neighbours.values())
         ahead = None
-        if frames.method.pace is None and samples_on_card(depsgraph.scene_eval):
+        if samples_on_card(depsgraph.scene_eval):
             ahead = partial(frames.sample_next, engine, depsgraph)
         picture = _finish(engine, key[1], frames.method, frame.own, others, ahead)
     finally:

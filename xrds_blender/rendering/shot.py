@@ -64,9 +64,8 @@ def render_shot(
     clock = clock or ShotClock()
     clock.add(len(_loaded(shot)), len(todo))
     source = _SceneFrames(scene, method, frames, shot, is_done, cache, clock)
-    # more samples of a frame are rendered, and judged, before it is finished
-    beside = method.pace is None and samples_on_card(scene)
     finish = partial(_finished, method)
+    beside = samples_on_card(scene)
     yield from finish_frames(shot, source, finish, beside=beside)
 
 

@@ -1,20 +1,17 @@
 """The value of a neighbour: of its samples beside a frame's own, in a shot.
 
 It is measured in the first frame, again in the first one beyond its neighbours, in the
-20th, and then each time that the shot is twice as far: so chance counts less and less,
-and the seconds of measuring are soon a small part of the shot's. Where a small picture
+20th, and then each time that the shot is three times as far: chance counts less and
+less, and the seconds of measuring are a small part of the shot's. Where a small picture
 shows more chance than anything else, what other shots have shown counts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-
-from ..errors import warn
 
 _SOON = 20  # frames; one of those before has all its neighbours
 # What is known before anything is measured: mean and standard deviation over the
@@ -80,7 +77,7 @@ class Worth:
         if neighbours > self._neighbours:
             self._likelihoods.clear()
         self._neighbours = neighbours
-        self._next = max(2 * self._frames, _SOON)
+        self._next = max(3 * self._frames, _SOON)
         if np.isfinite(ratio.value):
             expected = (share * (1.0 + (gain - 1.0) * _STEPS)) ** -FALL
             error = np.hypot(ratio.spread, _EXACT * expected)
@@ -96,60 +93,3 @@ class Worth:
         logarithms = usual + np.sum(self._likelihoods, axis=0)
         below = np.cumsum(np.exp(logarithms - logarithms.max()))
         return float(np.interp(_CAUTION, below / below[-1], _STEPS))
-
-
-_FRAMES = 5  # that are timed before anything is said
-_LATER = 1.1  # times Cycles' seconds, from which it is said
-
-
-@dataclass
-class Clock:
-    """Seconds of the frames of a shot, and what Cycles alone would take for them.
-
-    Attributes
-    ----------
-    denoising : float
-        Seconds of our denoiser for one picture; Cycles' takes about as long.
-    """
-
-    denoising: float = 0.0
-    _last: float | None = None
-    _ours: list[float] = field(default_factory=list)
-    _theirs: list[float] = field(default_factory=list)
-    _is_said: bool = False
-
-    def leave_out(self, now: float) -> None:
-        """Leave out a frame that was measured in, which takes longer than others.
-
-        Those before it had other samples than those that come, often more.
-        """
-        self._last = now
-        self._ours.clear()
-        self._theirs.clear()
-
-    def add(self, now: float, seconds: Mapping[str, float], share: float) -> None:
-        """Note a frame; one line is printed where frames take longer than Cycles would.
-
-        Parameters
-        ----------
-        now : float
-            The time, in seconds.
-        seconds : mapping of str to float
-            What the frame took, by stage.
-        share : float
-            Share of all samples that it was rendered with.
-        """
-        if self._last is not None:
-            sampling = seconds.get("beauty", 0.0) / share
-            self._ours.append(now - self._last)
-            self._theirs.append(seconds.get("sync", 0.0) + sampling + self.denoising)
-        self._last = now
-        ours, theirs = sum(self._ours), sum(self._theirs)
-        count = len(self._ours)
-        if count >= _FRAMES and ours > _LATER * theirs and not self._is_said:
-            self._is_said = True
-            warn(
-                f"Same Picture takes {ours / count:.3g} s a frame here, Cycles with "
-                f"its denoiser about {theirs / count:.3g} s: --plain is sooner, "
-                "and without Same Picture the picture is better"
-            )

@@ -12,6 +12,7 @@ import statistics
 import tempfile
 import time
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from unittest.mock import patch
@@ -29,15 +30,18 @@ from xrds_core.accumulation.weighted_sums import Work
 from xrds_core.denoising import Denoiser
 from xrds_core.exr import openexr_io
 from xrds_core.files import replacing, write_json
-from xrds_core.finish import finish_frame
+from xrds_core.finish import Finished, finish_frame
+from xrds_core.frame_source import FrameSource, Neighbourhood, finish_frames
 from xrds_core.native.library import processors
+from xrds_core.overlap import Overlap
+from xrds_core.shot import Shot
 
 from ..bench import machine
 from ..progress import report_line
 from .synthetic import frame
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Mapping
 
     Row = dict[str, Any]
     Runs = dict[str, list[tuple[float, float]]]
@@ -58,7 +62,9 @@ PARTS = {
     "alone": "finishing a frame alone",
     "shot": "finishing a frame of a shot",
     "write": "OpenEXR: writing a frame",
+    "card": "a frame whose samples take half a second on a card, all of it",
 }
+_ON_CARD, _SAMPLING = 4, 0.5  # frames in a row, and seconds of the samples of each
 
 
 def bench_own_seconds(
@@ -116,6 +122,7 @@ def ratios(points: Iterable[Row]) -> list[Row]:
             "accumulate": seconds["accumulate"] / seconds["denoise"],
             "shot_over_alone": (seconds["shot"] - seconds["alone"])
             / seconds["denoise"],
+            "card": seconds["card"] / max(_SAMPLING, seconds["shot"]),
             "efficiency": found[samples, 1]["sums"] / seconds["sums"] / cores
             if (samples, 1) in found
             else None,
@@ -131,7 +138,7 @@ def _points(
     rounds: int,
     bandwidth: float,
 ) -> list[Row]:
-    numbers = range(1, 2 * RADIUS + 2)
+    numbers = range(1, 2 * RADIUS + 1 + _ON_CARD)
     frames = {n: replace(frame(n, *size), samples=float(samples)) for n in numbers}
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -153,7 +160,7 @@ class _Bench:
 
     def __init__(self, frames: dict[int, Frame], path: Path, cores: int) -> None:
         self._frames, self._path, self._cores = frames, path, cores
-        self._middle = sorted(frames)[len(frames) // 2]
+        self._middle = min(frames) + RADIUS
         self._stored = {n: store(x) for n, x in frames.items()}
         self._denoiser = Denoiser(QUALITY, "cpu", threads=cores)
         self._runs: Runs = {}
@@ -178,7 +185,9 @@ class _Bench:
     def round(self) -> None:
         """Run all parts once."""
         own = self._stored[self._middle]
-        others = [x for n, x in self._stored.items() if n != self._middle]
+        first, *_ = self._stored
+        window = range(first, first + 2 * RADIUS + 1)
+        others = [self._stored[n] for n in window if n != self._middle]
         last = self._frames[max(self._frames)]
         packed = self._timed("store", lambda: store(last))
         self._bytes["store"] = _bytes(last) + _bytes(packed)
@@ -195,6 +204,7 @@ class _Bench:
         pairs = [pair(own, x) for x in others]
         self._timed("tiles", lambda: [tile_weights(x) for x in pairs])
         self._finishing(own, others)
+        self._on_card()
 
     def _finishing(self, own: Stored, others: list[Stored]) -> None:
         movement = Movement()
@@ -221,6 +231,30 @@ class _Bench:
         timed("alone", lambda: finish_frame(own, [], self._denoiser, movement))
         timed("shot", lambda: finish_frame(own, others, self._denoiser, movement))
 
+    def _on_card(self) -> None:
+        """Frames in a row as *Same Picture* takes them: judged, denoised, written."""
+        numbers = range(self._middle, self._middle + _ON_CARD)
+        movement = Movement()
+        source = _Card(self._stored, numbers[0] + RADIUS, movement)
+
+        def finish(frame: Neighbourhood[_Judged]) -> Finished:
+            own, found = frame.own
+            return finish_frame(own, [], self._denoiser, movement, accumulated=found)
+
+        def write(finished: Finished) -> None:
+            planes = {x: finished.picture[..., i] for i, x in enumerate("RGB")}
+            openexr_io.write(self._path, planes)
+
+        shot = Shot(tuple(numbers), RADIUS, others=tuple(self._stored))
+        clock, processor = time.perf_counter(), time.process_time()
+        with Overlap[None](True) as writing:
+            for finished in finish_frames(shot, source, finish, beside=True):
+                list(writing.put(partial(write, finished)))
+            list(writing.rest())
+        took = time.perf_counter() - clock, time.process_time() - processor
+        each = took[0] / _ON_CARD, took[1] / _ON_CARD
+        self._runs.setdefault("card", []).append(each)
+
     def _depths(self, own: Stored) -> None:
         given = own.inverse_depth, own.shape
         find_rims(*given, own.camera.orthographic)
@@ -245,6 +279,29 @@ class _Bench:
         run = time.perf_counter() - clock, time.process_time() - processor
         self._runs.setdefault(part, []).append(run)
         return found
+
+
+_Judged = tuple[Stored, accumulation.Accumulated | None]
+
+
+class _Card(FrameSource[_Judged]):
+    """Frames of which those beyond the first window take `_SAMPLING` seconds each."""
+
+    def __init__(
+        self, stored: Mapping[int, Stored], last: int, movement: Movement
+    ) -> None:
+        self._stored, self._last, self._movement = stored, last, movement
+
+    def load(self, number: int) -> _Judged:
+        if number > self._last:
+            time.sleep(_SAMPLING)
+        return self._stored[number], None
+
+    def complete(self, frame: Neighbourhood[_Judged]) -> tuple[_Judged, _Judged]:
+        own, _ = frame.own
+        others = [stored for stored, _ in frame.neighbours.values()]
+        found = accumulation.accumulate(own, others, self._movement)
+        return (own, found), frame.own
 
 
 def _bytes(frame: Frame | Stored) -> int:
@@ -295,15 +352,17 @@ def page(results: Row) -> str:
     lines += [
         "",
         "In denoisings: accumulation, and what a frame of a shot takes more than one "
-        "alone; then what cores bring, 1 where twice as many take half.",
+        "alone; then what cores bring, 1 where twice as many take half; and a frame "
+        f"whose samples take {_SAMPLING} s on a card, over the longer one of these and "
+        "of finishing.",
         "",
-        "| samples | cores | accumulation | shot over alone | efficiency |",
-        "|---|---|---|---|---|",
+        "| samples | cores | accumulation | shot over alone | efficiency | card |",
+        "|---|---|---|---|---|---|",
     ]
     for row in results["ratios"]:
         brings = row["efficiency"]
         cells = [row["samples"], row["cores"], f"{row['accumulate']:.3f}"]
         cells += [f"{row['shot_over_alone']:.2f}"]
-        cells += ["-" if brings is None else f"{brings:.2f}"]
+        cells += ["-" if brings is None else f"{brings:.2f}", f"{row['card']:.2f}"]
         lines.append(f"| {' | '.join(map(str, cells))} |")
     return "\n".join(lines) + "\n"

@@ -14,7 +14,7 @@ from xrds_blender import interface
 from xrds_blender.interface import registration, translations
 from xrds_blender.planning import estimates, offers, plan
 from xrds_blender.rendering import advice
-from xrds_blender.rendering.pace import same_picture
+from xrds_blender.rendering.pace import obstacles
 
 FOLDER = Path(interface.__file__).parent
 # The panel shows what a mode lacks, offers and advice.
@@ -27,12 +27,12 @@ SENTENCES = {
     plan.GLASS,
     plan.VOLUMES,
     plan.HAIR,
-    same_picture.FEW_FRAMES,
-    same_picture.FEW_SAMPLES,
-    same_picture.OLD_BLENDER,
-    same_picture.ONE_SUBSET,
-    same_picture.OWN_SAMPLES,
-    same_picture.OTHER_MODE,
+    obstacles.FEW_FRAMES,
+    obstacles.FEW_SAMPLES,
+    obstacles.OLD_BLENDER,
+    obstacles.ONE_SUBSET,
+    obstacles.OWN_SAMPLES,
+    obstacles.OTHER_MODE,
 }
 WORDS = translations.read()
 # Shown as they are in every language.

@@ -20,7 +20,7 @@ from xrds_blender.command import main
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.interface.properties import request_of
 from xrds_blender.planning.request import render_request
-from xrds_blender.rendering.pace import same_picture
+from xrds_blender.rendering.pace import obstacles
 from xrds_blender.rendering.shot import render_shot
 from xrds_blender.scene.contents import passes_looked_at
 from xrds_core.denoising.light_passes import read_renderers
@@ -115,7 +115,7 @@ def lobes_of_direct(parts: Planes) -> np.ndarray:
 def test_frames_with_fewer_samples_have_parts_too(
     shot: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(same_picture, "FEWEST_FRAMES", 5)
+    monkeypatch.setattr(obstacles, "FEWEST_FRAMES", 5)
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     bpy.context.scene.cycles.samples = 16
     bpy.ops.wm.save_mainfile()

@@ -19,11 +19,12 @@ from xrds_blender.cycles import settings
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
 from xrds_blender.rendering import sampling
-from xrds_blender.rendering.pace import measuring, more, same_picture
-from xrds_blender.rendering.pace.measuring import Threshold
+from xrds_blender.rendering.pace import measuring, more, obstacles, same_picture
 from xrds_blender.rendering.pace.more import blocks_beside, measured_regions, pixels_of
+from xrds_blender.rendering.pace.threshold import Threshold
 from xrds_blender.rendering.sampling import Sampled
 from xrds_core.accumulation.frame import Frame, Stored
+from xrds_core.pace.savings import Savings
 from xrds_core.pace.worth import Ratio
 
 pytestmark = pytest.mark.skipif(
@@ -37,7 +38,7 @@ MEASURED = [1, 4]  # the first frame, and the first beyond its neighbours
 @pytest.fixture
 def shot(blend: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The scene with enough samples to save some, in a short shot."""
-    monkeypatch.setattr(same_picture, "FEWEST_FRAMES", len(FRAMES))
+    monkeypatch.setattr(obstacles, "FEWEST_FRAMES", len(FRAMES))
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     scene = bpy.context.scene
     scene.cycles.samples, scene.cycles.use_adaptive_sampling = SAMPLES, False
@@ -122,6 +123,43 @@ def test_one_frame_that_needs_more_does_not_raise_those_of_the_rest() -> None:
     for _ in range(4):
         pace._choose_next(1.2)
     assert pace.share == 1.0  # where nearly all are needed
+
+
+def test_all_samples_are_taken_where_fewer_are_hardly_sooner(
+    shot: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lengths = measured(monkeypatch, 0.5)
+    monkeypatch.setattr(Savings, "are_known", True)
+    monkeypatch.setattr(Savings, "are_enough", False)
+    shares = [frame["share"] for frame in render(shot, "same")]
+    # decided in frame 1, when frames 2 and 3 had been sampled
+    assert shares[3:] == [1.0] * 4
+    assert lengths == [(SAMPLES // 2, SAMPLES // 2)] * 2  # measured once
+    said = capsys.readouterr().err
+    assert said.count("fewer samples are hardly sooner") == 1
+
+
+def test_it_is_measured_anew_after_a_cut(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    scene = bpy.context.scene
+    scene.timeline_markers.new("one", frame=1).camera = scene.camera
+    other = scene.camera.copy()
+    scene.collection.objects.link(other)
+    scene.timeline_markers.new("two", frame=4).camera = other
+    bpy.ops.wm.save_mainfile()
+    measured(monkeypatch, 0.5)
+    found: list[int] = []
+    inner = same_picture.measure
+
+    def noted(method: Any, own: Sampled, *more: Any) -> Any:
+        found.append(own.number)
+        return inner(method, own, *more)
+
+    monkeypatch.setattr(same_picture, "measure", noted)
+    render(shot, "same")
+    assert found == [1, 4]
 
 
 def test_more_samples_make_the_picture_of_all(
@@ -224,11 +262,11 @@ def test_elsewhere_frames_have_the_samples_of_the_file(
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     request = {"scale": 1, "temporal_radius": 2, "same_picture": True} | job
     scene = bpy.context.scene
-    assert not same_picture.can_save(scene, render_request(**request), frames)
+    assert not obstacles.can_save(scene, render_request(**request), frames)
     possible = render_request(1, temporal_radius=2, same_picture=True)
-    assert same_picture.can_save(scene, possible, len(FRAMES))
+    assert obstacles.can_save(scene, possible, len(FRAMES))
     scene.view_layers[0].samples = 32  # a layer's own
-    assert not same_picture.can_save(scene, possible, len(FRAMES))
+    assert not obstacles.can_save(scene, possible, len(FRAMES))
 
 
 def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
@@ -236,8 +274,7 @@ def test_the_engine_renders_what_the_command_does(shot: Path) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     scene = bpy.context.scene
     scene.render.engine, scene.xrds.mode = "XRDS", "full_size"
-    assert scene.xrds.animation == "same_time"
-    scene.xrds.animation = "same_picture"
+    assert scene.xrds.animation == "same_picture"
     scene.render.filepath = str(shot.parent / "engine" / "#")
     scene.render.image_settings.file_format = "OPEN_EXR"
     scene.render.image_settings.color_depth = "32"
@@ -261,7 +298,7 @@ def test_the_plan_of_a_shot_says_so(
 
 @pytest.mark.parametrize(
     ("shape", "share"),
-    [((1080, 1920), 0.25), ((2160, 3840), 0.25), ((540, 960), 0.5), ((300, 400), 1.0)],
+    [((1080, 1920), 0.13), ((2160, 3840), 0.13), ((540, 960), 0.13), ((200, 250), 1.0)],
 )
 def test_large_pictures_are_measured_in_parts_from_top_to_bottom(
     shape: tuple[int, int], share: float
@@ -309,10 +346,10 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
 ) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     render_settings = bpy.context.scene.render
-    render_settings.resolution_x, render_settings.resolution_y = 128, 96
+    render_settings.resolution_x, render_settings.resolution_y = 288, 96
     bpy.ops.wm.save_mainfile()
     monkeypatch.setattr("xrds_blender.rendering.pace.more._LEAST_AREA", 2000)
-    assert len(measured_regions((96, 128))) == 2
+    assert len(measured_regions((96, 288))) == 2
     sizes: list[int] = []
 
     def noted(ours: Any, noisy: Any, parts: Any, *_: Any) -> Ratio:
@@ -322,10 +359,11 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
 
     monkeypatch.setattr(measuring, "error_ratio", noted)
     frames = render(shot, "same")
-    assert sizes == [2 * 32 * 96] * 2
+    assert sizes == [2 * 64 * 96] * 2
     shares = {number: x["share"] for number, x in zip(FRAMES, frames, strict=True)}
-    # all samples everywhere; where it was measured, in half of the picture, frame 1
-    # has a quarter more, and frame 4 had them all before
-    expected = {1: 1.125, 4: 1.5}
+    # all samples everywhere; where it was measured, frame 1 has a quarter more, and
+    # frame 4 had them all before
+    part = 2 * 64 / 288
+    expected = {1: 1.0 + 0.25 * part, 4: 1.0 + part}
     for number in FRAMES:
         assert shares[number] == pytest.approx(expected.get(number, 1.0)), shares

@@ -12,7 +12,7 @@ pytest.importorskip("bpy")
 
 from shots import World, camera, view
 
-from xrds_blender.rendering.pace.measuring import (
+from xrds_blender.rendering.pace.threshold import (
     Threshold,
     counts_of_file,
     learn_threshold,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -112,23 +113,24 @@ def unite(one: Mapping[str, Passes], two: Mapping[str, Passes]) -> dict[str, Pas
     return {v: mean_of([x[v] for x in (one, two) if v in x]) for v in names}
 
 
-_LEAST_AREA = 200_000  # pixels that are measured in, where there are more
+# Of a picture so much is measured in, but so many pixels, in strips of two blocks.
+_SHARE, _LEAST_AREA = 0.125, 60_000
 
 
 def measured_regions(shape: tuple[int, int]) -> list[Region]:
     """The parts of a picture (H, W) that show how large its errors are.
 
-    Two strips from top to bottom, a quarter of a large picture and half of a smaller
-    one; all where that would leave too few blocks.
+    Two strips from top to bottom, an eighth of a large picture and more of a smaller
+    one; all where that would be more than half.
     """
     height, width = shape
-    for share in (0.25, 0.5):
-        across = int(width * share / 2) // BLOCK * BLOCK
-        if across >= BLOCK and across * height * 2 >= _LEAST_AREA:
-            middles = (width // 4, 3 * width // 4)
-            starts = [(x - across // 2) // BLOCK * BLOCK for x in middles]
-            return [Region(x, 0, across, height) for x in starts]
-    return [Region(0, 0, width, height)]
+    area = max(_SHARE * height * width, _LEAST_AREA)
+    across = max(math.ceil(area / (2 * height * BLOCK)), 2) * BLOCK
+    if 4 * across > width:
+        return [Region(0, 0, width, height)]
+    middles = (width // 4, 3 * width // 4)
+    starts = [(x - across // 2) // BLOCK * BLOCK for x in middles]
+    return [Region(x, 0, across, height) for x in starts]
 
 
 def blocks_beside(

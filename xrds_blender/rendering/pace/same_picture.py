@@ -1,10 +1,10 @@
 """The picture of the file's own settings from fewer samples, where neighbours help.
 
-The first frame of a shot is rendered both ways, with a share of the file's samples and
-with all of them, and the error of both is measured by halves. From there on what
-neighbours add to a frame says how many samples the next ones need. A frame that lacks
-samples, or a part of it that does, gets more before it is finished: up to all that the
-file asks for, where neighbours add nothing.
+Each frame is sampled with a share of the file's samples. Once its neighbours are there
+it is judged: what they add says whether it is to get more samples before it is
+finished, and what share the next frames take. In few frames of a take the error is
+measured, beside that of all samples: it tells what neighbours' samples are worth. Where
+fewer samples are hardly sooner, frames take all of them.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from xrds_core.accumulation.local_filters import BLOCK
 from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
+from xrds_core.errors import warn
 from xrds_core.finish import rectangles
 from xrds_core.pace.error import Gain, gain
 from xrds_core.pace.history import History
-from xrds_core.pace.worth import Clock, Worth
+from xrds_core.pace.savings import Savings
+from xrds_core.pace.worth import Worth
 
 from ...cycles.low_resolution import Region
-from ...cycles.settings import has_subsets, stops_at
+from ...cycles.settings import stops_at
 from ...planning.plan import SAME_PICTURE, Decision
 from ...planning.request import Request
-from ...planning.settings import Mode
 from ...scene.contents import stands_still
 from ..methods import Finishing
-from ..sampling import Sampled, can_continue, has_neighbours, is_even
-from .measuring import Measured, Render, Threshold, learn_threshold, measure
+from ..sampling import Sampled, can_continue, is_even
+from .measuring import Measured, Render, measure
 from .more import (
     More,
     Part,
@@ -46,17 +46,18 @@ from .more import (
     with_more,
     write_region,
 )
+from .obstacles import can_save
+from .threshold import Threshold, learn_threshold
 
-FEWEST_SAMPLES = 8
-"""Samples of the file from which it pays."""
-FEWEST_FRAMES = 16
-"""Frames of a shot from which it pays: the first costs more than the file asks for."""
-_FIRST = 0.25  # share that the first frames have; less was not tried by then
-_FALL = 0.5  # the next share over the present one, at least, where frames add up
+_FIRST = 0.25  # share that the first frames have
+# The least share, but where frames add up under a camera that stands still; and the
+# next share over the present one.
+_LEAST_SHARE, _FALL = 0.125, 0.5
 _LEAST = 2  # samples of a frame, which has halves then
 # Blocks with less than this share of what they need get more samples, and frames.
 _LACKING, _ENOUGH = 0.5, 0.8
 _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
+_PARTS = 2  # of a frame that get more: for each Cycles syncs the scene again
 # The share of the next frames stays as it is as long as it is off by no more from what
 # the last frames needed: Cycles syncs the scene again for another number of samples.
 _TOO_MUCH, _TOO_LITTLE = 0.9, 1.1
@@ -65,41 +66,6 @@ _LAST = 4  # frames: one alone may need more by chance
 _ALL = 0.8
 # Neighbours' samples of less worth count less beside more of the frame's own.
 _USEFUL = 0.25
-
-
-FEW_FRAMES = "Same Picture needs 16 frames or more: fewer take the file's samples"
-FEW_SAMPLES = "Same Picture needs 8 samples or more: frames take the file's samples"
-OLD_BLENDER = "Same Picture needs Blender 4.4: frames take the file's samples"
-ONE_SUBSET = (
-    "Same Picture does not go with Cycles' Sample Subset or time limit: frames take "
-    "the file's samples"
-)
-OWN_SAMPLES = (
-    "Same Picture does not go with samples of a view layer: frames take those samples"
-)
-OTHER_MODE = "Same Picture needs the mode Full Size without a time budget"
-
-
-def obstacle(scene: Any, request: Request, frames: int) -> str:
-    """Why a shot of so many frames has the file's samples; empty if it need not."""
-    settings, cycles = request.settings, scene.cycles
-    is_timed = request.time_budget is not None or settings.samples is not None
-    subset = getattr(cycles, "use_sample_subset", False)
-    obstacles = {
-        OTHER_MODE: settings.mode is not Mode.FULL_SIZE or is_timed,
-        OLD_BLENDER: not has_subsets(scene),
-        FEW_FRAMES: frames < FEWEST_FRAMES,
-        FEW_SAMPLES: cycles.samples < FEWEST_SAMPLES,
-        ONE_SUBSET: subset or cycles.time_limit,
-        OWN_SAMPLES: any(layer.samples for layer in scene.view_layers),
-    }
-    return next((sentence for sentence, is_there in obstacles.items() if is_there), "")
-
-
-def can_save(scene: Any, request: Request, frames: int) -> bool:
-    """Whether a shot of so many frames may have fewer samples than the file's."""
-    wanted = request.same_picture and has_neighbours(scene, request)
-    return wanted and not obstacle(scene, request, frames)
 
 
 def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | None:
@@ -113,7 +79,7 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     least = None
     if not is_even(scene, request):
         _, least = stops_at(scene.cycles, scene.cycles.samples)
-    budget = SamePicture(
+    pace = SamePicture(
         scene.cycles.samples,
         history,
         neighbours=2 * request.settings.temporal_radius,
@@ -121,8 +87,8 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
         least=least,
         moves=not stands_still(scene.camera),
     )
-    budget.share = budget.possible(_FIRST)
-    return budget
+    pace.share = pace.possible(_FIRST)
+    return pace
 
 
 @dataclass
@@ -145,13 +111,13 @@ class SamePicture:
     moves: bool = True
     _threshold: Threshold | None = None
     _worth: Worth = field(default_factory=Worth)
-    _clock: Clock = field(default_factory=Clock)
+    _savings: Savings = field(default_factory=Savings)
+    _is_decided: bool = False  # whether it saves enough, and that was said
+    _takes_all: bool = False  # because it does not
+    _reason: str = ""
     _measured_in: int | None = None
-    _tried: float = 1.0
-    _ratio: float = 1.0
     _shares: dict[int, float] = field(default_factory=dict)  # that all pixels have
     _gains: deque[float] = field(default_factory=partial(deque, maxlen=_LAST))
-    _call: float = 0.0  # what more samples cost each time, in samples of a block
     _newest: int = 0  # samples of the frame that was sampled last
     _taken: int = 0  # of the sequence that frames continue under a still camera
     _taken_more: int = 0  # of that of more samples
@@ -178,67 +144,51 @@ class SamePicture:
         Raises Cancelled when the user stops their render.
         """
         view, started = next(iter(own.views)), time.perf_counter()
-        before = own.views[view].samples
-        beside = [x.number for x in others]
+        frame, beside = own.views[view], [x.number for x in others]
         others = [*others, *self._before(own, others)]
-        accumulated = {v: method.accumulate(own, others, v) for v in own.views}
-        own = replace(own, gathered=accumulated)
-        share = self._shares.get(own.number, 1.0)
-        gained = gain(accumulated[view], own.views[view])
-        spent = _Seconds({"accumulate": time.perf_counter() - started})
-        shape = own.views[view].shape
+        gathered = {v: method.accumulate(own, others, v) for v in own.views}
+        own = replace(own, gathered=gathered)
+        gained = gain(gathered[view], frame)
+        spent = {"accumulate": time.perf_counter() - started}
+        render = partial(_rendered, more, spent)
+        if beside and own.number < min(beside):  # a take begins
+            self._worth = Worth()
         extra: dict[str, Passes] = {}
         regions: list[Region] = []
-        noted = spent.of(self._priced(more, shape))
         # One frame of many samples is worth less than many of few: all its pixels lie
         # as far beside this one's. So it is not to be among the neighbours.
-        if self._worth.is_due(len(beside)) and self._measured_in not in beside:
-            measured = self._measure(method, own, others, noted)
+        is_due = self._worth.is_due(len(beside)) and self._measured_in not in beside
+        if beside and is_due and not self._takes_all:
+            measured = measure(
+                method, own, others, self.samples, self.exposure, render, self.least
+            )
             extra, regions = measured.extra, measured.regions
-            share = self._learn(own, share, measured.asked)
-            whole = gained.of(gained.errors > 0.0)
-            self._worth.add(measured.ratio, share, whole, len(beside))
-            self._tried = share
+            self._learn(own, measured, gained, len(beside))
+        share = self._shares.get(own.number, 1.0)
         shares = np.full_like(gained.errors, share)
         if self._threshold is not None and own.samples is not None:  # even ones
-            shares /= self._threshold.density(own.views[view])
+            shares /= self._threshold.density(frame)
         lacks = self._lacks(shares, gained)
         rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
-        lent = self._lent(share, beside)
-        even = gained
-        if lent != 1.0:  # among frames of other shares
-            even = gain(accumulated[view], own.views[view], lent)
+        lent = self._lent(share, beside)  # among frames of its own share
+        even = gained if lent == 1.0 else gain(gathered[view], frame, lent)
         self._choose_next(even.of(rest))
         # where it was measured it has all now
         for part in blocks_beside(lacks, regions):
-            further = self._top_up(shape, shares, gained, part, noted)
+            further = self._top_up(frame.shape, shares, gained, part, render)
             extra = unite(extra, further)
         own = with_more(own, extra, self._weight)
-        if regions:
-            self._clock.leave_out(time.perf_counter())
-        else:
-            self._clock.add(time.perf_counter(), own.seconds, share)
-        share *= own.views[view].samples / before
+        self._note_seconds(own, share, bool(regions))
+        share *= own.views[view].samples / frame.samples
         if len(regions) == 1:  # all of the picture
             self._shares[own.number] = share
         return replace(
             own,
             samples=None,
-            seconds=spent.added_to(own.seconds),
+            seconds=_added(own.seconds, spent),
             share=share,
             decisions=(self._decision(share),),
         )
-
-    def _measure(
-        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: Render
-    ) -> Measured:
-        """Compare a frame with its neighbours to one of all samples."""
-        measured = measure(
-            method, own, others, self.samples, self.exposure, more, self.least
-        )
-        self._clock.denoising = measured.denoising
-        self._measured_in, self._ratio = own.number, measured.ratio.value
-        return measured
 
     def _before(self, own: Sampled, others: Sequence[Sampled]) -> list[Sampled]:
         """What frames before the window have left, as one that lies beside it."""
@@ -250,12 +200,10 @@ class SamePicture:
 
     def _decision(self, share: float) -> Decision:
         """What a frame was sampled with, and why."""
-        reason = (
-            f"measured in frame {self._measured_in}: with neighbours, "
-            f"{self._tried:.0%} of them had {self._ratio:.2f} times the error of the "
-            "file's"
-        )
-        return Decision(SAME_PICTURE, f"{share:.0%} of the file's samples", reason)
+        value = f"{share:.0%} of the file's samples"
+        return Decision(SAME_PICTURE, value, self._reason)
+
+    # ---- what a file with a noise threshold asks for
 
     @property
     def _of_file(self) -> int:
@@ -281,16 +229,50 @@ class SamePicture:
             return asked
         return float(next(iter(frame.views.values())).samples / self._threshold.samples)
 
-    def _learn(self, own: Sampled, share: float, asked: Array) -> float:
-        """Learn what the noise threshold asks for; the share that a frame has."""
-        if self.least is None:
-            return share
-        is_first = self._threshold is None
-        self._threshold = learn_threshold(next(iter(own.views.values())), asked)
-        had = self._share(own, share)
-        if is_first:  # what the others have is known now as well
-            self._shares = {n: x * had / share for n, x in self._shares.items()}
-        return had
+    # ---- what was measured in a frame
+
+    def _learn(
+        self, own: Sampled, measured: Measured, gained: Gain, neighbours: int
+    ) -> None:
+        """Learn from a frame what neighbours' samples are worth."""
+        share = self._shares.get(own.number, 1.0)
+        if self.least is not None:
+            is_first = self._threshold is None
+            frame = next(iter(own.views.values()))
+            self._threshold = learn_threshold(frame, measured.asked)
+            had = self._share(own, share)
+            if is_first:  # what the others have is known now as well
+                self._shares = {n: x * had / share for n, x in self._shares.items()}
+            share = self._shares[own.number] = had
+        whole = gained.of(gained.errors > 0.0)
+        self._worth.add(measured.ratio, share, whole, neighbours)
+        self._savings.denoising = measured.denoising
+        self._measured_in = own.number
+        self._reason = (
+            f"measured in frame {own.number}: with neighbours, {share:.0%} of them had "
+            f"{measured.ratio.value:.2f} times the error of the file's"
+        )
+
+    def _note_seconds(self, own: Sampled, share: float, was_measured: bool) -> None:
+        """Note what a frame took; decide once whether fewer samples are sooner."""
+        savings, now = self._savings, time.perf_counter()
+        if was_measured:
+            savings.leave_out(now)
+        else:
+            savings.add(now, own.seconds, share)
+        if self._is_decided or not savings.are_known:
+            return
+        self._is_decided, self._takes_all = True, not savings.are_enough
+        ours, theirs = savings.seconds
+        seconds = f"{ours:.3g} s a frame, Cycles with its denoiser about {theirs:.3g} s"
+        if not self._takes_all:
+            warn(f"the same picture in fewer samples: {seconds}")
+            return
+        self.share = 1.0
+        self._reason = f"fewer samples are hardly sooner: {seconds}"
+        warn(f"{self._reason}; so frames take all samples, for less flicker")
+
+    # ---- what a frame lacks, and what the next ones take
 
     def _equal(self, share: Any, gain: Any) -> Any:
         """The share of all samples that is as good without neighbours.
@@ -320,14 +302,11 @@ class SamePicture:
         shares: Array,
         gained: Gain,
         lacks: NDArray[np.bool_],
-        more: Render,
+        render: Render,
     ) -> dict[str, Passes]:
         """Render more samples where a frame lacks them, up to all of the file's."""
         extra: dict[str, Passes] = {}
-        if not lacks.any():
-            return extra
-        length = self._missing(shares, gained, lacks)
-        for rows, columns in rectangles(lacks, self._call / max(length, 1)):
+        for rows, columns in rectangles(lacks, most=_PARTS):
             there = np.zeros_like(lacks)
             there[rows, columns] = lacks[rows, columns]
             length = self._missing(shares, gained, there)
@@ -337,23 +316,10 @@ class SamePicture:
             begin = None if self.history is None else self._taken_more
             self._taken_more += length
             part = Part(length, length / self.samples, region, begin, self._newest)
-            for view, samples in more(part).items():
+            for view, samples in render(part).items():
                 whole = extra.setdefault(view, no_samples(shape, samples.parts))
                 write_region(whole, region, samples)
         return extra
-
-    def _priced(self, more: More, shape: tuple[int, int]) -> More:
-        """The same; what a call costs beside its samples is noted."""
-
-        def priced(part: Part) -> tuple[dict[str, Passes], dict[str, float]]:
-            by_view, seconds = more(part)
-            region = part.region or Region(0, 0, shape[1], shape[0])
-            samples = part.length * region.width * region.height / BLOCK**2
-            if seconds["beauty"]:
-                self._call = samples * seconds["sync"] / seconds["beauty"]
-            return by_view, seconds
-
-        return priced
 
     def _missing(self, shares: Array, gained: Gain, blocks: NDArray[np.bool_]) -> int:
         """How many samples some blocks lack, up to all of the file's."""
@@ -378,10 +344,12 @@ class SamePicture:
 
         `gain` is how many times its own samples a frame has then.
         """
+        if self._takes_all:
+            return
         self._gains.append(gain)
         needed = 1.0 / float(self._equal(1.0, np.mean(self._gains)))
-        least = _FIRST if self.history is None else self.share * _FALL
-        needed = max(needed, least)
+        least = _LEAST_SHARE if self.history is None else 0.0
+        needed = max(needed, least, self.share * _FALL)
         if not _TOO_MUCH <= needed / self.share <= _TOO_LITTLE:
             self.share = self.possible(needed)
 
@@ -392,23 +360,13 @@ class SamePicture:
         return max(_LEAST, np.ceil(self._of_file * share)) / self._of_file
 
 
-@dataclass
-class _Seconds:
-    """What more samples have taken, by stage."""
+def _rendered(more: More, spent: dict[str, float], part: Part) -> dict[str, Passes]:
+    """More samples; their seconds are added to those `spent`."""
+    samples, seconds = more(part)
+    spent.update(_added(spent, seconds))
+    return samples
 
-    stages: dict[str, float] = field(default_factory=dict)
 
-    def of(self, more: More) -> Render:
-        """The same without the seconds, which are noted here."""
-
-        def noted(part: Part) -> dict[str, Passes]:
-            samples, seconds = more(part)
-            self.stages = self.added_to(seconds)
-            return samples
-
-        return noted
-
-    def added_to(self, seconds: Mapping[str, float]) -> dict[str, float]:
-        """Together with others."""
-        names = self.stages.keys() | seconds.keys()
-        return {x: self.stages.get(x, 0.0) + seconds.get(x, 0.0) for x in names}
+def _added(one: Mapping[str, float], two: Mapping[str, float]) -> dict[str, float]:
+    """Seconds by stage, together."""
+    return {x: one.get(x, 0.0) + two.get(x, 0.0) for x in one.keys() | two.keys()}

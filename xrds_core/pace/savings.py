@@ -1,0 +1,71 @@
+"""Whether fewer samples are sooner: a shot's frames beside what Cycles would take."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+_FRAMES = 5  # that are timed before anything is said
+LEAST = 0.1
+"""Share of Cycles' seconds that has to be saved: else a better picture is worth more.
+"""
+
+
+@dataclass
+class Savings:
+    """Seconds of the frames of a shot, and what Cycles with its denoiser would take.
+
+    Attributes
+    ----------
+    denoising : float
+        Seconds of our denoiser for one picture; Cycles' takes about as long.
+    """
+
+    denoising: float = 0.0
+    _last: float | None = None
+    _ours: list[float] = field(default_factory=list)
+    _theirs: list[float] = field(default_factory=list)
+
+    def leave_out(self, now: float) -> None:
+        """Leave out a frame that was measured in, which takes longer than others.
+
+        Those before it had other samples than those that come, often more.
+        """
+        self._last = now
+        self._ours.clear()
+        self._theirs.clear()
+
+    def add(self, now: float, seconds: Mapping[str, float], share: float) -> None:
+        """Note a frame.
+
+        Parameters
+        ----------
+        now : float
+            The time, in seconds.
+        seconds : mapping of str to float
+            What the frame took, by stage.
+        share : float
+            Share of all samples that it was rendered with.
+        """
+        if self._last is not None:
+            sampling = seconds.get("beauty", 0.0) / share
+            self._ours.append(now - self._last)
+            self._theirs.append(seconds.get("sync", 0.0) + sampling + self.denoising)
+        self._last = now
+
+    @property
+    def are_known(self) -> bool:
+        """Whether enough frames were timed."""
+        return len(self._ours) >= _FRAMES
+
+    @property
+    def seconds(self) -> tuple[float, float]:
+        """Seconds of a frame here, and about what Cycles with its denoiser takes."""
+        count = max(len(self._ours), 1)
+        return sum(self._ours) / count, sum(self._theirs) / count
+
+    @property
+    def are_enough(self) -> bool:
+        """Whether at least `LEAST` of Cycles' seconds are saved."""
+        ours, theirs = self.seconds
+        return ours <= (1.0 - LEAST) * theirs
