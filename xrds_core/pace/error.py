@@ -18,7 +18,7 @@ from ..accumulation.accumulate import sample_counts
 from ..accumulation.local_filters import block_means, box
 from ..accumulation.noise import luminance
 from ..arrays import floats
-from .worth import FALL, Ratio
+from .worth import FALL, Errors
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -47,14 +47,14 @@ class Rendered:
     denoised: Array
 
 
-def error_ratio(
+def measure_errors(
     picture: Array,
     noisy: Array,
     parts: tuple[Rendered, Rendered],
     exposure: float = 1.0,
     share: float = 0.5,
-) -> Ratio:
-    """Return the squared error of a picture over that of a frame of all samples.
+) -> Errors:
+    """Return the squared errors of a picture, and of a frame of all samples.
 
     Errors count as they are seen: relative to the local light of their channel, and
     less where it is beyond white.
@@ -74,12 +74,11 @@ def error_ratio(
 
     Returns
     -------
-    ratio : Ratio
-        Infinite where noise hides the error of all samples.
+    errors : Errors
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
         errors, part_errors = _measure_errors(picture, noisy, parts, exposure)
-        return Ratio(*_estimate_ratio(errors, part_errors * share**FALL))
+        return Errors(errors, part_errors * share**FALL)
 
 
 def _measure_errors(
@@ -118,21 +117,6 @@ def _measure_errors(
         more += product(step, step + 2.0 * apart)
     half, more = half[kept] / 2, more[kept] / 2
     return half + more, half
-
-
-def _estimate_ratio(errors: Array, reference: Array) -> tuple[float, float]:
-    """Return the ratio of two sums over blocks, and its standard error."""
-    whole = float(reference.sum())
-    if whole <= 2.0 * _standard_error(reference):
-        return float("inf"), 0.0
-    ratio = max(float(errors.sum()), 0.0) / whole
-    # blocks that are hard to render are so both ways: what is left counts
-    return ratio, _standard_error(errors - ratio * reference) / whole
-
-
-def _standard_error(errors: Array) -> float:
-    """Return the standard error of a sum over blocks."""
-    return float(errors.std() * np.sqrt(max(errors.size, 1)))
 
 
 @dataclass(frozen=True)

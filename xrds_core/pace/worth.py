@@ -9,9 +9,14 @@ shows more chance than anything else, what other shots have shown counts.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[Any]
 
 _SOON = 20  # frames; one of those before has all its neighbours
 # What is known before anything is measured: mean and standard deviation over the
@@ -24,28 +29,49 @@ _CAUTION = 0.16  # probability of a lower value: the mean less its standard erro
 FALL = 0.7
 """The error of a denoised picture falls with about this power of its samples."""
 _STEPS = np.linspace(0.0, 1.0, 201)
+_TINY = 1e-30
 
 
-class Ratio(NamedTuple):
-    """The squared error of fewer samples with neighbours over that of all without.
+class Errors(NamedTuple):
+    """Squared errors, by blocks; single ones may be negative, where noise hides them.
 
     Attributes
     ----------
-    value : float
-        The ratio.
-    spread : float
-        Its standard error.
+    fewer : (n,) array
+        Of fewer samples with neighbours.
+    all : (n,) array
+        Of all samples without.
     """
 
-    value: float
-    spread: float
+    fewer: Array
+    all: Array
+
+    @property
+    def ratio(self) -> float:
+        """Error of fewer samples over that of all; infinite where noise hides it."""
+        whole = float(self.all.sum())
+        return max(float(self.fewer.sum()), 0.0) / whole if whole > 0.0 else np.inf
+
+    def misfit(self, ratio: Array) -> Array:
+        """Return by how many standard errors each of some ratios is off.
+
+        Neither error need be known for that: blocks that are hard to render are so both
+        ways, and what is left says how much is chance.
+        """
+        fewer, whole = self.fewer.astype(np.float64), self.all.astype(np.float64)
+        left = fewer - ratio[:, None] * whole
+        chance = left.std(axis=1) * np.sqrt(len(whole))
+        inexact = _EXACT * ratio * max(float(whole.sum()), 0.0)
+        return np.asarray(
+            left.sum(axis=1) / np.maximum(np.hypot(chance, inexact), _TINY)
+        )
 
 
 @dataclass
 class Worth:
     """The value, from 0 to 1, of the samples of neighbours in one shot."""
 
-    _likelihoods: list[np.ndarray] = field(default_factory=list)
+    _misfit: Array = field(default_factory=lambda: np.zeros_like(_STEPS))
     _neighbours: int = 0
     _frames: int = 0
     _next: int = 1
@@ -56,7 +82,7 @@ class Worth:
         more = neighbours >= 2 * max(self._neighbours, 1)
         return self._frames >= self._next or more
 
-    def add(self, ratio: Ratio, share: float, gain: float, neighbours: int) -> None:
+    def add(self, errors: Errors, share: float, gain: float, neighbours: int) -> None:
         """Add the measurement of a frame.
 
         Where a frame has few neighbours these lie on one side only and are less
@@ -64,9 +90,8 @@ class Worth:
 
         Parameters
         ----------
-        ratio : Ratio
-            Squared error of the frame with its neighbours over that of one of all
-            samples.
+        errors : Errors
+            Of the frame with its neighbours, and of one of all samples.
         share : float
             Share of all samples that the frame has.
         gain : float
@@ -75,21 +100,16 @@ class Worth:
             How many neighbours it has.
         """
         if neighbours > self._neighbours:
-            self._likelihoods.clear()
+            self._misfit[:] = 0.0
         self._neighbours = neighbours
         self._next = max(3 * self._frames, _SOON)
-        if np.isfinite(ratio.value):
-            expected = (share * (1.0 + (gain - 1.0) * _STEPS)) ** -FALL
-            error = np.hypot(ratio.spread, _EXACT * expected)
-            away = (ratio.value - expected) / error
-            self._likelihoods.append(-0.5 * np.square(away) - np.log(error))
+        expected = (share * (1.0 + (gain - 1.0) * _STEPS)) ** -FALL
+        self._misfit += np.square(errors.misfit(expected))
 
     @property
     def value(self) -> float:
-        """A cautious estimate; 0 where noise has hidden all errors."""
-        if not self._likelihoods:
-            return 0.0
-        usual = -0.5 * np.square((_STEPS - _USUAL) / _SPREAD)
-        logarithms = usual + np.sum(self._likelihoods, axis=0)
+        """A cautious estimate: that of other shots where noise hides all errors."""
+        usual = np.square((_STEPS - _USUAL) / _SPREAD)
+        logarithms = -0.5 * (usual + self._misfit)
         below = np.cumsum(np.exp(logarithms - logarithms.max()))
         return float(np.interp(_CAUTION, below / below[-1], _STEPS))

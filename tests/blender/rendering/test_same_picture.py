@@ -25,7 +25,7 @@ from xrds_blender.rendering.pace.threshold import Threshold
 from xrds_blender.rendering.sampling import Sampled
 from xrds_core.accumulation.frame import Frame, Stored
 from xrds_core.pace.savings import Savings
-from xrds_core.pace.worth import Ratio
+from xrds_core.pace.worth import Errors
 
 pytestmark = pytest.mark.skipif(
     not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
@@ -60,11 +60,12 @@ def picture(path: Path) -> np.ndarray:
 
 
 def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[tuple[int, int]]:
-    """Let the error of fewer samples be this.
+    """Let the error of fewer samples be this, over that of all.
 
     Returns the counts that are rendered beside frames' own, and those of a sequence.
     """
-    monkeypatch.setattr(measuring, "error_ratio", lambda *_: Ratio(ratio, 0.0))
+    errors = Errors(np.array([ratio]), np.array([1.0]))
+    monkeypatch.setattr(measuring, "measure_errors", lambda *_: errors)
     lengths: list[tuple[int, int]] = []
     inner = more.more_samples
 
@@ -91,7 +92,7 @@ def test_fewer_samples_are_taken_where_they_are_enough(
 def test_all_samples_are_taken_where_neighbours_are_of_no_use(
     shot: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lengths = measured(monkeypatch, float("inf"))
+    lengths = measured(monkeypatch, 100.0)
     frames = render(shot, "same")
     # the second was sampled when the first had shown that all are needed
     shares = [{1: 1.25, 4: 2.0}.get(number, 1.0) for number in FRAMES]
@@ -108,7 +109,8 @@ def test_all_samples_are_taken_where_neighbours_are_of_no_use(
 
 def test_one_frame_that_needs_more_does_not_raise_those_of_the_rest() -> None:
     pace = same_picture.SamePicture(SAMPLES, neighbours=8)
-    pace._worth.add(Ratio(0.8, 0.02), share=0.375, gain=4.0, neighbours=8)
+    errors = Errors(np.full(4, 0.8), np.ones(4))
+    pace._worth.add(errors, share=0.375, gain=4.0, neighbours=8)
     shares = []
     for gain in (4.0, 4.0, 4.0, 4.0, 3.2, 4.0, 4.0, 4.0, 4.0):
         pace._choose_next(gain)
@@ -166,7 +168,7 @@ def test_more_samples_make_the_picture_of_all(
     shot: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where no neighbour is used, it is one render of all samples, but for noise."""
-    measured(monkeypatch, float("inf"))
+    measured(monkeypatch, 100.0)
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     for obj in bpy.data.objects:
         obj.animation_data_clear()
@@ -298,7 +300,7 @@ def test_the_plan_of_a_shot_says_so(
 
 @pytest.mark.parametrize(
     ("shape", "share"),
-    [((1080, 1920), 0.13), ((2160, 3840), 0.13), ((540, 960), 0.13), ((200, 250), 1.0)],
+    [((1080, 1920), 0.13), ((2160, 3840), 0.13), ((540, 960), 0.24), ((200, 250), 1.0)],
 )
 def test_large_pictures_are_measured_in_parts_from_top_to_bottom(
     shape: tuple[int, int], share: float
@@ -352,12 +354,12 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
     assert len(measured_regions((96, 288))) == 2
     sizes: list[int] = []
 
-    def noted(ours: Any, noisy: Any, parts: Any, *_: Any) -> Ratio:
+    def noted(ours: Any, noisy: Any, parts: Any, *_: Any) -> Errors:
         sizes.append(ours.shape[0] * ours.shape[1])
         assert ours.shape == noisy.shape == parts[0].noisy.shape
-        return Ratio(float("inf"), 0.0)
+        return Errors(np.array([100.0]), np.array([1.0]))
 
-    monkeypatch.setattr(measuring, "error_ratio", noted)
+    monkeypatch.setattr(measuring, "measure_errors", noted)
     frames = render(shot, "same")
     assert sizes == [2 * 64 * 96] * 2
     shares = {number: x["share"] for number, x in zip(FRAMES, frames, strict=True)}

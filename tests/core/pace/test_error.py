@@ -14,9 +14,9 @@ from xrds_core.accumulation.frame import Halves, Stored, store
 from xrds_core.accumulation.local_filters import BLOCK
 from xrds_core.accumulation.noise import Noise
 from xrds_core.accumulation.passes import Passes
-from xrds_core.pace.error import Rendered, error_ratio, gain
+from xrds_core.pace.error import Rendered, gain, measure_errors
 from xrds_core.pace.extra_samples import enriched, with_extra
-from xrds_core.pace.worth import Ratio
+from xrds_core.pace.worth import Errors
 
 Array = NDArray[np.float32]
 SHAPE = (192, 256)
@@ -34,7 +34,7 @@ def denoised(truth: Array, deviation: float, seed: int) -> Array:
     return truth + np.float32(deviation) * error.repeat(4, 0).repeat(4, 1)
 
 
-def ratio(ours: float, theirs: float, noise: float = 0.3) -> Ratio:
+def errors(ours: float, theirs: float, noise: float = 0.3) -> Errors:
     """Of pictures whose errors have these deviations; `theirs` of all samples."""
     truth = np.full((*SHAPE, 3), 0.5, np.float32)
     half = theirs * 2.0**0.35  # half of the samples have 2 ** 0.7 times the error
@@ -42,26 +42,28 @@ def ratio(ours: float, theirs: float, noise: float = 0.3) -> Ratio:
         Rendered(noisy(truth, noise, i), denoised(truth, half, i + 10)) for i in (1, 2)
     )
     picture, own = denoised(truth, ours, 3), noisy(truth, noise * 1.4, 4)
-    return error_ratio(picture, own, (first, second))
+    return measure_errors(picture, own, (first, second))
 
 
 @pytest.mark.parametrize("expected", [0.25, 1.0, 4.0])
 def test_errors_are_measured_without_a_reference(expected: float) -> None:
-    found = ratio(0.05 * expected**0.5, 0.05)
-    # too high rather than too low
-    assert 0.9 * expected < found.value + found.spread < 1.3 * expected + 0.1
+    found = errors(0.05 * expected**0.5, 0.05)
+    assert 0.8 * expected < found.ratio < 1.3 * expected + 0.1
+    near, far = found.misfit(np.array([expected, 3.0 * expected]))
+    assert abs(near) < 2.0 < abs(far)
 
 
 def test_the_picture_of_half_of_the_samples_is_known_from_much_noise() -> None:
     """Its error is that of half, whatever noise says."""
-    values = [ratio(0.05 * 2.0**0.35, 0.05, noise) for noise in (0.1, 0.6)]
-    for found in values:
-        assert found.value == pytest.approx(2.0**0.7, rel=0.1)
-        assert found.spread < 0.2
+    for noise in (0.1, 0.6):
+        found = errors(0.05 * 2.0**0.35, 0.05, noise)
+        assert found.ratio == pytest.approx(2.0**0.7, rel=0.1)
+        assert found.misfit(np.array([1.0]))[0] > 2.0
 
 
-def test_a_ratio_that_noise_hides_is_infinite() -> None:
-    assert ratio(0.001, 0.001, noise=3.0).value == float("inf")
+def test_any_ratio_may_be_true_where_noise_hides_errors() -> None:
+    found = errors(0.001, 0.001, noise=3.0)
+    assert np.abs(found.misfit(np.array([0.2, 1.0, 5.0]))).max() < 2.5
 
 
 def test_radiance_beyond_all_bounds_is_survived() -> None:
@@ -69,7 +71,8 @@ def test_radiance_beyond_all_bounds_is_survived() -> None:
     bad = truth.copy()
     bad[3, 4] = 3e38
     parts = Rendered(bad, truth), Rendered(-bad, truth)
-    assert not np.isnan(error_ratio(truth, bad, parts)).any()
+    found = measure_errors(truth, bad, parts)
+    assert np.isfinite(found.misfit(np.array([0.1, 1.0, 10.0]))).all()
 
 
 def frames(moved: bool = True) -> tuple[list, Accumulated]:

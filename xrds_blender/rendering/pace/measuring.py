@@ -10,9 +10,9 @@ import numpy as np
 
 from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
-from xrds_core.pace.error import Rendered, error_ratio
+from xrds_core.pace.error import Rendered, measure_errors
 from xrds_core.pace.extra_samples import mean_of
-from xrds_core.pace.worth import Ratio
+from xrds_core.pace.worth import Errors
 
 from ...cycles.low_resolution import Region
 from ..methods import Finishing
@@ -27,13 +27,13 @@ Render = Callable[[Part], dict[str, Passes]]
 class Measured(NamedTuple):
     """What was measured in some regions of a frame, and the samples that it took.
 
-    `ratio` is the squared error of its picture over that of all samples; `extra` are by
-    view; denoising a frame of this size by itself takes so many seconds. `asked` (H, W)
-    are the samples that the file takes, 0 elsewhere.
+    `errors` are those of its picture and of one of all samples; `extra` are by view;
+    denoising a frame of this size by itself takes so many seconds. `asked` (H, W) are
+    the samples that the file takes, 0 elsewhere.
     """
 
     regions: list[Region]
-    ratio: Ratio
+    errors: Errors
     extra: dict[str, Passes]
     denoising: float
     asked: Array
@@ -84,7 +84,7 @@ def measure(
     assert both is not None
     asked = both if least is None else counts_of_file(both, least, samples)
     asked = np.where(both > 0.0, asked, np.float32(0.0))
-    ratio = error_ratio(
+    errors = measure_errors(
         np.concatenate(together),
         np.concatenate([noisy[place] for place in places]),
         parts,
@@ -92,7 +92,7 @@ def measure(
         float(both.sum() / 2 / asked.sum()),
     )
     denoising = seconds / 2 * shape[0] * shape[1] / area
-    return Measured(regions, ratio, extra, denoising, asked)
+    return Measured(regions, errors, extra, denoising, asked)
 
 
 def _rendered(method: Finishing, samples: Passes) -> Rendered:

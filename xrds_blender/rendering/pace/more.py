@@ -114,7 +114,7 @@ def unite(one: Mapping[str, Passes], two: Mapping[str, Passes]) -> dict[str, Pas
 
 
 # Of a picture so much is measured in, but so many pixels, in strips of two blocks.
-_SHARE, _LEAST_AREA = 0.125, 60_000
+_SHARE, _LEAST_AREA = 0.125, 120_000
 
 
 def measured_regions(shape: tuple[int, int]) -> list[Region]:

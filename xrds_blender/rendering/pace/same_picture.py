@@ -245,12 +245,12 @@ class SamePicture:
                 self._shares = {n: x * had / share for n, x in self._shares.items()}
             share = self._shares[own.number] = had
         whole = gained.of(gained.errors > 0.0)
-        self._worth.add(measured.ratio, share, whole, neighbours)
+        self._worth.add(measured.errors, share, whole, neighbours)
         self._savings.denoising = measured.denoising
         self._measured_in = own.number
         self._reason = (
             f"measured in frame {own.number}: with neighbours, {share:.0%} of them had "
-            f"{measured.ratio.value:.2f} times the error of the file's"
+            f"{measured.errors.ratio:.2f} times the error of the file's"
         )
 
     def _note_seconds(self, own: Sampled, share: float, was_measured: bool) -> None:
