@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from xrds_core.accumulation.frame import Frame
     from xrds_core.arrays import Array
 
-    from ..bench.journal import Journal
+    from ..bench.journal import Journal, Strict
     from ..bench.windows import Shot
 
 GENERATION = 3  # counts up whenever the same request is rendered otherwise
@@ -113,7 +113,7 @@ class ShotFrames:
     def render(
         self,
         wanted: Sequence[FrameRequest],
-        journal: Journal,
+        journal: Journal | Strict,
         done: Callable[[FrameRequest], object],
     ) -> None:
         """Render what is missing of `wanted`; failures go into the journal."""
@@ -134,7 +134,7 @@ class ShotFrames:
         wanted: Sequence[FrameRequest],
         motion: str,
         reach: int,
-        journal: Journal,
+        journal: Journal | Strict,
         done: Callable[[FrameRequest], object],
     ) -> None:
         scene = open_scene(self.shot.path, self.shot.window)

@@ -19,21 +19,23 @@ import numpy as np
 
 from xrds_blender.command import console
 from xrds_blender.planning.settings import DEFAULT_DENOISING
+from xrds_core.accumulation.frame import store
 from xrds_core.errors import UsageError
 from xrds_core.files import read_json, write_json
 
 from .. import metrics
 from ..bench import machine
 from ..bench.inputs import Folder, open_scene, sample_adaptively
-from ..bench.journal import Journal
-from ..bench.pictures import HALF_SEEDS, Networks, Pictures
+from ..bench.journal import Journal, Strict
+from ..bench.pictures import Networks, Pictures
 from ..bench.windows import find_shots
 from ..cards.cycles import CPU
 from ..csv_table import write_table
 from ..gallery.judge import compare
 from ..progress import report_line
-from .figures import REACH, wrong_change
-from .frames import MIDDLE
+from .figures import REACH
+from .flicker import flicker
+from .frames import MIDDLE, FrameRequest, ShotFrames
 from .motions import animate
 
 if TYPE_CHECKING:
@@ -55,6 +57,7 @@ MOST_SAMPLES = 4096
 CYCLES, SAME_PICTURE, SAME_SAMPLES = "cycles_oidn", "same_picture", "same_samples"
 _IN_TURN = ((CYCLES, SAME_PICTURE), (SAME_SAMPLES,))  # what takes longest comes last
 _TIMED = 3  # frames of Cycles, around the middle one
+_TRUTH, _TRUTH_SEEDS = 64, (101, 102)  # samples and seeds that flicker is judged by
 
 
 @dataclass(frozen=True)
@@ -191,8 +194,6 @@ class _Scene:
         verdict = compare(shown, alone, truth)
         reference = self.pictures.reference()
         error = metrics.flip(made.radiance, reference, made.stops)
-        both = made.radiance, made.following
-        flicker = wrong_change(both, (reference, self._following(case)), made.stops)
         own = {"seconds": made.seconds, "processor_seconds": made.processor}
         cycles = self.rows.get(f"{case.label}-{CYCLES}", own)
         ratios = {name: round(x / cycles[name], 3) for name, x in own.items()}
@@ -214,27 +215,28 @@ class _Scene:
             "psnr": round(verdict.psnr, 3),
             "gain": round(verdict.gain, 3),
             "flip": round(error, 5),
-            "flicker": round(flicker, 5),
+            "flicker": round(self._flicker(made, case.motion), 5),
             "worst_block": round(verdict.worst, 2),
             "share_of_blocks": round(verdict.share, 4),
         }
 
-    def _following(self, case: Case) -> Array:
-        """The reference of the frame after the middle one, to judge flicker by."""
-        from xrds_blender import render
-
-        case = Case(case.motion, self.pictures.reference_samples)
-        shot = replace(self.shot, size=None)
-        name = f"{shot.identity}-{shot.window.label}-{case.label}-following.npz"
-        kept = self.folder.read(name)
-        if kept is None:
-            scene = _opened(shot, case, REACH)
-            scene.cycles.seed = HALF_SEEDS[0]  # of other noise than the methods'
-            scene.frame_set(scene.frame_current + 1)
-            picture = render(scene, plain=True, denoiser=DEFAULT_DENOISING)
-            kept = {"radiance": np.asarray(picture.radiance, np.float32)}
-            self.folder.write(name, kept, {})
-        return kept["radiance"]
+    def _flicker(self, made: Made, motion: str) -> float:
+        """Of a method's two frames, against renders of both by many samples."""
+        frames = ShotFrames(replace(self.shot, size=None), self.folder)
+        wanted = [
+            FrameRequest(motion, _TRUTH, number, seed=seed)
+            for seed in _TRUTH_SEEDS
+            for number in (MIDDLE, MIDDLE + 1)
+        ]
+        frames.render(wanted, Strict(), lambda _: None)
+        found = [frames.frame(request) for request in wanted]
+        truth = [metrics.to_srgb(frame.radiance, made.stops) for frame in found]
+        shown = [
+            metrics.to_srgb(x, made.stops) for x in (made.radiance, made.following)
+        ]
+        here, there = (store(frame) for frame in found[:2])
+        pairs = (truth[0], truth[1]), (truth[2], truth[3])
+        return flicker((shown[0], shown[1]), pairs, (here, there))
 
     def _picture(self, case: Case, method: str) -> str:
         window = self.shot.rendered.label
