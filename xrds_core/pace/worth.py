@@ -82,6 +82,11 @@ class Worth:
         more = neighbours >= 2 * max(self._neighbours, 1)
         return self._frames >= self._next or more
 
+    @property
+    def is_old(self) -> bool:
+        """Whether enough frames were counted to measure anew where a shot changes."""
+        return self._frames >= _SOON
+
     def add(self, errors: Errors, share: float, gain: float, neighbours: int) -> None:
         """Add the measurement of a frame.
 

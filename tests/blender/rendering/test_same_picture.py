@@ -24,8 +24,9 @@ from xrds_blender.rendering.pace.more import blocks_beside, measured_regions, pi
 from xrds_blender.rendering.pace.threshold import Threshold
 from xrds_blender.rendering.sampling import Sampled
 from xrds_core.accumulation.frame import Frame, Stored
+from xrds_core.pace.error import Gain
 from xrds_core.pace.savings import Savings
-from xrds_core.pace.worth import Errors
+from xrds_core.pace.worth import FALL, Errors
 
 pytestmark = pytest.mark.skipif(
     not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
@@ -162,6 +163,24 @@ def test_it_is_measured_anew_after_a_cut(
     monkeypatch.setattr(same_picture, "measure", noted)
     render(shot, "same")
     assert found == [1, 4]
+
+
+def test_a_frame_that_shows_something_new_is_told_by_what_neighbours_add() -> None:
+    pace = same_picture.SamePicture(SAMPLES, neighbours=8)
+    pace._gains.extend([6.0] * 4)
+    own, beside = Sampled(30, {}, {}), [28, 29, 31, 32]
+
+    def gained(times: float) -> Gain:
+        errors = np.full((4, 4), times**-FALL)
+        return Gain(errors, np.ones((4, 4)), np.ones((4, 4), bool))
+
+    assert not pace._is_new(own, beside, gained(2.0))  # too soon after the first
+    for _ in range(20):
+        pace._worth.is_due(8)
+    assert pace._is_new(own, beside, gained(2.0))
+    assert not pace._is_new(own, beside, gained(5.0))
+    assert pace._is_new(own, [31, 32], gained(5.0))  # after a cut
+    assert not pace._is_new(own, [], gained(1.0))
 
 
 def test_more_samples_make_the_picture_of_all(

@@ -62,6 +62,7 @@ _PARTS = 2  # of a frame that get more: for each Cycles syncs the scene again
 # the last frames needed: Cycles syncs the scene again for another number of samples.
 _TOO_MUCH, _TOO_LITTLE = 0.9, 1.1
 _LAST = 4  # frames: one alone may need more by chance
+_CHANGED = 0.5  # of what neighbours add: a frame with less shows something new
 # Where so many are needed all are taken: a frame of a few less is no sooner, and worse.
 _ALL = 0.8
 # Neighbours' samples of less worth count less beside more of the frame's own.
@@ -151,7 +152,7 @@ class SamePicture:
         gained = gain(gathered[view], frame)
         spent = {"accumulate": time.perf_counter() - started}
         render = partial(_rendered, more, spent)
-        if beside and own.number < min(beside):  # a take begins
+        if self._is_new(own, beside, gained):
             self._worth = Worth()
         extra: dict[str, Passes] = {}
         regions: list[Region] = []
@@ -189,6 +190,14 @@ class SamePicture:
             share=share,
             decisions=(self._decision(share),),
         )
+
+    def _is_new(self, own: Sampled, beside: Sequence[int], gained: Gain) -> bool:
+        """Whether a frame shows something else than those before it, as after a cut."""
+        if not beside or own.number < min(beside):
+            return bool(beside)
+        usual = np.mean(self._gains) if self._gains else 0.0
+        is_less = gained.of(gained.errors > 0.0) < _CHANGED * usual
+        return bool(is_less) and self._worth.is_old
 
     def _before(self, own: Sampled, others: Sequence[Sampled]) -> list[Sampled]:
         """What frames before the window have left, as one that lies beside it."""
