@@ -28,7 +28,7 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
     # flicker is judged in the gallery where the camera stands still
     flicker = [x for x in results.gallery if x["flicker"] is not None]
     stills = {x["shot"] for x in flicker}
-    pan = [x for x in by_samples if x.get("motion") == "pan" and "flicker" in x]
+    pan = [x for x in by_samples if x.get("motion") == "pan" and "flicker_along" in x]
     same = [
         x
         for x in results.same_picture
@@ -44,14 +44,16 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
         "source": (
             "gain: gallery of small shots, 320x180, middle frame of nine beside the "
             "frame alone; flicker: the gallery's under a camera that stands still, "
-            "seven scenes under one that pans; share: Same Picture, late frames of 21 "
-            "under a camera that pans; accumulate: 1080p"
+            "seven scenes under one that pans, along its motion; share: Same Picture, "
+            "late frames of 21 under a camera that pans; accumulate: 1080p"
         ),
         "moving": {
             "gain": _means(
                 (x for x in gallery if x["shot"] not in stills), lambda x: x["gain"]
             ),
-            "flicker": _means(pan, lambda x: x["flicker"] / x["flicker_alone"]),
+            "flicker": _means(
+                pan, lambda x: x["flicker_along"] / x["flicker_along_alone"]
+            ),
             "same_flicker": _mean(_flicker_ratios(results.same_picture, same)),
         },
         "still": {
