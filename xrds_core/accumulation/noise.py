@@ -75,7 +75,12 @@ class Noise:
         light[invalid], guides[invalid] = 0.0, 0.0
         return Noise(light, guides)
 
-    def within(self, share: Array, others: Array, place: slice = slice(None)) -> Noise:
+    def within(
+        self,
+        share: Array,
+        others: Array,
+        place: slice | NDArray[np.integer] = slice(None),
+    ) -> Noise:
         """Return the noise of a mean in which these samples have a share.
 
         Parameters
@@ -84,7 +89,7 @@ class Noise:
             Share of these samples in the mean.
         others : (n,) float32 array
             Brightness of the other samples; NaN where there are none.
-        place : slice
+        place : slice or int array
             The pixels that `share` and `others` are of; elsewhere the noise stays.
 
         Returns

@@ -6,7 +6,7 @@ From then on they are the frame's own: other frames reuse them as well.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from ..accumulation.accumulate import Accumulated
     from ..accumulation.frame import Stored
     from ..arrays import Array
+    from ..finish import Rectangle
 
 
 def mean_of(several: Sequence[Passes]) -> Passes:
@@ -47,7 +48,9 @@ def _counts(extra: Passes) -> Array:
     return extra.counts
 
 
-def enriched(frame: Stored, alone: Accumulated, extra: Passes) -> Stored:
+def enriched(
+    frame: Stored, alone: Accumulated, extra: Passes, place: Rectangle
+) -> Stored:
     """Return a frame whose own samples include extra ones.
 
     `noise` stays that of the samples which the frame had: the mean root of more samples
@@ -61,31 +64,32 @@ def enriched(frame: Stored, alone: Accumulated, extra: Passes) -> Stored:
         The frame as accumulated without neighbours.
     extra : Passes
         Its extra samples.
+    place : tuple of slice
+        The rows and columns that these are of.
 
     Returns
     -------
     enriched : Stored
     """
-    combined = with_extra(alone, alone, extra)
-    rows = _find_rows(_counts(extra))
-    width = frame.shape[1]
-    place = slice(rows.start * width, rows.stop * width)
+    combined = with_extra(alone, alone, extra, place)
+    height, width = frame.shape
+    pixels = np.arange(height * width).reshape(height, width)[place].ravel()
     picture = frame.picture.copy()
     invalid = np.zeros(len(picture), bool)
     if frame.invalid is not None:
         invalid |= frame.invalid
     light, alpha = (
-        None if x is None else x[rows] for x in (combined.radiance, combined.alpha)
+        None if x is None else x[place] for x in (combined.radiance, combined.alpha)
     )
-    guides = combined.albedo[rows], combined.normal[rows]
-    picture[place], invalid[place] = pack(light, *guides, alpha)
+    guides = combined.albedo[place], combined.normal[place]
+    picture[pixels], invalid[pixels] = pack(light, *guides, alpha)
     total = combined.samples
     is_even = bool((total == total.flat[0]).all())
     noise = frame.noise
     if noise is not None:
         assert extra.radiance is not None
-        had = (alone.samples[rows] > 0.0).ravel().astype(np.float32)
-        noise = noise.within(had, brightness(extra.radiance[rows]).ravel(), place)
+        had = (alone.samples[place] > 0.0).ravel().astype(np.float32)
+        noise = noise.within(had, brightness(extra.radiance).ravel(), pixels)
     return replace(
         frame,
         samples=max(float(total.mean()), 1e-9),
@@ -98,7 +102,11 @@ def enriched(frame: Stored, alone: Accumulated, extra: Passes) -> Stored:
 
 
 def with_extra(
-    frame: Accumulated, alone: Accumulated, extra: Passes, worth: float = 1.0
+    frame: Accumulated,
+    alone: Accumulated,
+    extra: Passes,
+    place: Rectangle,
+    worth: float = 1.0,
 ) -> Accumulated:
     """Return an accumulated frame with extra samples, where these are finite.
 
@@ -110,6 +118,8 @@ def with_extra(
         The frame without them.
     extra : Passes
         Its extra samples.
+    place : tuple of slice
+        The rows and columns that these are of.
     worth : float
         Value of a neighbour's sample relative to one of the frame's own.
 
@@ -118,63 +128,45 @@ def with_extra(
     combined : Accumulated
     """
     more = _counts(extra)
-    rows = _find_rows(more)  # often few of many
-    usable = np.isfinite(extra.picture[rows]).all(axis=-1) & (more[rows] > 0.0)
-    for part in (extra.albedo, extra.normal):
-        usable &= np.isfinite(part[rows]).all(axis=-1)
+    usable = np.isfinite(extra.picture).all(axis=-1) & (more > 0.0)
+    for guide in (extra.albedo, extra.normal):
+        usable &= np.isfinite(guide).all(axis=-1)
     neighbours = np.float32(worth)
     counts = (
-        frame.samples[rows] * neighbours,
-        alone.samples[rows] * (np.float32(1.0) - neighbours),
-        np.where(usable, more[rows], np.float32(0.0)),
+        frame.samples[place] * neighbours,
+        alone.samples[place] * (np.float32(1.0) - neighbours),
+        np.where(usable, more, np.float32(0.0)),
     )
     total = np.maximum(sum(counts), np.float32(1e-9))
     shares = [(count / total).astype(np.float32) for count in counts]
 
-    def mean(*values: Array) -> Array:
-        whole = values[0]
+    def mean(whole: Array, own: Array, added: Array) -> Array:
         wide = (...,) + (None,) * (whole.ndim - 2)
-        mixed = np.zeros_like(whole[rows])
-        for plane, share in zip(values, shares, strict=True):
-            if share.any():
-                # NaN where there are no samples
-                mixed += np.where(share[wide] > 0.0, plane[rows], 0.0) * share[wide]
-        return _replace_rows(whole, rows, np.where(usable[wide], mixed, whole[rows]))
+        mixed = np.zeros_like(added)
+        for plane, share in zip((whole[place], own[place], added), shares, strict=True):
+            # NaN where there are no samples
+            mixed += np.where(share[wide] > 0.0, plane, 0.0) * share[wide]
+        return _replaced(whole, place, np.where(usable[wide], mixed, whole[place]))
 
-    def mean_pass(name: str) -> Array | None:
+    def mean_pass(name: str) -> Any:
         whole = getattr(frame, name)
-        return (
-            None
-            if whole is None
-            else mean(whole, *(getattr(samples, name) for samples in others))
-        )
+        if whole is None:
+            return None
+        return mean(whole, getattr(alone, name), getattr(extra, name))
 
-    others = alone, extra
-    albedo, normal = mean_pass("albedo"), mean_pass("normal")
-    assert albedo is not None
-    assert normal is not None
-    counted = np.where(usable, total, frame.samples[rows])
+    counted = np.where(usable, total, frame.samples[place])
     return replace(
         frame,
-        radiance=mean_pass("radiance"),
-        albedo=albedo,
-        normal=normal,
-        alpha=mean_pass("alpha"),
+        **{name: mean_pass(name) for name in ("radiance", "albedo", "normal", "alpha")},
         parts={
             name: mean(part, alone.parts[name], extra.parts[name])
             for name, part in frame.parts.items()
         },
-        samples=_replace_rows(frame.samples, rows, counted),
+        samples=_replaced(frame.samples, place, counted),
     )
 
 
-def _find_rows(samples: Array) -> slice:
-    """Return the rows from the first to the last one with samples."""
-    rows = np.flatnonzero(samples.any(axis=1))
-    return slice(rows[0], rows[-1] + 1) if len(rows) else slice(0, 0)
-
-
-def _replace_rows(whole: Array, rows: slice, values: Array) -> Array:
+def _replaced(whole: Array, place: Rectangle, values: Array) -> Array:
     result = whole.copy()
-    result[rows] = values
+    result[place] = values
     return result

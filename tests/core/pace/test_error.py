@@ -20,6 +20,8 @@ from xrds_core.pace.worth import Errors
 
 Array = NDArray[np.float32]
 SHAPE = (192, 256)
+WHOLE = slice(None), slice(None)
+TOP = slice(0, BLOCK), slice(None)
 
 
 def noisy(truth: Array, deviation: float, seed: int) -> Array:
@@ -138,7 +140,7 @@ def test_extra_samples_count_by_their_number() -> None:
     samples = np.zeros(found[1].shape, np.float32)
     samples[:BLOCK] = 3.0
     alone = accumulate(found[1], [])
-    result = with_extra(accumulated, alone, extra(samples, 7.0))
+    result = with_extra(accumulated, alone, extra(samples[:BLOCK], 7.0), TOP)
     assert result.radiance is not None
     assert accumulated.radiance is not None
     share = 3.0 / (accumulated.samples[:BLOCK] + 3.0)
@@ -154,7 +156,7 @@ def test_extra_samples_that_are_not_finite_are_left_out() -> None:
     samples = np.ones(accumulated.samples.shape, np.float32)
     more = extra(samples, 7.0)
     more.radiance[5, 6] = np.nan
-    result = with_extra(accumulated, accumulate(found[1], []), more)
+    result = with_extra(accumulated, accumulate(found[1], []), more, WHOLE)
     assert result.radiance is not None
     assert accumulated.radiance is not None
     assert np.array_equal(result.radiance[5, 6], accumulated.radiance[5, 6])
@@ -166,7 +168,7 @@ def test_neighbours_count_by_their_worth_beside_extra_samples(worth: float) -> N
     found, accumulated = frames(moved=False)
     alone = accumulate(found[1], [])
     more = extra(np.full(found[1].shape, 3.0, np.float32), 7.0)
-    result = with_extra(accumulated, alone, more, worth)
+    result = with_extra(accumulated, alone, more, WHOLE, worth)
     assert result.albedo is not None
     counts = 1.0, worth * (accumulated.samples - 1.0), 3.0
     beside = accumulated.samples[..., None]
@@ -183,7 +185,7 @@ def test_extra_samples_are_the_frames_own_from_then_on() -> None:
     found, _ = frames()
     frame, samples = found[1], np.zeros(found[1].shape, np.float32)
     samples[:BLOCK] = 3.0
-    more = enriched(frame, accumulate(frame, []), extra(samples, 7.0))
+    more = enriched(frame, accumulate(frame, []), extra(samples[:BLOCK], 7.0), TOP)
     assert more.counts is not None
     counts = more.counts.reshape(frame.shape)
     assert (counts[:BLOCK] == 4.0).all()
@@ -197,7 +199,10 @@ def test_extra_samples_are_the_frames_own_from_then_on() -> None:
     assert np.array_equal(more.noise.difference, frame.noise.difference)
     assert np.allclose(more.noise.brightness, frame.noise.brightness, rtol=1e-6)
     whole = enriched(
-        frame, accumulate(frame, []), extra(np.full(frame.shape, 3.0, np.float32), 7.0)
+        frame,
+        accumulate(frame, []),
+        extra(np.full(frame.shape, 3.0, np.float32), 7.0),
+        WHOLE,
     )
     assert whole.counts is None
     assert whole.samples == 4.0
@@ -228,7 +233,7 @@ def test_a_frame_with_extra_samples_shows_the_light_of_its_neighbours() -> None:
         alpha=np.ones_like(samples),
         counts=samples,
     )
-    rich = enriched(other, accumulate(other, []), extra)
+    rich = enriched(other, accumulate(other, []), extra, WHOLE)
     shares = [
         (accumulate(own, [x]).samples.mean() - own.samples) / x.samples
         for x in (other, rich)

@@ -14,10 +14,9 @@ from xrds_core.pace.error import Rendered, measure_errors
 from xrds_core.pace.extra_samples import mean_of
 from xrds_core.pace.worth import Errors
 
-from ...cycles.low_resolution import Region
 from ..methods import Finishing
 from ..sampling import Sampled
-from .more import Part, measured_regions, no_samples, pixels_of, write_region
+from .more import Extra, Part, measured_regions, pixels_of
 from .threshold import counts_of_file
 
 Render = Callable[[Part], dict[str, Passes]]
@@ -27,14 +26,13 @@ Render = Callable[[Part], dict[str, Passes]]
 class Measured(NamedTuple):
     """What was measured in some regions of a frame, and the samples that it took.
 
-    `errors` are those of its picture and of one of all samples; `extra` are by view;
-    denoising a frame of this size by itself takes so many seconds. `asked` (H, W) are
-    the samples that the file takes, 0 elsewhere.
+    `errors` are those of its picture and of one of all samples; denoising a frame of
+    this size by itself takes so many seconds. `asked` (H, W) are the samples that the
+    file takes, 0 elsewhere.
     """
 
-    regions: list[Region]
     errors: Errors
-    extra: dict[str, Passes]
+    extra: list[Extra]
     denoising: float
     asked: Array
 
@@ -59,18 +57,17 @@ def measure(
     regions = measured_regions(shape)
     cells: list[list[Rendered]] = []
     seconds = 0.0
-    extra: dict[str, Passes] = {}
+    extra: list[Extra] = []
+    both = np.zeros(shape, np.float32)
     for region in regions:
         place = None if (region.height, region.width) == shape else region
         halves = [more(Part(length, 0.5, place, sequence=-i)) for i in (1, 2)]
         started = time.perf_counter()
         cells.append([_rendered(method, half[view]) for half in halves])
         seconds += time.perf_counter() - started
-        for name in own.views:
-            mean = mean_of([half[name] for half in halves])
-            write_region(
-                extra.setdefault(name, no_samples(shape, mean.parts)), region, mean
-            )
+        views = {name: mean_of([half[name] for half in halves]) for name in own.views}
+        extra.append(Extra(region, views))
+        both[pixels_of(region)] = views[view].counts
     parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
     area = sum(region.width * region.height for region in regions)
     # with the neighbours' samples: what may be wrong in them has nothing to do with
@@ -80,8 +77,6 @@ def measure(
     places = [pixels_of(region) for region in regions]
     # a part by itself, as its halves are
     together = [method.radiance(own, others, view, place) for place in places]
-    both = extra[view].counts
-    assert both is not None
     asked = both if least is None else counts_of_file(both, least, samples)
     asked = np.where(both > 0.0, asked, np.float32(0.0))
     errors = measure_errors(
@@ -92,7 +87,7 @@ def measure(
         float(both.sum() / 2 / asked.sum()),
     )
     denoising = seconds / 2 * shape[0] * shape[1] / area
-    return Measured(regions, errors, extra, denoising, asked)
+    return Measured(errors, extra, denoising, asked)
 
 
 def _rendered(method: Finishing, samples: Passes) -> Rendered:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,43 +74,23 @@ def render_more(
     return {v: mean_of([x[v] for x in samples]) for v in samples[0]}, seconds
 
 
-def with_more(own: Sampled, extra: Mapping[str, Passes], weight: float) -> Sampled:
+class Extra(NamedTuple):
+    """More samples of a region of a frame, by view; regions do not overlap."""
+
+    region: Region
+    views: dict[str, Passes]
+
+
+def with_more(own: Sampled, extra: Sequence[Extra], weight: float) -> Sampled:
     """A frame with extra samples; beside them neighbours' count with a weight."""
     views, gathered = dict(own.views), dict(own.gathered)
-    for view, more in extra.items():
-        alone = accumulate(own.views[view], [])
-        gathered[view] = with_extra(own.gathered[view], alone, more, weight)
-        views[view] = enriched(own.views[view], alone, more)
-    return replace(own, views=views, gathered=gathered) if extra else own
-
-
-def no_samples(shape: tuple[int, int], parts: Iterable[str]) -> Passes:
-    """No samples anywhere."""
-    radiance, albedo, normal = (np.zeros((*shape, 3), np.float32) for _ in range(3))
-    alpha, counts = np.zeros((2, *shape), np.float32)
-    return Passes(
-        radiance=radiance,
-        albedo=albedo,
-        normal=normal,
-        alpha=alpha,
-        counts=counts,
-        parts={name: np.zeros_like(radiance) for name in parts},
-    )
-
-
-def write_region(whole: Passes, region: Region, part: Passes) -> None:
-    """Write the samples of a region into those of the whole picture."""
-    place = pixels_of(region)
-    for name, pixels in whole.given.items():
-        pixels[place] = part.given[name]
-    for name, pixels in part.parts.items():
-        whole.parts[name][place] = pixels
-
-
-def unite(one: Mapping[str, Passes], two: Mapping[str, Passes]) -> dict[str, Passes]:
-    """Both, by view."""
-    names = one.keys() | two.keys()
-    return {v: mean_of([x[v] for x in (one, two) if v in x]) for v in names}
+    for region, by_view in extra:
+        place = pixels_of(region)
+        for view, more in by_view.items():
+            alone = accumulate(views[view], [])
+            gathered[view] = with_extra(gathered[view], alone, more, place, weight)
+            views[view] = enriched(views[view], alone, more, place)
+    return replace(own, views=views, gathered=gathered)
 
 
 # Of a picture so much is measured in, but so many pixels, in strips of two blocks.

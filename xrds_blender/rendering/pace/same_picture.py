@@ -28,7 +28,6 @@ from xrds_core.pace.history import History
 from xrds_core.pace.savings import Savings
 from xrds_core.pace.worth import Worth
 
-from ...cycles.low_resolution import Region
 from ...cycles.settings import stops_at
 from ...planning.plan import SAME_PICTURE, Decision
 from ...planning.request import Request
@@ -36,16 +35,7 @@ from ...scene.contents import stands_still
 from ..methods import Finishing
 from ..sampling import Sampled, can_continue, is_even
 from .measuring import Measured, Render, measure
-from .more import (
-    More,
-    Part,
-    blocks_beside,
-    no_samples,
-    region_of,
-    unite,
-    with_more,
-    write_region,
-)
+from .more import Extra, More, Part, blocks_beside, region_of, with_more
 from .obstacles import can_save
 from .threshold import Threshold, learn_threshold
 
@@ -154,8 +144,7 @@ class SamePicture:
         render = partial(_rendered, more, spent)
         if self._is_new(own, beside, gained):
             self._worth = Worth()
-        extra: dict[str, Passes] = {}
-        regions: list[Region] = []
+        extra: list[Extra] = []
         # One frame of many samples is worth less than many of few: all its pixels lie
         # as far beside this one's. So it is not to be among the neighbours.
         is_due = self._worth.is_due(len(beside)) and self._measured_in not in beside
@@ -163,7 +152,7 @@ class SamePicture:
             measured = measure(
                 method, own, others, self.samples, self.exposure, render, self.least
             )
-            extra, regions = measured.extra, measured.regions
+            extra += measured.extra
             self._learn(own, measured, gained, len(beside))
         share = self._shares.get(own.number, 1.0)
         shares = np.full_like(gained.errors, share)
@@ -175,9 +164,9 @@ class SamePicture:
         even = gained if lent == 1.0 else gain(gathered[view], frame, lent)
         self._choose_next(even.of(rest))
         # where it was measured it has all now
+        regions = [region for region, _ in extra]
         for part in blocks_beside(lacks, regions):
-            further = self._top_up(frame.shape, shares, gained, part, render)
-            extra = unite(extra, further)
+            extra += self._top_up(frame.shape, shares, gained, part, render)
         own = with_more(own, extra, self._weight)
         self._note_seconds(own, share, bool(regions))
         share *= own.views[view].samples / frame.samples
@@ -312,9 +301,9 @@ class SamePicture:
         gained: Gain,
         lacks: NDArray[np.bool_],
         render: Render,
-    ) -> dict[str, Passes]:
+    ) -> list[Extra]:
         """Render more samples where a frame lacks them, up to all of the file's."""
-        extra: dict[str, Passes] = {}
+        extra = []
         for rows, columns in rectangles(lacks, most=_PARTS):
             there = np.zeros_like(lacks)
             there[rows, columns] = lacks[rows, columns]
@@ -325,9 +314,7 @@ class SamePicture:
             begin = None if self.history is None else self._taken_more
             self._taken_more += length
             part = Part(length, length / self.samples, region, begin, self._newest)
-            for view, samples in render(part).items():
-                whole = extra.setdefault(view, no_samples(shape, samples.parts))
-                write_region(whole, region, samples)
+            extra.append(Extra(region, render(part)))
         return extra
 
     def _missing(self, shares: Array, gained: Gain, blocks: NDArray[np.bool_]) -> int:
