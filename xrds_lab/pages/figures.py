@@ -18,6 +18,7 @@ def figures(results: Results) -> Figures:
     """Return every figure that docs/figures.toml may name."""
     return {
         **_shots(results),
+        **_by_samples(results),
         **_same_seconds(results),
         **_held_out(results),
         **_gallery(results),
@@ -52,6 +53,17 @@ def _shots(results: Results) -> Figures:
         needed = [x["cycles_samples"] for x in rows if x["cycles_samples"] is not None]
         name = f"shots.equal.{samples}"
         found |= {f"{name}.least": min(needed), f"{name}.most": max(needed)}
+    return found
+
+
+def _by_samples(results: Results) -> Figures:
+    """Of shots over their frames alone: decibels, and flicker taken away in percent."""
+    found: Figures = {}
+    for samples in sorted({x["samples"] for x in results.by_samples}):
+        rows = only(results.by_samples, samples=samples)
+        flicker = mean(x["flicker_along"] / x["flicker_along_alone"] for x in rows)
+        found[f"by_samples.{samples}.gain"] = mean(x["gain"] for x in rows)
+        found[f"by_samples.{samples}.steadier"] = 100.0 * (1.0 - flicker)
     return found
 
 

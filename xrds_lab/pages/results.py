@@ -85,6 +85,12 @@ class Results:
         return found | {"shots": over_seeds(found["shots"])}
 
     @cached_property
+    def by_samples(self) -> Rows:
+        """Shots of the seven scenes over the frame alone, by samples; a camera pans."""
+        rows = self.read("shots/by-samples.json")["rows"]
+        return [x for x in rows if x.get("motion") == "pan" and "flicker_along" in x]
+
+    @cached_property
     def held_out(self) -> Rows:
         """Shots on which no constant was chosen: all methods."""
         return self.read("held-out/results.json")["shots"]

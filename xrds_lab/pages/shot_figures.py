@@ -28,7 +28,6 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
     # flicker is judged in the gallery where the camera stands still
     flicker = [x for x in results.gallery if x["flicker"] is not None]
     stills = {x["shot"] for x in flicker}
-    pan = [x for x in by_samples if x.get("motion") == "pan" and "flicker_along" in x]
     same = [
         x
         for x in results.same_picture
@@ -52,7 +51,8 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
                 (x for x in gallery if x["shot"] not in stills), lambda x: x["gain"]
             ),
             "flicker": _means(
-                pan, lambda x: x["flicker_along"] / x["flicker_along_alone"]
+                results.by_samples,
+                lambda x: x["flicker_along"] / x["flicker_along_alone"],
             ),
             "same_flicker": _mean(_flicker_ratios(results.same_picture, same)),
         },

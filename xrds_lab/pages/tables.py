@@ -6,7 +6,7 @@ from operator import itemgetter
 from statistics import mean, median
 from typing import TYPE_CHECKING
 
-from .results import MEDIAN, SCENES, Results, only, scene_name
+from .results import SCENES, Results, only, scene_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -16,12 +16,6 @@ if TYPE_CHECKING:
     Table = list[list[str]]
 
 MOTIONS = ("pan", "objects", "both")
-RADII = {
-    "median of three denoised frames": MEDIAN,
-    "radius 1": 1,
-    "radius 2": 2,
-    "**radius 4**": 4,
-}
 UNITS = (1.0, 2.0, 4.0, 8.0)
 QUALITIES = (
     "HIGH-ACCURATE",
@@ -81,14 +75,18 @@ def _signed(decibels: float) -> str:
     return f"{round(decibels, 2) + 0.0:+.2f}"
 
 
-def shot_radii(results: Results) -> Table:
-    """What a radius brings."""
-    table = [["", "mean gain", "worst scene", "flicker"]]
-    for label, radius in RADII.items():
-        rows = results.shot_rows("pan", 2, radius)
+def shots_by_samples(results: Results) -> Table:
+    """What shots bring over their frames alone, by samples."""
+    head = ["samples", "scenes", "mean gain", "worst gain", "FLIP", "flicker"]
+    table = [[*head, "worst flicker"]]
+    for samples in sorted({x["samples"] for x in results.by_samples}):
+        rows = only(results.by_samples, samples=samples)
         gains = [x["gain"] for x in rows]
-        flicker = f"{mean(x['flicker_ratio'] for x in rows):.2f}"
-        table.append([label, f"{mean(gains):+.2f}", f"{min(gains):+.2f}", flicker])
+        errors = mean(x["flip"] / x["flip_alone"] for x in rows)
+        flicker = [x["flicker_along"] / x["flicker_along_alone"] for x in rows]
+        cells = [samples, len(rows), f"{mean(gains):+.1f}", f"{min(gains):+.1f}"]
+        cells += [f"{errors:.2f}", f"{mean(flicker):.2f}", f"{max(flicker):.2f}"]
+        table.append(list(map(str, cells)))
     return table
 
 
@@ -256,7 +254,7 @@ def card(results: Results) -> Table:
 TABLES: Mapping[str, Callable[[Results], Table]] = {
     "shots in short": shots_in_short,
     "shots by motion": shot_motions,
-    "shots by radius": shot_radii,
+    "shots by samples": shots_by_samples,
     "gallery": gallery,
     "passes of light": light_parts,
     "same picture": same_picture,
