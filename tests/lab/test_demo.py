@@ -179,7 +179,7 @@ def test_demo_leaves_figures_pictures_and_the_scene(
         "xrds_x1",
         "xrds_shot",
     ]
-    assert rows["cycles_oidn_default"]["samples"] == 3
+    assert rows["xrds_shot"]["samples"] == 3
     assert report["settings"]["frames"] == 3
     assert all(row["seconds_per_frame"] > 0 for row in rows.values())
     assert all(10 < row["psnr"] < 60 for row in rows.values())

@@ -87,8 +87,8 @@ class Entry:
 
 
 def fitting(seconds: float, fixed: float, each: float) -> int:
-    """The samples of `each` seconds that fit beside what is fixed; one at least."""
-    return max(1, int((seconds - fixed) / each))
+    """The samples that take nearest to so many seconds, fixed ones included."""
+    return max(1, round((seconds - fixed) / each))
 
 
 class Contest:
@@ -108,23 +108,21 @@ class Contest:
             self._still(way, 4)
         self._scene.render.resolution_percentage = size
 
-    def plain_shot(self, samples: int, way: Way = CYCLES) -> Entry:
-        """Every frame by itself, by Cycles and OIDN."""
-        fixed, each = self._line(way)
-        reference = fixed + REFERENCE_SAMPLES[0] * each
-        frame = fixed + samples * each
-        self._countdown.needs(FRAMES * frame + len(PAIR) * reference)
-        return self._separately(way, samples, SHOT)
+    def plain_shot(self, seconds: float) -> Entry:
+        """Every frame by itself, by Cycles and OIDN, with the samples that fit."""
+        return self._separately(CYCLES, self.samples_in(CYCLES, seconds), SHOT)
 
     def pair(self, way: Way, seconds: float) -> Entry:
         """The two frames that have a reference, with the samples that fit."""
         return self._separately(way, self.samples_in(way, seconds), PAIR)
 
-    def shot(self, seconds: float) -> Entry:
-        """The shot as XRDS renders shots, with the samples that fit into `seconds`."""
-        fixed, each = self._line(FULL_SIZE)
-        samples = fitting(seconds, fixed + self._accumulating(), each)
-        taken, made = self._shoot(samples, SHOT)
+    def shot(self, samples: int) -> Entry:
+        """The shot as XRDS renders shots."""
+        fixed, each = self._line(CYCLES)
+        reference = fixed + REFERENCE_SAMPLES[0] * each
+        frame = fixed + samples * each
+        self._countdown.needs(FRAMES * frame + len(PAIR) * reference)
+        taken, made = self._shoot(samples)
         frames = {number: picture.radiance for number, picture in made.items()}
         return Entry(ACCUMULATED, samples, taken / len(SHOT), frames)
 
@@ -157,26 +155,22 @@ class Contest:
         if way not in self._lines:
             self._countdown.say(f"how long a sample takes: {way.label}")
             few, more = way.trials
-            low, high = (self._still(way, n)[0] for n in way.trials)
+            # the camera moves between them, as in the shot
+            low, high = (
+                self._still(way, n, number)[0]
+                for n, number in zip(way.trials, PAIR, strict=True)
+            )
             each = max(0.01, (high - low) / (more - few))
             self._lines[way] = max(0.0, low - few * each), each
         return self._lines[way]
 
-    def _accumulating(self) -> float:
-        """Seconds in which a frame takes the samples of all its neighbours."""
-        self._countdown.say("how long a neighbour takes")
-        few = range(MIDDLE - 1, MIDDLE + 2)
-        _, made = self._shoot(1, few)
-        of_one = made[MIDDLE].seconds["accumulate"] / (len(few) - 1)
-        return float(2 * RADIUS * of_one)
-
     # --- renders ----------------------------------------------------------------------
 
-    def _shoot(self, samples: int, numbers: Sequence[int]) -> tuple[float, Any]:
+    def _shoot(self, samples: int) -> tuple[float, Any]:
         job, name = ACCUMULATED.job.with_settings(samples=samples), ACCUMULATED.label
         start, made = time.perf_counter(), {}
-        self._countdown.say(f"{name}, {samples} spp, {len(numbers)} frames")
-        for number, picture in render_shot(self._scene, job, numbers):
+        self._countdown.say(f"{name}, {samples} spp, {len(SHOT)} frames")
+        for number, picture in render_shot(self._scene, job, SHOT):
             made[number] = picture
             self._countdown.say(f"{name}, {samples} spp, frame {number} of {SHOT[-1]}")
         return time.perf_counter() - start, made
