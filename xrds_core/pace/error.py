@@ -142,6 +142,11 @@ class Gain:
         """How many times its own samples a block equals; infinite without noise."""
         return np.where(self.seen, self.errors ** (-1.0 / FALL), np.inf)
 
+    @property
+    def whole(self) -> float:
+        """How many times its own samples the frame equals."""
+        return self.of(self.errors > 0.0)  # not NaN, as where light knows no bounds
+
     def of(self, blocks: NDArray[np.bool_]) -> float:
         """How many times their own samples some blocks together equal."""
         error = float(np.average(self.errors[blocks], weights=self.noise[blocks]))

@@ -9,14 +9,12 @@ shows more chance than anything else, what other shots have shown counts.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[Any]
+    from ..arrays import Array
 
 _SOON = 20  # frames; one of those before has all its neighbours
 # What is known before anything is measured: mean and standard deviation over the

@@ -13,6 +13,8 @@ import numpy as np
 
 from xrds_core.accumulation.reprojection import centres, reproject, reprojection
 
+from .rivals import interpolated
+
 if TYPE_CHECKING:
     from xrds_core.accumulation.frame import Stored
     from xrds_core.arrays import Array
@@ -44,7 +46,7 @@ def flicker(
     """
     x, y, inside = _positions(*frames)
     changes = [
-        (_at(shown[1] - after, x, y) - (shown[0] - before))[inside]
+        (interpolated(shown[1] - after, x, y) - (shown[0] - before))[inside]
         for before, after in truths
     ]
     return float(np.sqrt(max(np.mean(changes[0] * changes[1], dtype=np.float64), 0.0)))
@@ -62,14 +64,4 @@ def _positions(here: Stored, there: Stored) -> tuple[Array, Array, Array]:
     x, y = (each.reshape(here.shape) - np.float32(0.5) for each in (x, y))
     with np.errstate(invalid="ignore"):  # behind the camera
         inside = (x >= 0) & (x <= width - 1) & (y >= 0) & (y <= height - 1)
-    return np.where(inside, x, 0.0), np.where(inside, y, 0.0), inside
-
-
-def _at(image: Array, x: Array, y: Array) -> Array:
-    """The values of an image (H, W, C) at places, linear between pixels."""
-    left = np.minimum(x.astype(int), image.shape[1] - 2)
-    top = np.minimum(y.astype(int), image.shape[0] - 2)
-    right, low = (x - left)[..., None], (y - top)[..., None]
-    up = image[top, left] * (1 - right) + image[top, left + 1] * right
-    down = image[top + 1, left] * (1 - right) + image[top + 1, left + 1] * right
-    return np.asarray(up * (1 - low) + down * low)
+    return x, y, inside

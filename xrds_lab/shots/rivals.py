@@ -84,7 +84,7 @@ def median_of_three(frames: dict[int, Frame], number: int) -> Array:
         if other is None:
             return pictures[0]
         x, y = _displaced(own, other)
-        pictures.append(_interpolated(cycles_oidn(other), x, y))
+        pictures.append(interpolated(cycles_oidn(other), x, y))
     return np.asarray(np.median(np.stack(pictures), axis=0))
 
 
@@ -101,7 +101,7 @@ def _displaced(here: Frame, there: Frame) -> tuple[Array, Array]:
     return columns - here.vector[..., 2], rows + here.vector[..., 3]
 
 
-def _interpolated(picture: Array, x: Array, y: Array) -> Array:
+def interpolated(picture: Array, x: Array, y: Array) -> Array:
     """Return a picture (H, W, 3) at places (H, W), linear between pixels."""
     height, width = picture.shape[:2]
     x, y = np.nan_to_num(x).clip(0, width - 1), np.nan_to_num(y).clip(0, height - 1)

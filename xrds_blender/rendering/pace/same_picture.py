@@ -185,7 +185,7 @@ class SamePicture:
         if not beside or own.number < min(beside):
             return bool(beside)
         usual = np.mean(self._gains) if self._gains else 0.0
-        is_less = gained.of(gained.errors > 0.0) < _CHANGED * usual
+        is_less = gained.whole < _CHANGED * usual
         return bool(is_less) and self._worth.is_old
 
     def _before(self, own: Sampled, others: Sequence[Sampled]) -> list[Sampled]:
@@ -242,8 +242,7 @@ class SamePicture:
             if is_first:  # what the others have is known now as well
                 self._shares = {n: x * had / share for n, x in self._shares.items()}
             share = self._shares[own.number] = had
-        whole = gained.of(gained.errors > 0.0)
-        self._worth.add(measured.errors, share, whole, neighbours)
+        self._worth.add(measured.errors, share, gained.whole, neighbours)
         self._savings.denoising = measured.denoising
         self._measured_in = own.number
         self._reason = (
