@@ -7,15 +7,12 @@ import pytest
 from numpy.typing import NDArray
 from shots import HEIGHT, PIXEL, WIDTH, World, camera, view
 
-from xrds_core.accumulation.frame import store
 from xrds_lab.shots.flicker import flicker
 
 Array = NDArray[np.float64]
 SHIFT = 3  # pixels by which the wall moves to the left
 EYES = camera(0.0), camera(SHIFT * PIXEL * 10.0)  # the wall is 10 away
-FRAMES = tuple(
-    store(view(n, eye, World(wall_half=1e4)).frame) for n, eye in enumerate(EYES)
-)
+FRAMES = tuple(view(n, eye, World(wall_half=1e4)).frame for n, eye in enumerate(EYES))
 SHAPE = (HEIGHT, WIDTH, 3)
 
 

@@ -83,13 +83,13 @@ def median_of_three(frames: dict[int, Frame], number: int) -> Array:
         other = frames.get(beside)
         if other is None:
             return pictures[0]
-        x, y = _displaced(own, other)
+        x, y = displaced(own, other)
         pictures.append(interpolated(cycles_oidn(other), x, y))
     return np.asarray(np.median(np.stack(pictures), axis=0))
 
 
-def _displaced(here: Frame, there: Frame) -> tuple[Array, Array]:
-    """Where each pixel (H, W) was in the frame before or after, in pixels."""
+def displaced(here: Frame, there: Frame) -> tuple[Array, Array]:
+    """Where each pixel (H, W) is in the frame before or after, in pixels."""
     rows, columns = np.mgrid[: here.shape[0], : here.shape[1]].astype(np.float32)
     if here.vector is None:
         own = grid(here.shape)

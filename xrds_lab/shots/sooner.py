@@ -19,7 +19,6 @@ import numpy as np
 
 from xrds_blender.command import console
 from xrds_blender.planning.settings import DEFAULT_DENOISING
-from xrds_core.accumulation.frame import store
 from xrds_core.errors import UsageError
 from xrds_core.files import read_json, write_json
 
@@ -234,9 +233,8 @@ class _Scene:
         shown = [
             metrics.to_srgb(x, made.stops) for x in (made.radiance, made.following)
         ]
-        here, there = (store(frame) for frame in found[:2])
         pairs = (truth[0], truth[1]), (truth[2], truth[3])
-        return flicker((shown[0], shown[1]), pairs, (here, there))
+        return flicker((shown[0], shown[1]), pairs, (found[0], found[1]))
 
     def _picture(self, case: Case, method: str) -> str:
         window = self.shot.rendered.label
