@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,14 +21,16 @@ from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.settings import CYCLES_DENOISING
 from xrds_blender.rendering.blender_job import call_engine
 from xrds_core.accumulation.camera import Camera
-from xrds_core.accumulation.frame import Frame
+from xrds_core.accumulation.frame import Frame, Halves
+from xrds_core.arrays import Array
 from xrds_core.errors import SceneError, UsageError
 from xrds_lab.bench.inputs import Folder
 from xrds_lab.bench.windows import Window, find_shots
 from xrds_lab.shots import bench, blocks, equal, figures, film, motions, report, rivals
 from xrds_lab.shots.bench import Measure, bench_shots
-from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, XRDS, flicker
+from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 from xrds_lab.shots.frames import MIDDLE, ShotFrames, requests
+from xrds_lab.shots.nl_means import nl_means
 from xrds_lab.shots.seeds import over_seeds
 
 pytestmark = pytest.mark.nightly  # it takes minutes
@@ -63,7 +66,8 @@ def test_a_second_run_renders_nothing_and_gives_the_same_files(
     assert first["failures"] == {}
     points = first["shots"]
     cases = {(p["motion"], p["method"], p["radius"]) for p in points}
-    methods = [(DEFAULT, 0), (BEST, 0), (MEDIAN, 1), (XRDS, 0), (XRDS, 1), (XRDS, 4)]
+    methods = [(DEFAULT, 0), (BEST, 0), (MEDIAN, 1), (NL_MEANS, 1)]
+    methods += [(XRDS, radius) for radius in (0, 1, 4)]
     assert cases == {(m, *x) for m in ("pan", "still") for x in methods}
     assert all(p["flicker"] > 0 and 0 < p["flip"] < 1 for p in points)
     for motion in ("pan", "still"):
@@ -371,17 +375,34 @@ def test_the_median_leaves_out_what_one_frame_alone_shows(
     assert ends[:, 0] == pytest.approx(9.0)
 
 
-def test_flicker_counts_what_changes_beside_the_scene() -> None:
-    rng = np.random.default_rng(0)
-    truth = rng.uniform(0.2, 0.8, (2, 8, 8, 3)).astype(np.float32)
-    pictures = {MIDDLE: truth[0], MIDDLE + 1: truth[1]}
-    pair = truth[0], truth[1]
-    assert flicker(pictures.__getitem__, "pan", 0.0, pair) == 0.0
-    pictures[MIDDLE + 1] = truth[1] * 1.1
-    assert flicker(pictures.__getitem__, "pan", 0.0, pair) > 0.02
-    assert flicker(pictures.__getitem__, "pan", 0.0, None) is None
-    still = dict.fromkeys(figures.STEADY, truth[0])
-    assert flicker(still.__getitem__, "still", 0.0, None) == pytest.approx(0, abs=1e-7)
+def test_non_local_means_follow_what_looks_alike() -> None:
+    rng = np.random.default_rng(3)
+    rows, columns = np.mgrid[:32, :40]
+    frames = {}
+    for number in range(3):
+        true = np.where((columns - 2 * number) // 8 % 2 == rows // 8 % 2, 1.0, 0.2)
+        halves = true[None, ..., None] + rng.normal(0, 0.1, (2, 32, 40, 3))
+        frames[number] = replace(
+            frames_of([1.0])[0],
+            number=number,
+            camera=Camera(np.eye(4), np.eye(4), (32, 40)),
+            radiance=halves.mean(0).astype(np.float32),
+            albedo=np.ones((32, 40, 3), np.float32),
+            normal=np.zeros((32, 40, 3), np.float32),
+            depth=np.ones((32, 40), np.float32),
+            vector=None,
+            halves=Halves(halves.astype(np.float32)),
+        )
+        if number == 1:
+            middle = true[..., None]
+
+    def error(picture: Array) -> float:
+        return float(np.sqrt(np.mean((picture - middle) ** 2)))
+
+    noisy, alone = frames[1].radiance, nl_means({1: frames[1]}, 1)
+    assert noisy is not None
+    assert error(alone) < 0.6 * error(noisy)  # edges stay: they would cost more
+    assert error(nl_means(frames, 1)) < 0.8 * error(alone)
 
 
 def test_equal_samples_lie_between_those_rendered() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from xrds_lab.shots import comparison, equal_seconds, paired, verdicts
 from xrds_lab.shots.bench import compared
-from xrds_lab.shots.figures import DEFAULT, REACH, XRDS
+from xrds_lab.shots.figures import DEFAULT, MEDIAN, REACH, XRDS
 
 SCENES = ("car", "house", "cave", "room")
 
@@ -172,9 +172,26 @@ def test_each_method_is_read_at_the_seconds_of_the_other() -> None:
     page = "\n".join(comparison.sections(compared(points)))
     assert (
         "- `pan`: at the seconds of XRDS with 2 samples (27.00 dB), Cycles + OIDN has "
-        "22.00 dB: XRDS +5.00, worst +5.00 car (1 of 2 scenes)."
+        "22.00 dB: XRDS +5.00, worst +5.00 car (1 of 2 scenes; flicker 1.00 of Cycles "
+        "+ OIDN's)."
     ) in page
     assert "Cycles + OIDN with 2 samples, XRDS was not timed" not in page
+
+
+def test_what_others_make_of_the_same_samples_stands_beside_cycles() -> None:
+    points = [
+        *timed("car", DEFAULT, (1.0, 20.0), (4.0, 24.0)),
+        *timed("car", XRDS, (0.5, 22.0), (8.0, 27.0)),
+        point("car", MEDIAN, samples=1, psnr=20.5),
+        point("car", MEDIAN, samples=2, psnr=24.2),
+        point("house", MEDIAN, samples=1, psnr=10.0),
+    ]
+    known = {(e["at"], e["samples"]): e for e in equal_seconds.entries(points)}
+    assert known[DEFAULT, 2]["peers"] == {MEDIAN: 24.2}
+    assert "peers" not in known[XRDS, 2]
+    assert known[DEFAULT, 1]["flicker"] == pytest.approx(1.0)
+    page = "\n".join(comparison.sections(compared(points)))
+    assert "; flicker 1.00 of Cycles + OIDN's); a median of three 20.50 dB." in page
 
 
 def test_one_number_of_samples_has_no_equal_seconds() -> None:

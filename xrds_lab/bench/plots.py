@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from . import pareto
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     Point = dict[str, Any]
     Line = list[tuple[float, float]]
@@ -94,14 +94,16 @@ def as_text(name: str) -> str:
     return name.replace("$", r"\$")
 
 
-def two_panels(title: str, axis: str) -> tuple[Any, Any]:
-    """A figure with a panel for each of `MEASURES` over a log `axis`."""
+def two_panels(
+    title: str, axis: str, measures: Mapping[str, str] = MEASURES
+) -> tuple[Any, Any]:
+    """A figure with a panel for each of two measures over a log `axis`."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE, layout="constrained")
     figure.suptitle(title, fontsize=11)
     panels = figure.subplots(1, 2)
-    for panel, (measure, label) in zip(panels, MEASURES.items(), strict=True):
+    for panel, (measure, label) in zip(panels, measures.items(), strict=True):
         panel.set_xscale("log")
         _number(panel.xaxis)
         panel.set_xlabel(axis)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from .figures import DEFAULT, REACH, XRDS
+from .figures import DEFAULT, MEDIAN, NL_MEANS, REACH, XRDS
 from .paired import LEVEL, MEASURES
 from .verdicts import NAMES, sentence
 
@@ -93,7 +93,9 @@ def _equal_seconds(entries: Sequence[Row]) -> Iterator[str]:
         f"PSNR at the seconds per frame of one method, XRDS at radius {REACH} or "
         "Cycles + OIDN's default, and what the other has in as many: read from its own "
         "frontier over samples, straight lines over the logarithm of seconds. Nothing "
-        "is extrapolated: only scenes where the other was timed on both sides count."
+        "is extrapolated: only scenes where the other was timed on both sides count. "
+        "A median of three denoised frames and non-local means of three noisy ones "
+        "have Cycles + OIDN's samples; what they take themselves is not counted."
     )
     shots = dict.fromkeys((e["motion"], e["at"], e["samples"]) for e in entries)
     lines = []
@@ -118,5 +120,24 @@ def _told(entries: Sequence[Row]) -> str:
     return (
         f"{of}samples ({own:.2f} dB), {NAMES[other]} has {theirs:.2f} dB: XRDS "
         f"{gain:+.2f}, worst {worst['gain']:+.2f} {worst['scene']} "
-        f"({len(known)} of {len(entries)} scenes)."
+        f"({len(known)} of {len(entries)} scenes{_flicker(known)}){_peers(known)}."
     )
+
+
+def _flicker(entries: Sequence[Row]) -> str:
+    """The mean ratio of what flickers, where it is told."""
+    ratios = [e["flicker"] for e in entries]
+    if None in ratios:
+        return ""
+    return f"; flicker {statistics.fmean(ratios):.2f} of Cycles + OIDN's"
+
+
+def _peers(entries: Sequence[Row]) -> str:
+    """What others make of the same samples."""
+    names = {MEDIAN: "a median of three", NL_MEANS: "non-local means"}
+    told = [
+        f"{name} {statistics.fmean(e['peers'][peer] for e in entries):.2f} dB"
+        for peer, name in names.items()
+        if all(peer in e.get("peers", {}) for e in entries)
+    ]
+    return f"; {', '.join(told)}" if told else ""

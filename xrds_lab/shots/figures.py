@@ -11,8 +11,6 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import xrds_core
 from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING
@@ -23,10 +21,11 @@ from xrds_core.files import write_json
 from xrds_core.shot import Shot
 
 from ..checksum import checksum
-from ..metrics import all_metrics, to_srgb
-from . import blocks, rivals
+from ..metrics import all_metrics
+from . import blocks, nl_means, rivals
 from .crops import REFERENCE, SceneCrops, crop_key
-from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests, truth
+from .flicker import flicker_of, truths
+from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests
 from .motions import MOTIONS
 
 if TYPE_CHECKING:
@@ -41,13 +40,11 @@ if TYPE_CHECKING:
     Figures = dict[str, Any]
     Paint = Callable[[int], Array]
 
-GENERATION = 2  # counts up whenever this file makes other figures
+GENERATION = 3  # counts up whenever this file makes other figures
 DEFAULT, BEST, MEDIAN = "cycles_oidn_default", "cycles_oidn_best", "median_of_three"
-XRDS = "xrds"
-RIVALS = {DEFAULT: 0, BEST: 0, MEDIAN: 1}
+NL_MEANS, XRDS = "nl_means", "xrds"
+RIVALS = {DEFAULT: 0, BEST: 0, MEDIAN: 1, NL_MEANS: nl_means.REACH}
 """Each rival, and how many frames before and after it looks at."""
-STEADY = range(MIDDLE - 2, MIDDLE + 3)
-"""Frames whose spread is the flicker where nothing moves: the 3rd to 7th of nine."""
 
 
 def reach_of(radius: int) -> int:
@@ -108,30 +105,9 @@ class Clip:
         """A frame denoised by Cycles, then the median with its neighbours."""
         return rivals.median_of_three(self.frames, number)
 
-
-def flicker(
-    paint: Paint, motion: str, stops: float, pair: tuple[Array, Array] | None
-) -> float | None:
-    """How much the picture changes that should not, in sRGB, mean over the pixels.
-
-    Where nothing moves: the standard deviation over five frames. Elsewhere the mean
-    absolute error of the difference between the middle frame and the next, against the
-    difference of the `pair` of references; None without one.
-    """
-    if motion == "still":
-        shown = [to_srgb(paint(number), stops) for number in STEADY]
-        return float(np.std(np.stack(shown), axis=0, dtype=np.float64).mean())
-    if pair is None:
-        return None
-    return wrong_change((paint(MIDDLE), paint(MIDDLE + 1)), pair, stops)
-
-
-def wrong_change(
-    shown: tuple[Array, Array], true: tuple[Array, Array], stops: float = 0.0
-) -> float:
-    """Mean absolute error, in sRGB, of the change from a frame to the next."""
-    before, after, was, then = (to_srgb(x, stops) for x in (*shown, *true))
-    return float(np.abs((after - before) - (then - was)).mean(dtype=np.float64))
+    def nl_means(self, number: int) -> Array:
+        """A frame by non-local means over its neighbours."""
+        return nl_means.nl_means(self.frames, number)
 
 
 class SceneFigures:
@@ -201,12 +177,9 @@ class SceneFigures:
         """The frames that these figures need."""
         reaches = sorted({reach_of(radius) for radius in radii} | {REACH})
         wanted = [r for x in reaches for r in requests(motion, samples, x, seed)]
-        return [*wanted, *filter(None, [self._truth(motion)])]
-
-    def _truth(self, motion: str) -> FrameRequest | None:
-        if motion == "still" or not self.pair_samples:
-            return None
-        return truth(motion, self.pair_samples)
+        if self.pair_samples:
+            wanted += truths(motion, self.pair_samples)
+        return wanted
 
     def measure(
         self, motion: str, samples: int, radii: Sequence[int], seed: int = 0
@@ -236,10 +209,7 @@ class SceneFigures:
     def _measure(self, clip: Clip, method: str, radius: int) -> None:
         motion = clip.motion
         paint, more = self._paint(clip, method, radius)
-        reference, pair = self._reference(), None
-        request = self._truth(motion)
-        if request is not None:
-            pair = reference, self.frames.truth(request)
+        reference = self._reference()
         made: dict[int, Array] = {}
 
         def once(number: int) -> Array:
@@ -248,8 +218,8 @@ class SceneFigures:
             return made[number]
 
         if method == XRDS and radius:
-            truths = self._references()
-            more |= blocks.against_alone(once(MIDDLE), clip.alone, truths, clip.stops)
+            pair = self._references()
+            more |= blocks.against_alone(once(MIDDLE), clip.alone, pair, clip.stops)
         point = {
             "scene": self.frames.shot.name,
             "motion": motion,
@@ -260,7 +230,7 @@ class SceneFigures:
             "scale": 1,
             "seconds_per_frame": None,
             **all_metrics(once(MIDDLE), reference, clip.stops),
-            "flicker": flicker(once, motion, clip.stops, pair),
+            "flicker": self._flicker(once, clip),
         }
         key = self._key(motion, clip.samples, clip.seed, method, radius)
         if not clip.seed:  # others show the same place with other noise
@@ -268,12 +238,22 @@ class SceneFigures:
         self._known[key] = point | more
         write_json(self._path, self._known)
 
+    def _flicker(self, paint: Paint, clip: Clip) -> float | None:
+        """Of the middle frame and the next; None where nothing tells what is true."""
+        if not self.pair_samples:
+            return None
+        shown = paint(MIDDLE), paint(MIDDLE + 1)
+        frames, samples = self.frames, self.pair_samples
+        return flicker_of(shown, clip.motion, samples, frames, clip.stops)
+
     def _paint(self, clip: Clip, method: str, radius: int) -> tuple[Paint, Figures]:
         """What makes the picture of a frame by its number, and what it is named by."""
         if method == XRDS:
             return lambda number: clip.xrds(number, radius), {}
         if method == MEDIAN:
             return clip.median, {}
+        if method == NL_MEANS:
+            return clip.nl_means, {}
         mode = DEFAULT_DENOISING
         if method == BEST:
             mode = best_mode(clip, self._reference())
@@ -282,7 +262,7 @@ class SceneFigures:
     def _key(
         self, motion: str, samples: int, seed: int, method: str, radius: int
     ) -> str:
-        pair = self.pair_samples if motion != "still" else 0
+        pair = self.pair_samples
         other = f"-seed{seed}" if seed else ""
         what = f"{motion}-{samples}-{method}-{radius}{other}-pair{pair}"
         return f"{what}-{_code(method == XRDS)}"
@@ -301,12 +281,12 @@ def best_mode(clip: Clip, reference: Array) -> Denoising:
 @lru_cache
 def _code(is_ours: bool) -> str:
     """A checksum of the code that the figures judge, ours or the rivals'."""
-    sources = [Path(rivals.__file__)]
+    sources = [Path(rivals.__file__), Path(nl_means.__file__)]
     if is_ours:
         package = Path(xrds_core.__file__).parent
-        parts = ("temporal", "denoising", "sequence")
-        sources = [path for part in parts for path in package.glob(f"{part}/*.py")]
-        sources.append(Path(full_size.__file__))
+        parts = ("accumulation/*.py", "denoising/*.py", "native/*.[ch]")
+        sources = [path for part in parts for path in package.glob(part)]
+        sources += [package / "finish.py", Path(full_size.__file__)]
     return checksum(sources, GENERATION)
 
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.errors import SceneError
 
 from .. import packing
@@ -18,7 +17,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from xrds_core.accumulation.frame import Frame
-    from xrds_core.arrays import Array
 
     from ..bench.journal import Journal, Strict
     from ..bench.windows import Shot
@@ -29,7 +27,6 @@ MIDDLE = 9
 REACH = 4
 """Frames to each side of it in a shot of nine, the standard."""
 _STILL_CAMERA = ("still", "objects", FILE)  # of a file it may stand still
-_PAIR_SEED = 21
 _SEED_STEP = 15_485_863  # larger than seeds of a shot's frames lie apart
 _EXPOSURE = "view_exposure"
 
@@ -39,27 +36,24 @@ class FrameRequest:
     """One frame of one shot.
 
     `reach` is how many frames the shot has on each side of the middle one: under a
-    camera that stands still the part of the sample sequence depends on it. With
-    `is_truth` it is rendered to be compared with: by many samples, denoised by Cycles.
-    Another `seed` gives other noise; that of 0 is the file's own.
+    camera that stands still the part of the sample sequence depends on it. Another
+    `seed` gives other noise; that of 0 is the file's own.
     """
 
     motion: str
     samples: int
     number: int
     reach: int = REACH
-    is_truth: bool = False
     seed: int = 0
 
     def file_name(self, shot: Shot) -> str:
         """A name that depends on everything the pixels depend on."""
         import bpy
 
-        kind = "truth" if self.is_truth else "noisy"
         length = 2 * self.reach + 1
-        of = f"of{length}" if self.motion in _STILL_CAMERA and not self.is_truth else ""
+        of = f"of{length}" if self.motion in _STILL_CAMERA else ""
         seed = f"-seed{self.seed}" if self.seed else ""
-        what = f"{self.motion}-{kind}-{self.samples}spp-{self.number:02}{of}{seed}"
+        what = f"{self.motion}-noisy-{self.samples}spp-{self.number:02}{of}{seed}"
         version = bpy.app.version_string.replace(" ", "")
         scene = f"{shot.name}-{shot.digest}-{shot.window.label}"
         return f"{scene}-{what}-v{GENERATION}-blender{version}.npz"
@@ -75,11 +69,6 @@ def requests(
     return [FrameRequest(motion, samples, n, reach, seed=seed) for n in numbers]
 
 
-def truth(motion: str, samples: int) -> FrameRequest:
-    """The reference of the frame after the middle one, whose own is the scene's."""
-    return FrameRequest(motion, samples, MIDDLE + 1, is_truth=True)
-
-
 class ShotFrames:
     """The frames of one scene, in memory once they are read."""
 
@@ -93,10 +82,6 @@ class ShotFrames:
     def frame(self, request: FrameRequest) -> Frame:
         """A noisy frame as the renderer gave it; raises SceneError without one."""
         return next(iter(packing.unpack(self._read(request)).values()))
-
-    def truth(self, request: FrameRequest) -> Array:
-        """The radiance (H, W, 3) of a reference; raises SceneError without one."""
-        return np.asarray(self._read(request)["radiance"])
 
     def stops(self, request: FrameRequest) -> float:
         """The exposure of the scene's view."""
@@ -145,8 +130,7 @@ class ShotFrames:
         for request in wanted:
             with journal.attempt(self._named(request)):
                 scene.frame_set(request.number + apart)
-                made = _truth if request.is_truth else _noisy
-                arrays, seconds = made(scene, request)
+                arrays, seconds = _noisy(scene, request)
                 arrays[_EXPOSURE] = exposure
                 self.folder.write(request.file_name(self.shot), arrays, seconds)
             done(request)
@@ -167,15 +151,3 @@ def _noisy(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]
     place = request.number - (MIDDLE - request.reach)
     frames, seconds = call_engine(scene, lambda *given: noisy_frame(*given, job, place))
     return packing.pack(frames), seconds
-
-
-def _truth(scene: Any, request: FrameRequest) -> tuple[Arrays, dict[str, float]]:
-    from xrds_blender import run_job
-
-    made = run_job(
-        scene,
-        lambda passes: passes.beauty(
-            1, request.samples, seed=_PAIR_SEED, denoiser=DEFAULT_DENOISING
-        ),
-    )
-    return {"radiance": made.radiance}, made.seconds

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..bench.plots import MEASURES, svg_of, two_panels
-from .figures import BEST, DEFAULT, MEDIAN, XRDS
+from ..bench.plots import svg_of, two_panels
+from .figures import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,11 +19,13 @@ LINES = {
     (DEFAULT, 0): ("Cycles + OIDN", "#d55e00", "--", "s"),
     (BEST, 0): ("Cycles + OIDN, best mode", "#000000", "-", "o"),
     (MEDIAN, 1): ("median of three", "#cc79a7", "-.", "^"),
+    (NL_MEANS, 1): ("non-local means", "#999999", ":", "x"),
     (XRDS, 0): ("XRDS, the frame alone", "#e69f00", ":", "P"),
     (XRDS, 1): ("XRDS, radius 1", "#56b4e9", "--", "d"),
     (XRDS, 2): ("XRDS, radius 2", "#009e73", "-.", "v"),
     (XRDS, 4): ("XRDS, radius 4", "#0072b2", "-", "D"),
 }
+MEASURES = {"psnr": "PSNR, dB (sRGB)", "flicker": "flicker (sRGB)"}
 PERCENTILES = (5, 50, 95)
 """Of the scenes: the bar's beginning, the point, and the bar's end."""
 
@@ -34,7 +36,8 @@ def error_plot(
     """SVG of medians over scenes, with the 5th to 95th percentile of errors.
 
     A line joins the samples per pixel at which all scenes were timed; None where there
-    are none. `resolution` is that of the frames that were timed, whole ones with None.
+    are none. Flicker is left out where it was not told. `resolution` is that of the
+    frames that were timed, whole ones with None.
     """
     timed = [p for p in points if p["motion"] == motion and p["seconds_per_frame"]]
     scenes = {p["scene"] for p in timed}
@@ -42,7 +45,7 @@ def error_plot(
     frame = (
         "whole frame" if resolution is None else "frame of {}x{}".format(*resolution)
     )
-    figure, panels = two_panels(title, f"seconds of a {frame}")
+    figure, panels = two_panels(title, f"seconds of a {frame}", MEASURES)
     drawn = False
     for (method, radius), (name, colour, dash, mark) in LINES.items():
         own = [p for p in timed if (p["method"], p["radius"]) == (method, radius)]
@@ -54,6 +57,8 @@ def error_plot(
         drawn = True
         seconds = [np.median([p["seconds_per_frame"] for p in g]) for g in whole]
         for panel, measure in zip(panels, MEASURES, strict=True):
+            if any(p[measure] is None for g in whole for p in g):
+                continue
             low, middle, high = np.transpose(
                 [np.percentile([p[measure] for p in g], PERCENTILES) for g in whole]
             )

@@ -31,14 +31,26 @@ def cycles_oidn(frame: Frame, mode: Denoising = DEFAULT_DENOISING) -> Array:
     The same library with the same settings, as in Cycles'
     `intern/cycles/integrator/denoiser_oidn.cpp`: one render then serves all modes.
     """
-    images = {"albedo": frame.albedo, "normal": frame.normal}
-    images = {name: _upwards(image) for name, image in images.items()}
     quality = mode.quality.capitalize()
+    images = {name: _upwards(image) for name, image in _guides(frame).items()}
     if mode.prefilter == "ACCURATE":
         images = {k: _run(quality, False, **{k: image}) for k, image in images.items()}
     colour = _upwards(frame.radiance)
     clean = mode.prefilter != "FAST"  # which takes the guides for noisy
     return np.ascontiguousarray(_run(quality, clean, color=colour, **images)[::-1])
+
+
+def clean_guides(frame: Frame) -> dict[str, Array]:
+    """Albedo and normal (H, W, 3), each denoised by itself."""
+    cleaned = {
+        name: _run("High", False, **{name: _upwards(image)})
+        for name, image in _guides(frame).items()
+    }
+    return {name: np.ascontiguousarray(image[::-1]) for name, image in cleaned.items()}
+
+
+def _guides(frame: Frame) -> dict[str, Array]:
+    return {"albedo": frame.albedo, "normal": frame.normal}
 
 
 def _upwards(image: Array) -> Array:

@@ -33,8 +33,8 @@ from ..csv_table import write_table
 from ..gallery.judge import compare
 from ..progress import report_line
 from .figures import REACH
-from .flicker import flicker
-from .frames import MIDDLE, FrameRequest, ShotFrames
+from .flicker import flicker_of, truths
+from .frames import MIDDLE, ShotFrames
 from .motions import animate
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ MOST_SAMPLES = 4096
 CYCLES, SAME_PICTURE, SAME_SAMPLES = "cycles_oidn", "same_picture", "same_samples"
 _IN_TURN = ((CYCLES, SAME_PICTURE), (SAME_SAMPLES,))  # what takes longest comes last
 _TIMED = 3  # frames of Cycles, around the middle one
-_TRUTH, _TRUTH_SEEDS = 64, (101, 102)  # samples and seeds that flicker is judged by
+_TRUTH = 64  # samples of the renders that flicker is judged by
 
 
 @dataclass(frozen=True)
@@ -222,19 +222,9 @@ class _Scene:
     def _flicker(self, made: Made, motion: str) -> float:
         """Of a method's two frames, against renders of both by many samples."""
         frames = ShotFrames(replace(self.shot, size=None), self.folder)
-        wanted = [
-            FrameRequest(motion, _TRUTH, number, seed=seed)
-            for seed in _TRUTH_SEEDS
-            for number in (MIDDLE, MIDDLE + 1)
-        ]
-        frames.render(wanted, Strict(), lambda _: None)
-        found = [frames.frame(request) for request in wanted]
-        truth = [metrics.to_srgb(frame.radiance, made.stops) for frame in found]
-        shown = [
-            metrics.to_srgb(x, made.stops) for x in (made.radiance, made.following)
-        ]
-        pairs = (truth[0], truth[1]), (truth[2], truth[3])
-        return flicker((shown[0], shown[1]), pairs, (found[0], found[1]))
+        frames.render(truths(motion, _TRUTH), Strict(), lambda _: None)
+        shown = made.radiance, made.following
+        return flicker_of(shown, motion, _TRUTH, frames, made.stops)
 
     def _picture(self, case: Case, method: str) -> str:
         window = self.shot.rendered.label
