@@ -12,14 +12,18 @@ from xrds_blender.interface.registration import ensure_registered
 from xrds_blender.planning.plan import GUIDE_CACHE, savings_but
 from xrds_blender.planning.request import Request, render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Denoising
+from xrds_blender.rendering.blender_job import call_engine
 from xrds_blender.rendering.render import render_scene
+from xrds_blender.rendering.sampling import noisy_frame
 from xrds_blender.rendering.shot import render_shot
 
+from ..shots.rivals import cycles_oidn
 from .scene import MIDDLE, SHOT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from xrds_core.accumulation.frame import Frame
     from xrds_core.arrays import Array
 
     from .countdown import Countdown
@@ -30,7 +34,7 @@ PAIR = (MIDDLE, MIDDLE + 1)
 REFERENCE_SAMPLES = (64, 512)  # at least and at most
 FRAMES = 30
 """What all ways take beside the reference, in frames of Cycles + OIDN, about."""
-_SEED = 77  # of references: no method shares their noise
+_SEEDS = (77, 15_485_940)  # of references: no method shares their noise
 
 
 @dataclass(frozen=True)
@@ -86,6 +90,14 @@ class Entry:
         return f"{self.way.label}, {self.samples} spp{self.way.where}"
 
 
+@dataclass(frozen=True)
+class Reference:
+    """What is true: a picture, and two raw renders of both frames of `PAIR`."""
+
+    picture: Entry
+    renders: tuple[tuple[Frame, Frame], tuple[Frame, Frame]]
+
+
 def fitting(seconds: float, fixed: float, each: float) -> int:
     """The samples that take nearest to so many seconds, fixed ones included."""
     return max(1, round((seconds - fixed) / each))
@@ -133,16 +145,24 @@ class Contest:
         taken, radiance = self._still(way, samples)
         return Entry(way, samples, taken, {MIDDLE: radiance})
 
-    def references(self) -> Entry:
-        """Two frames by Cycles and OIDN, with the samples that the time left allows."""
+    def references(self) -> Reference:
+        """Two frames, each rendered twice, with the samples that the time left allows.
+
+        The picture is of the middle frame's samples together, denoised by Cycles' OIDN.
+        """
         fixed, each = self._line(CYCLES)
         least, most = REFERENCE_SAMPLES
         samples = fitting(self._countdown.left / len(PAIR), fixed, each)
         samples = max(least, min(most, samples))
         self._countdown.needs(len(PAIR) * (fixed + samples * each))
-        job = replace(CYCLES.job, seed=_SEED)
-        way = replace(CYCLES, name="reference", label="Reference", job=job)
-        return self._separately(way, samples, PAIR)
+        half = samples // 2
+        started = time.perf_counter()
+        one, two = (tuple(self._raw(half, seed, n) for n in PAIR) for seed in _SEEDS)
+        seconds = (time.perf_counter() - started) / len(PAIR)
+        way = replace(CYCLES, name="reference", label="Reference")
+        frames = {MIDDLE: cycles_oidn(_mean(one[0], two[0]))}
+        picture = Entry(way, 2 * half, seconds, frames)
+        return Reference(picture, ((one[0], one[1]), (two[0], two[1])))
 
     def samples_in(self, way: Way, seconds: float) -> int:
         """The samples that fit into so many seconds; one at least."""
@@ -185,6 +205,13 @@ class Contest:
             seconds += taken
         return Entry(way, samples, seconds / len(numbers), frames)
 
+    def _raw(self, samples: int, seed: int, number: int) -> Frame:
+        self._countdown.say(f"the reference, frame {number}, {samples} spp")
+        job = replace(ACCUMULATED.job.with_settings(samples=samples), seed=seed)
+        self._scene.frame_set(number)
+        frames, _ = call_engine(self._scene, lambda *given: noisy_frame(*given, job))
+        return next(iter(frames.values()))
+
     def _still(
         self, way: Way, samples: int, number: int = MIDDLE
     ) -> tuple[float, Array]:
@@ -197,3 +224,10 @@ class Contest:
         if not np.isfinite(radiance).all():
             raise FloatingPointError(f"{way.label} holds values that are not finite")
         return seconds, radiance
+
+
+def _mean(one: Frame, two: Frame) -> Frame:
+    """A frame of the samples of both."""
+    names = ("radiance", "albedo", "normal")
+    means = {name: (getattr(one, name) + getattr(two, name)) / 2 for name in names}
+    return replace(one, halves=None, **means)

@@ -12,7 +12,7 @@ from xrds_core.files import write_json
 
 from .. import metrics
 from ..bench import machine
-from ..shots.figures import wrong_change
+from ..shots.flicker import flicker
 from . import comparison
 from .contest import PAIR
 from .scene import MIDDLE, SHOT
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from .comparison import Column
-    from .contest import Entry
+    from .contest import Entry, Reference
 
     Row = dict[str, Any]
 
@@ -37,7 +37,7 @@ class Outcome:
     quick: Entry
     shot: Entry
     stills: tuple[Entry, ...]
-    reference: Entry
+    reference: Reference
 
     @property
     def entries(self) -> tuple[Entry, ...]:
@@ -48,7 +48,7 @@ class Outcome:
 def write(out: Path, scene: Any, outcome: Outcome) -> list[Row]:
     """Write everything into the folder `out`; returns the rows of results.json."""
     rows = [_row(entry, outcome.reference) for entry in outcome.entries]
-    for entry in (*outcome.entries, outcome.reference):
+    for entry in (*outcome.entries, outcome.reference.picture):
         picture = entry.frames[MIDDLE]
         opaque = np.ones(picture.shape[:2], np.float32)
         for suffix in (".exr", ".png"):
@@ -57,7 +57,7 @@ def write(out: Path, scene: Any, outcome: Outcome) -> list[Row]:
     settings = {
         "resolution": [scene.render.resolution_x, scene.render.resolution_y],
         "frames": len(SHOT),
-        "reference_samples": outcome.reference.samples,
+        "reference_samples": outcome.reference.picture.samples,
     }
     report = {"settings": settings, "machine": machine.describe(), "ways": rows}
     write_json(out / "results.json", report)
@@ -73,8 +73,8 @@ def line(row: Row) -> str:
     )
 
 
-def _row(entry: Entry, reference: Entry) -> Row:
-    picture, truth = entry.frames[MIDDLE], reference.frames[MIDDLE]
+def _row(entry: Entry, reference: Reference) -> Row:
+    picture, truth = entry.frames[MIDDLE], reference.picture.frames[MIDDLE]
     return {
         "label": entry.label,
         "way": entry.way.name,
@@ -86,20 +86,26 @@ def _row(entry: Entry, reference: Entry) -> Row:
     }
 
 
-def _flicker(entry: Entry, reference: Entry) -> float | None:
-    """How wrongly the picture changes from frame to frame; None for a still."""
+def _flicker(entry: Entry, reference: Reference) -> float | None:
+    """How errors change from frame to frame; None for a still."""
     if not set(PAIR) <= set(entry.frames):
         return None
-    shown, true = ((x.frames[PAIR[0]], x.frames[PAIR[1]]) for x in (entry, reference))
-    return round(wrong_change(shown, true), 5)
+    shown = [metrics.to_srgb(entry.frames[number]) for number in PAIR]
+    one, two = (
+        (metrics.to_srgb(before.radiance), metrics.to_srgb(after.radiance))
+        for before, after in reference.renders
+    )
+    frames = reference.renders[0]
+    return round(flicker((shown[0], shown[1]), (one, two), frames), 5)
 
 
 def _write_comparisons(out: Path, outcome: Outcome, rows: Sequence[Row]) -> None:
     known = {row["way"]: row for row in rows}
+    true = outcome.reference.picture
 
     def columns(*entries: Entry) -> list[Column]:
         shown = [(_label(known[x.way.name]), x.frames[MIDDLE]) for x in entries]
-        return [*shown, (outcome.reference.label, outcome.reference.frames[MIDDLE])]
+        return [*shown, (true.label, true.frames[MIDDLE])]
 
     first, *others = PICTURES
     rival, shot = outcome.rival, outcome.shot

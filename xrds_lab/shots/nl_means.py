@@ -4,8 +4,9 @@ A pixel becomes the mean of those around it, in its own frame and the ones besid
 surroundings look alike: by noisy colour and its variance, and by albedo and normal.
 Neither cameras nor motion are known to it: what moves is found by looking alike, within
 the search window. After Rousselle, Manzi and Zwicker, "Robust Denoising using Feature
-and Color Information" (2013), with guides cleaned by Open Image Denoise; the radii are noice's defaults
-(https://help.autodesk.com/view/ARNOL/ENU/?guid=arnold_user_guide_ac_denoising_html).
+and Color Information" (2013), with guides cleaned by Open Image Denoise; the radii are
+noice's defaults
+(https://docs.arnoldrenderer.com/display/A5KTN/Denoiser+Attributes).
 """
 
 from __future__ import annotations
