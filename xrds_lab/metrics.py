@@ -13,6 +13,7 @@ from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
 
 RELMSE_EPSILON = 0.01  # the published tables of Monte Carlo denoising use this value
+LEAST_ERROR = 1e-7  # squared, 70 dB: below it two references tell noise alone
 TRIMMED_FRACTION = 0.001  # of pixels: a few fireflies rule the raw RelMSE
 
 
@@ -68,6 +69,31 @@ def all_metrics(
         "relmse": relmse(picture, reference),
         "relmse_trimmed": relmse(picture, reference, TRIMMED_FRACTION),
         "flip": flip(picture, reference, exposure),
+    }
+
+
+def metrics_of_pair(
+    picture: Array, pair: tuple[Array, Array], clean: Array, exposure: float = 0.0
+) -> dict[str, float]:
+    """The standard row, by two references of independent noise.
+
+    The mean of (x - r)(x - s) is the squared error of x without the noise of r and s;
+    where both are one reference this is `all_metrics`. FLIP is told by a `clean` one.
+    """
+    for reference in pair:
+        _check(picture, reference)
+    one, two = (np.asarray(x, np.float64) for x in pair)
+    shown, *true = (to_srgb(x, exposure) for x in (picture, *pair))
+    error = float(np.mean((shown - true[0]) * (shown - true[1]), dtype=np.float64))
+    relative = (picture - one) * (picture - two)
+    relative /= ((one + two) / 2) ** 2 + RELMSE_EPSILON
+    pixels = np.sort(relative.mean(axis=2), axis=None)
+    kept = max(1, pixels.size - round(TRIMMED_FRACTION * pixels.size))
+    return {
+        "psnr": float(-10.0 * np.log10(max(error, LEAST_ERROR))),
+        "relmse": float(pixels.mean()),
+        "relmse_trimmed": float(pixels[:kept].mean()),
+        "flip": flip(picture, clean, exposure),
     }
 
 

@@ -146,7 +146,7 @@ def test_notes_are_those_of_the_version() -> None:
 
 
 def test_the_changelog_tells_of_this_version(laid_out: Path) -> None:
-    assert "Shots" in (laid_out / "notes.md").read_text("utf-8")
+    assert "flicker" in (laid_out / "notes.md").read_text("utf-8")
 
 
 def test_without_zips_there_is_no_release(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from xrds_core.arrays import Array
 from xrds_core.errors import SceneError, UsageError
 from xrds_lab.bench.inputs import Folder
 from xrds_lab.bench.windows import Window, find_shots
-from xrds_lab.shots import bench, blocks, equal, figures, film, motions, report, rivals
+from xrds_lab.shots import bench, blocks, figures, film, motions, rivals
 from xrds_lab.shots.bench import Measure, bench_shots
 from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 from xrds_lab.shots.frames import MIDDLE, ShotFrames, requests
@@ -40,7 +40,7 @@ WINDOW = Window(*SIZE, 0, 0, *SIZE)
 
 
 def run(blend: Path, out: str = "out", **more: Any) -> dict[str, Any]:
-    choices = {"motions": ("pan",), "radii": (0, 1), "pair_samples": 4} | more
+    choices = {"motions": ("pan",), "radii": (0, 1)} | more
     return bench_shots(
         [blend],
         blend.parent / out,
@@ -61,7 +61,7 @@ def gain(points: list[dict[str, Any]], motion: str, radius: int) -> float:
 def test_a_second_run_renders_nothing_and_gives_the_same_files(
     blend: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = {"motions": ("pan", "still"), "equal_quality": True, "films": True}
+    asked = {"motions": ("pan", "still"), "films": True}
     first = run(blend, radii=(0, 1, 4), **asked)
     assert first["failures"] == {}
     points = first["shots"]
@@ -72,8 +72,6 @@ def test_a_second_run_renders_nothing_and_gives_the_same_files(
     assert all(p["flicker"] > 0 and 0 < p["flip"] < 1 for p in points)
     for motion in ("pan", "still"):
         assert gain(points, motion, 4) > gain(points, motion, 1) > 0.5
-    assert [e["samples"] for e in first["equal_quality"]] == [2]
-    assert first["equal_quality"][0]["cycles_samples"] > 2.0
     out = blend.parent / "out"
     assert json.loads((out / "results.json").read_text()) == first
     with (out / "results.csv").open(newline="") as file:
@@ -88,7 +86,7 @@ def test_a_second_run_renders_nothing_and_gives_the_same_files(
         raise AssertionError("measured again")
 
     monkeypatch.setattr(ShotFrames, "_render", refuse)
-    monkeypatch.setattr(figures, "all_metrics", refuse)
+    monkeypatch.setattr(figures, "metrics_of_pair", refuse)
     # what an earlier call has measured stays in the report
     again = run(blend, "again", radii=(0,), **(asked | {"films": False}))
     assert again == first
@@ -97,13 +95,13 @@ def test_a_second_run_renders_nothing_and_gives_the_same_files(
 
 
 def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
-    asked = {"radii": (0, 5), "pair_samples": 0, "rounds": 1, "samples": (2, 6)}
+    asked = {"radii": (0, 5), "rounds": 1, "samples": (2, 6)}
     result = run(blend, seconds=True, seconds_at=(48, 32), **asked)
     assert result["failures"] == {}
     few = [p for p in result["shots"] if p["samples"] == 2]
     found = {(p["method"], p["radius"]): p for p in few}
     assert found[XRDS, 5]["psnr"] > found[XRDS, 0]["psnr"] + 1.0
-    assert found[XRDS, 5]["flicker"] is None
+    assert found[XRDS, 5]["flicker"] < found[XRDS, 0]["flicker"]
     timed = [
         found[x]["seconds_per_frame"] for x in ((XRDS, 0), (XRDS, 5), (DEFAULT, 0))
     ]
@@ -124,9 +122,9 @@ def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
 
 
 def test_another_seed_is_other_noise_of_the_same_shot(blend: Path) -> None:
-    asked = {"motions": ("still",), "radii": (0,), "pair_samples": 0}
+    asked = {"motions": ("still",), "radii": (0,)}
     first = run(blend, **asked)["shots"]
-    kept = {path.name for path in (blend.parent / "cache").glob("*noisy*")}
+    kept = [path.name for path in (blend.parent / "cache").glob("*noisy-2spp*")]
     assert len(kept) == 9
     assert not any("seed" in name for name in kept)
     both = run(blend, seeds=2, **asked)["shots"]
@@ -405,14 +403,6 @@ def test_non_local_means_follow_what_looks_alike() -> None:
     assert error(nl_means(frames, 1)) < 0.8 * error(alone)
 
 
-def test_equal_samples_lie_between_those_rendered() -> None:
-    known = {1: 20.0, 2: 22.0, 4: 26.0}
-    assert equal.samples_for(22.0, known) == 2.0
-    assert equal.samples_for(24.0, known) == pytest.approx(2 * 2**0.5)
-    assert equal.samples_for(15.0, known) == 1.0
-    assert equal.samples_for(27.0, known) is None
-
-
 def test_films_show_the_largest_and_the_smallest_gain() -> None:
     points = [
         {"scene": s, "motion": "pan", "samples": 2, "method": m, "radius": r, "psnr": p}
@@ -422,30 +412,3 @@ def test_films_show_the_largest_and_the_smallest_gain() -> None:
     chosen = film.chosen(points, 2)
     assert chosen == {"best": ("b", "pan"), "worst": ("a", "pan")}
     assert film.chosen(points, 16) == {}
-
-
-def test_seconds_of_the_same_picture_follow_the_line_of_samples() -> None:
-    known = {2: 10.0, 16: 24.0}
-    assert equal.seconds_for(9.0, known) == pytest.approx(17.0)
-    assert equal.seconds_for(9.0, {2: 10.0}) is None
-    assert equal.seconds_for(None, known) is None
-    case = {"scene": "car", "motion": "pan"}
-    points = [
-        case
-        | {"method": method, "samples": n, "radius": radius, "seconds_per_frame": s}
-        for method, n, radius, s in (
-            (DEFAULT, 2, 0, 10.0),
-            (DEFAULT, 16, 0, 24.0),
-            (XRDS, 2, 4, 8.5),
-            (XRDS, 16, 4, None),
-        )
-    ]
-    entries = [
-        case | {"samples": n, "cycles_samples": needed, "psnr": 30.0, "curve": {}}
-        for n, needed in ((16, 64.0), (2, 9.0))
-    ]
-    first, last = equal.with_seconds(entries, points)
-    assert (first["samples"], first["gain"]) == (2, pytest.approx(2.0))
-    assert last["gain"] is None
-    page = "\n\n".join(report._equal([first, last]))
-    assert "| car | 2 | 30.00 | 8.5 | 17.0 | 2.00 |" in page

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from xrds_core.arrays import Array
 from xrds_core.errors import PictureError
 from xrds_lab import metrics
 
@@ -97,3 +98,21 @@ def test_bad_arrays_are_named(measure) -> None:  # noqa: ANN001
         measure(broken, REFERENCE)
     with pytest.raises(PictureError, match="reference"):
         measure(REFERENCE, broken)
+
+
+def test_two_references_tell_an_error_without_their_noise() -> None:
+    rng = np.random.default_rng(5)
+    true = rng.uniform(0.2, 0.6, (96, 96, 3)).astype(np.float32)
+
+    def noisy(size: float) -> Array:
+        return true + rng.normal(0, size, true.shape).astype(np.float32)
+
+    picture, pair = noisy(0.01), (noisy(0.03), noisy(0.03))
+    same = metrics.metrics_of_pair(picture, (true, true), true)
+    assert same == pytest.approx(metrics.all_metrics(picture, true))
+    found = metrics.metrics_of_pair(picture, pair, true)
+    assert found["psnr"] == pytest.approx(same["psnr"], abs=0.5)
+    assert found["relmse"] == pytest.approx(same["relmse"], rel=0.15)
+    assert metrics.psnr(picture, (pair[0] + pair[1]) / 2) < same["psnr"] - 3.0
+    perfect = metrics.metrics_of_pair(true, (true, true), true)
+    assert perfect["psnr"] == pytest.approx(70.0)

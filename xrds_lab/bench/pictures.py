@@ -178,7 +178,7 @@ class Pictures:
     def reference(self) -> Array:
         """The reference (H, W, 3): the shot's own, or the mean of two halves."""
         if self.shot.reference is not None:
-            return _reference_file(self.shot.reference)
+            return reference_file(self.shot.reference)
         first, second = self.references()
         return (first + second) / 2
 
@@ -259,7 +259,8 @@ def _denoisers_code() -> str:
 
 
 @lru_cache(maxsize=2)
-def _reference_file(path: Path) -> Array:
+def reference_file(path: Path) -> Array:
+    """The radiance (H, W, 3) of a reference's file."""
     return np.asarray(exr.read_beauty(path).radiance[..., :3])
 
 

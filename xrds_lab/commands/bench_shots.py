@@ -36,21 +36,10 @@ def add_shots(benches: Any) -> argparse.ArgumentParser:
         help="temporal radii, as 0,4; more than 4 asks for more frames",
     )
     add(
-        "--pair-samples",
-        type=arguments.whole,
-        default=64,
-        help="of the frame that flicker under a moving camera is judged by; 0: none",
-    )
-    add(
         "--seeds",
         type=arguments.positive,
         default=1,
         help="render each shot so many times, with other noise (default: 1)",
-    )
-    add(
-        "--equal",
-        action="store_true",
-        help="find the samples with which Cycles + OIDN is as good under pan",
     )
     add("--seconds", action="store_true", help="time whole frames; on a quiet machine")
     add(
@@ -131,9 +120,7 @@ def _shots(options: argparse.Namespace) -> dict[str, Any]:
             options.motions,
             options.samples,
             options.radii,
-            options.pair_samples,
             options.seeds,
-            equal_quality=options.equal,
             seconds=options.seconds,
             seconds_at=options.seconds_resolution,
             films=options.films,

@@ -18,6 +18,7 @@ from xrds_blender.rendering.sampling import noisy_frame
 from xrds_blender.rendering.shot import render_shot
 
 from ..shots.rivals import cycles_oidn
+from ..shots.truth import mean_of
 from .scene import MIDDLE, SHOT
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ class Contest:
         one, two = (tuple(self._raw(half, seed, n) for n in PAIR) for seed in _SEEDS)
         seconds = (time.perf_counter() - started) / len(PAIR)
         way = replace(CYCLES, name="reference", label="Reference")
-        frames = {MIDDLE: cycles_oidn(_mean(one[0], two[0]))}
+        frames = {MIDDLE: cycles_oidn(mean_of(one[0], two[0]))}
         picture = Entry(way, 2 * half, seconds, frames)
         return Reference(picture, ((one[0], one[1]), (two[0], two[1])))
 
@@ -224,10 +225,3 @@ class Contest:
         if not np.isfinite(radiance).all():
             raise FloatingPointError(f"{way.label} holds values that are not finite")
         return seconds, radiance
-
-
-def _mean(one: Frame, two: Frame) -> Frame:
-    """A frame of the samples of both."""
-    names = ("radiance", "albedo", "normal")
-    means = {name: (getattr(one, name) + getattr(two, name)) / 2 for name in names}
-    return replace(one, halves=None, **means)

@@ -6,7 +6,7 @@ measured is in the report too, so that a long measure can be made in parts.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.command import console
@@ -16,13 +16,11 @@ from xrds_core.files import write_json
 from ..bench import machine, workload
 from ..bench.inputs import Folder
 from ..bench.journal import Journal
-from ..bench.pictures import Networks, Pictures
 from ..bench.windows import find_shots
 from ..csv_table import write_table
 from ..progress import report_line
 from . import (
     answer,
-    equal,
     equal_seconds,
     estimate,
     film,
@@ -49,7 +47,6 @@ if TYPE_CHECKING:
 
 SAMPLES = (2,)
 RADII = (0, 1, 2, 4)
-PAIR_SAMPLES = 64
 REFERENCE_SAMPLES = 128
 ROUNDS = 3
 
@@ -61,9 +58,7 @@ class Measure:
     motions: tuple[str, ...] = tuple(MADE)
     samples: tuple[int, ...] = SAMPLES
     radii: tuple[int, ...] = RADII
-    pair_samples: int = PAIR_SAMPLES
     seeds: int = 1
-    equal_quality: bool = False
     seconds: bool = False
     seconds_at: tuple[int, int] | None = None  # width, height; the shots' own
     films: bool = False
@@ -91,19 +86,17 @@ def bench_shots(
     """Measure shots of scene files and write the report into `out`; returns it.
 
     `windows` (a file) and `references` (a folder of NAME.exr) are as for `bench`;
-    without them errors are of the whole frame, against the mean of two renders of
-    `reference_samples` each. `resolution` replaces the files' own. Raises UsageError
-    for missing files, before anything is rendered.
+    without them errors are of the whole frame, against two renders of
+    `reference_samples` each, without their noise. `resolution` replaces the files' own.
+    Raises UsageError for missing files, before anything is rendered.
     """
     out.mkdir(parents=True, exist_ok=True)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-shots.json", report_line)
     with console.stdout_to(folder.directory / "blender.log"):
         shots = find_shots(scenes, windows, references, resolution)
-        networks = Networks(None, "cpu")
         parts = [
-            _Scene(shot, folder, journal, networks, reference_samples, measure)
-            for shot in shots
+            _Scene(shot, folder, journal, reference_samples, measure) for shot in shots
         ]
         return _measured(parts, measure, journal, out)
 
@@ -115,19 +108,12 @@ class _Scene:
     shot: Shot
     folder: Folder
     journal: Journal
-    networks: Networks
     reference_samples: int
     measure: Measure
-    equals: list[dict[str, Any]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.pictures = Pictures(
-            self.shot, self.folder, self.networks, self.reference_samples
-        )
         self.frames = ShotFrames(self.shot, self.folder)
-        self.figures = SceneFigures(
-            self.frames, self.pictures.references, self.measure.pair_samples
-        )
+        self.figures = SceneFigures(self.frames, self.reference_samples)
         self.seconds = SceneSeconds(
             self.shot, self.folder.directory, self.measure.seconds_at
         )
@@ -152,10 +138,6 @@ class _Scene:
         }
         return sum(missing.values())
 
-    def left(self, cases: Sequence[tuple[str, int]]) -> float:
-        """What is to be rendered, references too, in the unit of `cost`."""
-        return self.cost(cases) + sum(r.samples for r in self.pictures.missing([]))
-
     def shoot(self, motion: str, samples: int, meter: workload.Meter) -> None:
         """Render and measure one shot, with every seed."""
         what = f"{self.shot.name}: {motion}, {samples} spp"
@@ -163,20 +145,10 @@ class _Scene:
         def done(request: FrameRequest) -> None:
             meter.done(cost(request), f"{what}, frame {request.number}")
 
-        halves = self.pictures.missing([])
-        self.pictures.render(halves, self.journal, lambda _: None)
         self.frames.render(self.wanted(motion, samples), self.journal, done)
         with self.journal.attempt(f"{what}, figures"):
             for seed in range(self.measure.seeds):
                 self.figures.measure(motion, samples, self.measure.radii, seed)
-
-    def compare(self) -> None:
-        """Find the samples at which Cycles gives pictures as good."""
-        targets = equal.targets(over_seeds(self.figures.points()))
-        if targets and self.measure.equal_quality:
-            best = max(point["psnr"] for point in targets)
-            known = equal.curve(self.pictures, self.journal, best)
-            self.equals = equal.comparisons(targets, known)
 
     def time(self) -> None:
         """Time whole frames at every number of samples."""
@@ -204,7 +176,7 @@ def _measured(
 ) -> Report:
     """Shot by shot, each of all scenes, with a report of what is done after each."""
     cases = [(m, n) for m in measure.motions for n in measure.samples]
-    left = {part.shot: part.left(cases) for part in parts}
+    left = {part.shot: part.cost(cases) for part in parts}
     left = {shot: units for shot, units in left.items() if units}
     if left:
         report_line(estimate.sentence(left))
@@ -216,7 +188,6 @@ def _measured(
                 part.shoot(*case, meter)
             _written(parts, journal, out)
         for part in parts:
-            part.compare()
             if measure.seconds:
                 part.time()
         results = _written(parts, journal, out)
@@ -249,21 +220,15 @@ def compared(points: Sequence[dict[str, Any]]) -> Report:
 def _written(parts: Sequence[_Scene], journal: Journal, out: Path) -> Report:
     points = [point for part in parts for point in part.points()]
     means = over_seeds(points)
-    equals = [entry for part in parts for entry in part.equals]
     results = {
         "settings": {
             "middle": "the file's own view",
-            "pair_samples": parts[0].measure.pair_samples,
+            "reference_samples": parts[0].reference_samples,
             "radius": REACH,
             "seconds_resolution": parts[0].measure.seconds_at,
         },
         "machine": machine.describe(),
-        "scenes": [
-            {"scene": part.shot.name, "reference_psnr_floor": part.pictures.floor()}
-            for part in parts
-        ],
         "shots": points,
-        "equal_quality": equal.with_seconds(equals, means),
         **compared(points),
         "failures": journal.failures,
     }

@@ -21,12 +21,13 @@ from xrds_core.files import write_json
 from xrds_core.shot import Shot
 
 from ..checksum import checksum
-from ..metrics import all_metrics
+from ..gallery.judge import squared_error
+from ..metrics import metrics_of_pair, to_srgb
 from . import blocks, nl_means, rivals
 from .crops import REFERENCE, SceneCrops, crop_key
-from .flicker import flicker_of, truths
 from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests
 from .motions import MOTIONS
+from .truth import Truth, requests_of_truth
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,11 +117,9 @@ class SceneFigures:
     def __init__(
         self,
         frames: ShotFrames,
-        references: Callable[[], tuple[Array, Array]],
-        pair_samples: int,
+        reference_samples: int,
     ) -> None:
-        self.frames, self._references = frames, references
-        self.pair_samples = pair_samples
+        self.frames, self.reference_samples = frames, reference_samples
         shot = frames.shot
         own = "own" if shot.reference is None else shot.reference.stem
         name = f"{shot.name}-{shot.digest}-{shot.window.label}-{own}-shots"
@@ -128,15 +127,12 @@ class SceneFigures:
         self._path = directory / f"{name}.json"
         self.crops = SceneCrops(directory, name)
         self._known: dict[str, Figures] = _stored(self._path)
-
-    def _reference(self) -> Array:
-        first, second = self._references()
-        return (first + second) / 2
+        self._truths: dict[str, Truth] = {}
 
     def points(self) -> list[Figures]:
         """Every figure that the present code gave, in order of motions and samples.
 
-        Of those with other pairs of references one each: this one's, if there is any.
+        Of those with other references one each: this one's, if there is any.
         """
         return [{"seed": 0} | self._known[key] for key in self._current()]
 
@@ -167,7 +163,7 @@ class SceneFigures:
                 point["radius"],
                 point.get("seed", 0),
             )
-            if case not in found or f"-pair{self.pair_samples}-" in key:
+            if case not in found or f"-truth{self.reference_samples}-" in key:
                 found[case] = key
         return [found[case] for case in sorted(found)]
 
@@ -177,9 +173,7 @@ class SceneFigures:
         """The frames that these figures need."""
         reaches = sorted({reach_of(radius) for radius in radii} | {REACH})
         wanted = [r for x in reaches for r in requests(motion, samples, x, seed)]
-        if self.pair_samples:
-            wanted += truths(motion, self.pair_samples)
-        return wanted
+        return wanted + requests_of_truth(motion, self.reference_samples)
 
     def measure(
         self, motion: str, samples: int, radii: Sequence[int], seed: int = 0
@@ -204,12 +198,13 @@ class SceneFigures:
         """Find where crops are, with the two methods that pages set side by side."""
         if not self.crops.has_place(clip.motion):
             pair = clip.xrds(MIDDLE, REACH), clip.oidn(MIDDLE, DEFAULT_DENOISING)
-            self.crops.settle(clip.motion, pair, self._reference(), clip.stops)
+            clean = self._truth(clip.motion).clean
+            self.crops.settle(clip.motion, pair, clean, clip.stops)
 
     def _measure(self, clip: Clip, method: str, radius: int) -> None:
         motion = clip.motion
         paint, more = self._paint(clip, method, radius)
-        reference = self._reference()
+        truth = self._truth(motion)
         made: dict[int, Array] = {}
 
         def once(number: int) -> Array:
@@ -218,8 +213,8 @@ class SceneFigures:
             return made[number]
 
         if method == XRDS and radius:
-            pair = self._references()
-            more |= blocks.against_alone(once(MIDDLE), clip.alone, pair, clip.stops)
+            shown = once(MIDDLE), clip.alone
+            more |= blocks.against_alone(*shown, truth.pair, clip.stops)
         point = {
             "scene": self.frames.shot.name,
             "motion": motion,
@@ -229,8 +224,8 @@ class SceneFigures:
             "seed": clip.seed,
             "scale": 1,
             "seconds_per_frame": None,
-            **all_metrics(once(MIDDLE), reference, clip.stops),
-            "flicker": self._flicker(once, clip),
+            **metrics_of_pair(once(MIDDLE), truth.pair, truth.clean, clip.stops),
+            "flicker": truth.flicker((once(MIDDLE), once(MIDDLE + 1)), clip.stops),
         }
         key = self._key(motion, clip.samples, clip.seed, method, radius)
         if not clip.seed:  # others show the same place with other noise
@@ -238,13 +233,11 @@ class SceneFigures:
         self._known[key] = point | more
         write_json(self._path, self._known)
 
-    def _flicker(self, paint: Paint, clip: Clip) -> float | None:
-        """Of the middle frame and the next; None where nothing tells what is true."""
-        if not self.pair_samples:
-            return None
-        shown = paint(MIDDLE), paint(MIDDLE + 1)
-        frames, samples = self.frames, self.pair_samples
-        return flicker_of(shown, clip.motion, samples, frames, clip.stops)
+    def _truth(self, motion: str) -> Truth:
+        if motion not in self._truths:
+            samples = self.reference_samples
+            self._truths[motion] = Truth.of(self.frames, motion, samples)
+        return self._truths[motion]
 
     def _paint(self, clip: Clip, method: str, radius: int) -> tuple[Paint, Figures]:
         """What makes the picture of a frame by its number, and what it is named by."""
@@ -256,26 +249,26 @@ class SceneFigures:
             return clip.nl_means, {}
         mode = DEFAULT_DENOISING
         if method == BEST:
-            mode = best_mode(clip, self._reference())
+            mode = best_mode(clip, self._truth(clip.motion))
         return lambda number: clip.oidn(number, mode), {"mode": str(mode)}
 
     def _key(
         self, motion: str, samples: int, seed: int, method: str, radius: int
     ) -> str:
-        pair = self.pair_samples
         other = f"-seed{seed}" if seed else ""
-        what = f"{motion}-{samples}-{method}-{radius}{other}-pair{pair}"
-        return f"{what}-{_code(method == XRDS)}"
+        what = f"{motion}-{samples}-{method}-{radius}{other}"
+        return f"{what}-truth{self.reference_samples}-{_code(method == XRDS)}"
 
 
-def best_mode(clip: Clip, reference: Array) -> Denoising:
+def best_mode(clip: Clip, truth: Truth) -> Denoising:
     """The mode of Cycles' denoiser with the highest PSNR on the middle frame."""
-    from ..metrics import psnr
+    true = [to_srgb(x, clip.stops) for x in truth.pair]
 
-    return max(
-        rivals.MODES,
-        key=lambda mode: psnr(clip.oidn(MIDDLE, mode), reference, clip.stops),
-    )
+    def error(mode: Denoising) -> float:
+        shown = to_srgb(clip.oidn(MIDDLE, mode), clip.stops)
+        return float(squared_error(shown, true).mean())
+
+    return min(rivals.MODES, key=error)
 
 
 @lru_cache

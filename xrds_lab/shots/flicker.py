@@ -11,42 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..metrics import to_srgb
-from .frames import MIDDLE, FrameRequest
 from .rivals import displaced, interpolated
 
 if TYPE_CHECKING:
     from xrds_core.accumulation.frame import Frame
     from xrds_core.arrays import Array
 
-    from .frames import ShotFrames
-
     Pair = tuple[Array, Array]
-
-_SEEDS = (101, 102)
-
-
-def truths(motion: str, samples: int) -> list[FrameRequest]:
-    """The frames that flicker is judged by: the middle one and the next, twice."""
-    return [
-        FrameRequest(motion, samples, number, seed=seed)
-        for seed in _SEEDS
-        for number in (MIDDLE, MIDDLE + 1)
-    ]
-
-
-def flicker_of(
-    shown: Pair, motion: str, samples: int, frames: ShotFrames, stops: float
-) -> float:
-    """Return the flicker of radiance (H, W, 3) of a shot's middle frame and the next.
-
-    `frames` hold the `truths` of so many samples; `stops` is the exposure.
-    """
-    found = [frames.frame(request) for request in truths(motion, samples)]
-    true = [to_srgb(frame.radiance, stops) for frame in found]
-    pairs = (true[0], true[1]), (true[2], true[3])
-    pictures = to_srgb(shown[0], stops), to_srgb(shown[1], stops)
-    return flicker(pictures, pairs, (found[0], found[1]))
 
 
 def flicker(

@@ -56,7 +56,6 @@ def page(results: dict[str, Any]) -> str:
         *_gains(points),
         *comparison.sections(results),
         *blocks.section(points),
-        *_equal(results["equal_quality"]),
         *_seconds(points, results["settings"].get("seconds_resolution")),
         *_by_scene(points),
         *_failures(results["failures"]),
@@ -141,55 +140,6 @@ def _flicker(pairs: Sequence[tuple[Point, Point]]) -> list[str]:
         return ["-", "-"]
     scene = max(ratios, key=lambda name: ratios[name])
     return [f"{statistics.fmean(ratios.values()):.2f}", f"{ratios[scene]:.2f} {scene}"]
-
-
-def _equal(entries: Sequence[dict[str, Any]]) -> Iterator[str]:
-    if not entries:
-        return
-    yield "## Equal quality"
-    yield (
-        "Samples per pixel with which Cycles + OIDN's default has the PSNR of XRDS at "
-        f"radius {REACH} under `pan`, and in brackets how many times as many."
-    )
-    counts = sorted({entry["samples"] for entry in entries})
-    found = {(entry["scene"], entry["samples"]): entry for entry in entries}
-    lines = [
-        "| scene | " + " | ".join(f"XRDS, {n}" for n in counts) + " |",
-        "|---|" + "---|" * len(counts),
-    ]
-    for scene in dict.fromkeys(entry["scene"] for entry in entries):
-        cells = [_needed(found.get((scene, count))) for count in counts]
-        lines.append(f"| {scene} | {' | '.join(cells)} |")
-    yield "\n".join(lines)
-    yield from _same_picture(entries)
-
-
-def _same_picture(entries: Sequence[dict[str, Any]]) -> Iterator[str]:
-    timed = [entry for entry in entries if entry["gain"] is not None]
-    if not timed:
-        return
-    yield (
-        "The same picture in how many seconds per frame, where XRDS gains least first; "
-        "those of Cycles by the line through its fewest and most samples."
-    )
-    lines = [
-        "| scene | samples | PSNR | s of XRDS | s of Cycles + OIDN | times |",
-        "|---|---|---|---|---|---|",
-    ]
-    for e in timed:
-        seconds = f"{e['seconds']:.1f} | {e['cycles_seconds']:.1f} | {e['gain']:.2f}"
-        lines.append(f"| {e['scene']} | {e['samples']} | {e['psnr']:.2f} | {seconds} |")
-    yield "\n".join(lines)
-
-
-def _needed(entry: dict[str, Any] | None) -> str:
-    if entry is None:
-        return "-"
-    if entry["cycles_samples"] is None:
-        most = max(map(int, entry["curve"]), default=0)
-        return f"more than {most}"
-    needed = entry["cycles_samples"]
-    return f"{needed:.1f} ({needed / entry['samples']:.1f})"
 
 
 def _seconds(points: Sequence[Point], size: Sequence[int] | None) -> Iterator[str]:

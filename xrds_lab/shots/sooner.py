@@ -33,9 +33,9 @@ from ..csv_table import write_table
 from ..gallery.judge import compare
 from ..progress import report_line
 from .figures import REACH
-from .flicker import flicker_of, truths
 from .frames import MIDDLE, ShotFrames
 from .motions import animate
+from .truth import Truth, requests_of_truth
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -222,9 +222,9 @@ class _Scene:
     def _flicker(self, made: Made, motion: str) -> float:
         """Of a method's two frames, against renders of both by many samples."""
         frames = ShotFrames(replace(self.shot, size=None), self.folder)
-        frames.render(truths(motion, _TRUTH), Strict(), lambda _: None)
-        shown = made.radiance, made.following
-        return flicker_of(shown, motion, _TRUTH, frames, made.stops)
+        frames.render(requests_of_truth(motion, _TRUTH), Strict(), lambda _: None)
+        truth = Truth.of(frames, motion, _TRUTH)
+        return truth.flicker((made.radiance, made.following), made.stops)
 
     def _picture(self, case: Case, method: str) -> str:
         window = self.shot.rendered.label
