@@ -78,8 +78,8 @@ class Case:
 class Made:
     """A method's middle frame (H, W, 3) and the next, seen at `stops`, and their price.
 
-    `seconds` are of a frame by the clock, `processor` of all cores; `late` are those of
-    a frame of the last third of the shot, as its picture tells, None of one alone.
+    `seconds` are of a frame by the clock, `processor` of all cores; `late` the latter
+    of a frame of the last third of the shot, None of one alone.
     `shares` are of the file's samples, one for each frame.
     """
 
@@ -205,7 +205,8 @@ class _Scene:
             "method": method,
             "seconds": round(made.seconds, 3),
             "ratio": ratios["seconds"],
-            "late_ratio": made.late and round(made.late / cycles["seconds"], 3),
+            "late_ratio": made.late
+            and round(made.late / cycles["processor_seconds"], 3),
             "processor_seconds": round(made.processor, 3),
             "processor_ratio": ratios["processor_seconds"],
             "mean_share": round(float(np.mean(made.shares or [1.0])), 3),
@@ -295,19 +296,23 @@ def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     middle = scene.frame_current
     numbers = range(middle - reach, middle + reach + 1)
     job = render_request(scale=1, temporal_radius=REACH, **choices)
-    shown, shares, taken = {}, [], []
+    shown, shares, spent = {}, [], []
     started, busy = time.perf_counter(), time.process_time()
     for number, picture in render_shot(scene, job, numbers):
         assert picture.settings is not None
         shares.append(float(picture.settings.share))
-        taken.append(picture.seconds["total"])
+        spent.append(time.process_time())
         if number in (middle, middle + 1):
             shown[number] = np.asarray(picture.radiance, np.float32)
     seconds = (time.perf_counter() - started) / len(numbers)
     processor = (time.process_time() - busy) / len(numbers)
     pictures = shown[middle], shown[middle + 1]
     stops = _stops(scene)
-    return Made(*pictures, seconds, processor, stops, tuple(shares), _late(taken))
+    # a frame is finished beside the samples of a later one: what is spent between two
+    # is known, and of the last ones none is sampled
+    between = np.diff(spent)[: len(spent) - REACH - 2]
+    late = statistics.median(between[-len(spent) // 3 :])
+    return Made(*pictures, seconds, processor, stops, tuple(shares), float(late))
 
 
 def _late(values: Sequence[float]) -> float:
@@ -327,8 +332,8 @@ _COLUMNS = {
     "method": "method",
     "seconds": "s a frame",
     "ratio": "of Cycles'",
-    "late_ratio": "late in the shot",
     "processor_ratio": "of its processor seconds",
+    "late_ratio": "of these late in the shot",
     "mean_share": "share of samples",
     "late_share": "late",
     "psnr": "PSNR",
