@@ -74,7 +74,7 @@ def test_more_can_be_rendered_than_is_judged(blend: Path) -> None:
             windows=windows,
             around=around,
             cache=cache,
-            reference_samples=16,
+            reference_samples=64,
         )
         assert found["failures"] == {}
         return {row["method"]: row for row in found["shots"]}
@@ -83,7 +83,7 @@ def test_more_can_be_rendered_than_is_judged(blend: Path) -> None:
     assert small[CYCLES]["size"] == "32x32"
     assert large[CYCLES]["size"] == "64x72"
     # the same window of the same frame; a denoiser sees what is around it
-    assert large[CYCLES]["psnr"] == pytest.approx(small[CYCLES]["psnr"], abs=1.0)
+    assert large[CYCLES]["psnr"] == pytest.approx(small[CYCLES]["psnr"], abs=2.0)
     with pytest.raises(UsageError, match="16x72 is not between the window, 32x32"):
         measured((16, 72))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ def run(out: Path, minutes: float = 20.0) -> dict:
         shots=("hand_held",),
         sizes=[SIZE],
         samples=(2,),
+        picture_samples=8,
         radii=(1,),
         minutes=minutes,
         rounds=1,
@@ -34,7 +36,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_without_minutes_nothing_is_begun_and_all_is_told(folder: Path) -> None:
     found = run(folder, minutes=0.0)
     assert found["rows"] == []
-    assert len(found["failures"]) == 1
+    assert len(found["failures"]) == 2
     assert all("run it again" in why for why in found["failures"].values())
 
 
@@ -51,5 +53,8 @@ def test_a_second_run_goes_on_to_the_whole_report(folder: Path) -> None:
     names = {path.name for path in folder.iterdir()}
     assert {"results.json", "results.csv", "error-seconds.svg"} <= names
     assert "XRDS, radius 1" in (folder / "error-seconds.svg").read_text()
+    pan = json.loads((folder / "same-picture-hand_held" / "results.json").read_text())
+    methods = ["cycles_oidn", "same_picture", "same_samples"]
+    assert [row["method"] for row in pan["shots"]] == methods
     again = run(folder, minutes=0.0)
     assert again["rows"] == found["rows"]

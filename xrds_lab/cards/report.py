@@ -1,14 +1,16 @@
 """`xrds bench device-report`: every stage on the card of this machine and beside it.
 
-Three shots of the gallery, which the project makes itself. Cases are kept as they are
-done, so a run that was stopped, or ran out of minutes, goes on where it was.
+Three shots of the gallery, which the project makes itself. First each is panned over,
+by Cycles and its denoiser, with the same samples and for the same picture; then come
+the stages. Cases are kept as they are done, so a run that was stopped, or ran out of
+minutes, goes on where it was.
 """
 
 from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from xrds_blender.command import console
@@ -17,7 +19,9 @@ from xrds_core.files import read_json, write_json
 from ..bench import machine
 from ..bench.journal import Journal
 from ..csv_table import write_table
+from ..gallery.table import SHOTS as ALL_SHOTS
 from ..progress import report_line
+from ..shots import sooner
 from .cycles import find_card
 from .measure import Case, measure
 
@@ -33,6 +37,7 @@ SIZES = ((1920, 1080), (3840, 2160))
 SAMPLES = (16, 4, 1, 64)
 RADII = (1, 2, 4)
 MINUTES = 20.0
+PICTURE_SAMPLES = 64  # of a file whose picture is made in fewer
 
 
 def bench_devices(
@@ -41,6 +46,7 @@ def bench_devices(
     shots: Sequence[str] = SHOTS,
     sizes: Sequence[Size] = SIZES,
     samples: Sequence[int] = SAMPLES,
+    picture_samples: int = PICTURE_SAMPLES,
     radii: Sequence[int] = RADII,
     minutes: float = MINUTES,
     rounds: int = 3,
@@ -50,8 +56,9 @@ def bench_devices(
 
     `shots` are of the gallery; at further sizes the first of them is measured.
     Times are of a whole frame, medians of `rounds`; `cpu` and `card` take turns. The
-    first of `samples` is timed by stage, the others give their pictures alone. Without
-    a card `card` is the processor, too, which always accumulates.
+    first of `samples` is timed by stage, the others give their pictures alone; those of
+    *Same Picture* are `picture_samples`. Without a card `card` is the processor, too,
+    which always accumulates.
     """
     out.mkdir(parents=True, exist_ok=True)
     kept = out / "cache"
@@ -62,6 +69,13 @@ def bench_devices(
         cycles = find_card()
         about = {**machine.describe(), "cycles_device": cycles}
         report_line(f"Cycles on {cycles}")
+        pans = _Pans(sizes[0], picture_samples, reference_samples, cycles, out)
+        for name in shots:
+            if time.monotonic() > ends:
+                journal.failures[name] = "no minutes were left: run it again"
+                continue
+            with journal.attempt(name):
+                pans.measure(name)
         known: list[Row] = []
         for case in _cases(shots, sizes, samples, radii, cycles):
             one = replace(case, rounds=rounds, reference_samples=reference_samples)
@@ -81,6 +95,36 @@ def bench_devices(
                 known += read_json(path)
             _write(known, about, journal, out)
     return _write(known, about, journal, out)
+
+
+@dataclass(frozen=True)
+class _Pans:
+    """Shots of the gallery that a camera pans over, as `xrds bench same-picture`."""
+
+    size: Size
+    samples: int
+    reference_samples: int
+    device: str
+    out: Path
+
+    def measure(self, name: str) -> None:
+        """Measure what is missing of a shot, into a folder of its own."""
+        import bpy
+
+        folder = self.out / f"same-picture-{name}"
+        folder.mkdir(exist_ok=True)
+        blend = folder / f"{name}.blend"
+        if not blend.is_file():
+            ALL_SHOTS[name].build(folder, self.size)
+            bpy.ops.wm.save_as_mainfile(filepath=str(blend.resolve()))
+        sooner.bench_same_picture(
+            [blend],
+            folder,
+            [sooner.Case("pan", self.samples)],
+            resolution=self.size,
+            reference_samples=self.reference_samples,
+            device=self.device,
+        )
 
 
 def _line(case: Case, row: Row) -> str:

@@ -25,8 +25,7 @@ from xrds_core.files import read_json, write_json
 from .. import metrics
 from ..bench import machine
 from ..bench.inputs import Folder, open_scene, sample_adaptively
-from ..bench.journal import Journal, Strict
-from ..bench.pictures import Networks, Pictures
+from ..bench.journal import Journal
 from ..bench.windows import find_shots
 from ..cards.cycles import CPU
 from ..csv_table import write_table
@@ -56,7 +55,7 @@ MOST_SAMPLES = 4096
 CYCLES, SAME_PICTURE, SAME_SAMPLES = "cycles_oidn", "same_picture", "same_samples"
 _IN_TURN = ((CYCLES, SAME_PICTURE), (SAME_SAMPLES,))  # what takes longest comes last
 _TIMED = 3  # frames of Cycles, around the middle one
-_TRUTH = 64  # samples of the renders that flicker is judged by
+REFERENCE_SAMPLES = 128
 
 
 @dataclass(frozen=True)
@@ -108,16 +107,16 @@ def bench_same_picture(
     resolution: tuple[int, int] | None = None,
     around: tuple[int, int] | None = None,
     cache: Path | None = None,
-    reference_samples: int = 256,
+    reference_samples: int = REFERENCE_SAMPLES,
     device: str = CPU,
 ) -> dict[str, Any]:
     """Measure what is missing, write the report into `out` and return it.
 
     Errors are of the shot's middle frame, which is the file's own view, against two
     renders of `reference_samples` each, without their noise; with `references` against
-    these. `around` is the width and height of what is rendered around the windows.
-    Cycles renders on a `device` as in `Shot`. Raises UsageError for missing files, what
-    does not fit, and too short a shot.
+    these, and flicker alone by such renders. `around` is the width and height of what
+    is rendered around the windows. Cycles renders on a `device` as in `Shot`. Raises
+    UsageError for missing files, what does not fit, and too short a shot.
     """
     if frames < 2 * REACH + 1:
         raise UsageError(f"{frames} frames: give {2 * REACH + 1} or more")
@@ -125,14 +124,9 @@ def bench_same_picture(
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-same-picture.json", report_line)
     with console.stdout_to(folder.directory / "blender.log"):
-        networks = Networks(None, "cpu")
         shots = find_shots(scenes, windows, references, resolution, device)
         parts = [
-            _Scene(
-                replace(shot, size=around),
-                folder,
-                Pictures(shot, folder, networks, reference_samples),
-            )
+            _Scene(replace(shot, size=around), folder, reference_samples)
             for shot in shots
         ]
         for methods in _IN_TURN:
@@ -146,8 +140,10 @@ def bench_same_picture(
 class _Scene:
     """One scene: its rows, kept in a file."""
 
-    def __init__(self, shot: Shot, folder: Folder, pictures: Pictures) -> None:
-        self.shot, self.folder, self.pictures = shot, folder, pictures
+    def __init__(self, shot: Shot, folder: Folder, reference_samples: int) -> None:
+        self.shot, self.folder = shot, folder
+        self._frames = ShotFrames(replace(shot, size=None), folder)
+        self._reference_samples = reference_samples
         self._place = shot.window.within(shot.rendered)
         name = f"{shot.identity}-{shot.rendered.label}-same-picture.json"
         self._path = folder.directory / name
@@ -167,7 +163,9 @@ class _Scene:
         missing = [x for x in methods if f"{case.label}-{x}" not in self.rows]
         if not missing:
             return
-        self.pictures.render(self.pictures.missing([]), journal, lambda _: None)
+        wanted = requests_of_truth(case.motion, self._reference_samples)
+        self._frames.render(wanted, journal, lambda _: None)
+        truth = Truth.of(self._frames, case.motion, self._reference_samples)
         for method in missing:
             report_line(f"{self.shot.name}: {case.label}, {method}")
             made = work[method]().within(self._place)
@@ -175,7 +173,9 @@ class _Scene:
             self.folder.write(self._picture(case, method), picture, {})
             if method == SAME_PICTURE:
                 self._time_again(case, frames)
-            self.rows[f"{case.label}-{method}"] = self._judged(case, method, made)
+            self.rows[f"{case.label}-{method}"] = self._judged(
+                case, method, made, truth
+            )
             write_json(self._path, self.rows)
 
     def _time_again(self, case: Case, frames: int) -> None:
@@ -185,14 +185,14 @@ class _Scene:
         row["seconds"] = round((row["seconds"] + seconds) / 2, 3)
         row["processor_seconds"] = round((row["processor_seconds"] + processor) / 2, 3)
 
-    def _judged(self, case: Case, method: str, made: Made) -> Row:
+    def _judged(self, case: Case, method: str, made: Made, truth: Truth) -> Row:
         single = self.folder.read(self._picture(case, CYCLES))
         assert single is not None  # Cycles comes first
-        pictures = made.radiance, single["radiance"], *self.pictures.references()
-        shown, alone, *truth = (metrics.to_srgb(x, made.stops) for x in pictures)
-        verdict = compare(shown, alone, truth)
-        reference = self.pictures.reference()
-        error = metrics.flip(made.radiance, reference, made.stops)
+        pictures = made.radiance, single["radiance"], *truth.pair
+        shown, alone, *true = (metrics.to_srgb(x, made.stops) for x in pictures)
+        verdict = compare(shown, alone, true)
+        error = metrics.flip(made.radiance, truth.clean, made.stops)
+        flicker = truth.flicker((made.radiance, made.following), made.stops)
         own = {"seconds": made.seconds, "processor_seconds": made.processor}
         cycles = self.rows.get(f"{case.label}-{CYCLES}", own)
         ratios = {name: round(x / cycles[name], 3) for name, x in own.items()}
@@ -215,17 +215,10 @@ class _Scene:
             "psnr": round(verdict.psnr, 3),
             "gain": round(verdict.gain, 3),
             "flip": round(error, 5),
-            "flicker": round(self._flicker(made, case.motion), 5),
+            "flicker": round(flicker, 5),
             "worst_block": round(verdict.worst, 2),
             "share_of_blocks": round(verdict.share, 4),
         }
-
-    def _flicker(self, made: Made, motion: str) -> float:
-        """Of a method's two frames, against renders of both by many samples."""
-        frames = ShotFrames(replace(self.shot, size=None), self.folder)
-        frames.render(requests_of_truth(motion, _TRUTH), Strict(), lambda _: None)
-        truth = Truth.of(frames, motion, _TRUTH)
-        return truth.flicker((made.radiance, made.following), made.stops)
 
     def _picture(self, case: Case, method: str) -> str:
         window = self.shot.rendered.label
