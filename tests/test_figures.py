@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from xrds_lab.pages.writing import PageError, Pages
 
 ROOT = Path(__file__).resolve().parent.parent
-LISTED = ("README.md", "docs/performance.md")
+LISTED = tuple(tomllib.loads((ROOT / "docs/figures.toml").read_text("utf-8")))
 
 
 @pytest.fixture

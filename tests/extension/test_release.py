@@ -119,7 +119,7 @@ def test_the_page_leads_to_what_is_there(laid_out: Path) -> None:
         "python_versions": ["3"],
     }
     assert "4.2 or later, before 5.1" in text
-    assert "<strong>Shots</strong>" in text
+    assert "<strong>Time left</strong>" in text
     assert not re.findall(r"\$\w+", text)
 
 
