@@ -14,10 +14,10 @@ from mathutils import Vector
 from PIL import Image
 
 from xrds_lab.demo import __main__ as demo
-from xrds_lab.demo import comparison, contest, results, scene
+from xrds_lab.demo import comparison, contest, film, results, scene
 from xrds_lab.demo.countdown import Countdown
 from xrds_lab.demo.scene import MIDDLE, PIVOT, SHOT, TURN, build, orbit
-from xrds_lab.shots import film
+from xrds_lab.shots import film as pictures
 
 pytestmark = pytest.mark.nightly  # it takes minutes
 
@@ -140,8 +140,8 @@ def test_films_stay_small_where_that_costs_quality(tmp_path: Path) -> None:
     noise = [random.integers(0, 255, (80, 80, 3), np.uint8) for _ in range(3)]
     frames = [Image.fromarray(picture) for picture in noise]
     fine, small = tmp_path / "fine.webp", tmp_path / "small.webp"
-    film.save(fine, frames)
-    film.save(small, frames, fine.stat().st_size - 1)
+    pictures.save(fine, frames)
+    pictures.save(small, frames, fine.stat().st_size - 1)
     assert small.stat().st_size < fine.stat().st_size
 
 
@@ -192,3 +192,24 @@ def test_demo_leaves_figures_pictures_and_the_scene(
     assert len(told) == len(rows)
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "still_life.blend"))
     assert bpy.context.scene.camera.animation_data.action is not None
+
+
+@pytest.mark.parametrize(("fixed", "each"), [(2.0, 0.61), (9.0, 0.61), (0.4, 2.0)])
+def test_films_have_samples_of_equal_seconds(fixed: float, each: float) -> None:
+    cycles, ours = film.Line(4.0, each), film.Line(fixed, each)
+    samples = film.equal_samples(cycles, ours, 16)
+    assert ours.at(samples[1]) == pytest.approx(cycles.at(samples[0]), rel=0.02)
+    assert abs(samples[0] - 16) <= 4
+
+
+def test_a_film_shows_both_in_the_samples_chosen(blend: Path, tmp_path: Path) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 10
+    bpy.ops.wm.save_mainfile()
+    asked = [str(blend), "-o", str(tmp_path), "--samples", "2"]
+    assert film.main([*asked, "--resolution", "48x32"]) == 0
+    report = json.loads((tmp_path / "film.json").read_text())
+    assert [row["way"] for row in report["ways"]] == ["Cycles + OIDN", "XRDS"]
+    assert report["ratio"] > 0.0
+    with Image.open(tmp_path / "film.webp") as picture:
+        assert picture.n_frames == 10

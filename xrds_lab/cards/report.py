@@ -122,7 +122,8 @@ class _Pans:
             folder,
             [sooner.Case("pan", self.samples)],
             resolution=self.size,
-            reference_samples=self.reference_samples,
+            # four renders of each shot, where the stages have two
+            reference_samples=max(self.reference_samples // 2, 1),
             device=self.device,
         )
 

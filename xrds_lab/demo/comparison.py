@@ -59,20 +59,35 @@ def compare(heading: str, columns: Sequence[Column], path: Path) -> None:
 
 
 def move(shots: Sequence[Sequence[Array]], labels: Sequence[str], path: Path) -> None:
-    """Write two shots side by side as an animated WebP, labels of two lines above.
+    """Write two shots side by side as an animated WebP that runs there and back.
 
     Of every frame (H, W, 3), scene-linear, the middle is shown in its own size.
     """
+    parts = [[_middle(frame) for frame in frames] for frames in shots]
+    film.save(path, _beside(parts, labels))
+
+
+def play(
+    shots: Sequence[Sequence[Array]], labels: Sequence[str], path: Path, largest: int
+) -> None:
+    """Write two shots (H, W, 3), scene-linear, side by side as one that begins anew."""
+    film.save(path, _beside(shots, labels), largest, there_and_back=False)
+
+
+def _beside(
+    shots: Sequence[Sequence[Array]], labels: Sequence[str]
+) -> list[Image.Image]:
+    """Frames of two shots side by side, labels of two lines above."""
     frames = []
     for pair in zip(*shots, strict=True):
-        picture = film.beside(*(to_srgb(_middle(frame)) for frame in pair))
+        picture = film.beside(*(to_srgb(frame) for frame in pair))
         sheet = Image.new("RGB", (picture.width, LABEL + picture.height), PAPER)
         for number, label in enumerate(labels):
             place = GAP + number * picture.width // 2, 3
             _write(ImageDraw.Draw(sheet), place, label)
         sheet.paste(picture, (0, LABEL))
         frames.append(sheet)
-    film.save(path, frames)
+    return frames
 
 
 def _write(draw: ImageDraw.ImageDraw, place: tuple[int, int], text: str) -> None:

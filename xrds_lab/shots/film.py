@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     Point = dict[str, Any]
 
 FRAME_MILLISECONDS = 83  # 12 frames a second
+FILM_MILLISECONDS = 62  # 16: of longer ones
 QUALITIES = (60, 45, 30, 20)
 LARGEST = 600_000  # bytes: pages show several
 _GAP = 4  # white pixels between both
@@ -56,19 +57,25 @@ def write(path: Path, clip: Clip) -> None:
     save(path, frames)
 
 
-def save(path: Path, frames: Sequence[Image.Image], largest: int = LARGEST) -> None:
-    """Write pictures as an animated WebP that runs there and back without end.
+def save(
+    path: Path,
+    frames: Sequence[Image.Image],
+    largest: int = LARGEST,
+    there_and_back: bool = True,
+) -> None:
+    """Write pictures as an animated WebP that runs without end.
 
     In the best of QUALITIES that takes no more than `largest` bytes, or in the last.
     """
+    back = frames[-2:0:-1] if there_and_back else []
     for quality in QUALITIES:
         film = io.BytesIO()
         frames[0].save(
             film,
             "WEBP",
             save_all=True,
-            append_images=[*frames[1:], *frames[-2:0:-1]],
-            duration=FRAME_MILLISECONDS,
+            append_images=[*frames[1:], *back],
+            duration=FRAME_MILLISECONDS if there_and_back else FILM_MILLISECONDS,
             loop=0,
             quality=quality,
         )

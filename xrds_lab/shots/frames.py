@@ -11,6 +11,7 @@ from xrds_core.errors import SceneError
 
 from .. import packing
 from ..bench.inputs import Arrays, Folder, open_scene
+from ..cards.cycles import CPU
 from .motions import FILE, animate
 
 if TYPE_CHECKING:
@@ -55,7 +56,8 @@ class FrameRequest:
         seed = f"-seed{self.seed}" if self.seed else ""
         what = f"{self.motion}-noisy-{self.samples}spp-{self.number:02}{of}{seed}"
         version = bpy.app.version_string.replace(" ", "")
-        scene = f"{shot.name}-{shot.digest}-{shot.window.label}"
+        card = "" if shot.device == CPU else f"-{shot.device.lower()}"
+        scene = f"{shot.name}-{shot.digest}-{shot.window.label}{card}"
         return f"{scene}-{what}-v{GENERATION}-blender{version}.npz"
 
 
@@ -122,7 +124,7 @@ class ShotFrames:
         journal: Journal | Strict,
         done: Callable[[FrameRequest], object],
     ) -> None:
-        scene = open_scene(self.shot.path, self.shot.window)
+        scene = open_scene(self.shot.path, self.shot.window, self.shot.device)
         animate(scene, self.shot.window, motion, MIDDLE, reach)
         apart = scene.frame_current - MIDDLE  # of a file's own motion
         scene.render.use_persistent_data = True  # one sync of the scene for all frames
