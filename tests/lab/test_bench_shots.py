@@ -28,8 +28,8 @@ from xrds_lab.bench.inputs import Folder
 from xrds_lab.bench.windows import Window, find_shots
 from xrds_lab.shots import bench, blocks, figures, film, motions, rivals
 from xrds_lab.shots.bench import Measure, bench_shots
-from xrds_lab.shots.figures import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 from xrds_lab.shots.frames import MIDDLE, ShotFrames, requests
+from xrds_lab.shots.methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 from xrds_lab.shots.nl_means import nl_means
 from xrds_lab.shots.seeds import over_seeds
 
@@ -95,7 +95,8 @@ def test_a_second_run_renders_nothing_and_gives_the_same_files(
 
 
 def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
-    asked = {"radii": (0, 5), "rounds": 1, "samples": (2, 6)}
+    asked = {"radii": (0, 5), "rounds": 1, "samples": (2, 4, 6)}
+    asked["seconds_samples"] = (2, 6)
     result = run(blend, seconds=True, seconds_at=(48, 32), **asked)
     assert result["failures"] == {}
     few = [p for p in result["shots"] if p["samples"] == 2]
@@ -109,12 +110,15 @@ def test_longer_shots_and_seconds_join_the_report(blend: Path) -> None:
     (path,) = (blend.parent / "cache").glob("*-shot-seconds.json")
     known = json.loads(path.read_text())
     name = f"{XRDS}-5"
-    assert known.keys() == {"2", "4", "6"}  # frames of 6 are finished as those of 4
-    assert known["6"][name]["finish"] == known["4"][name]["finish"]
-    assert known["6"][name]["finish"] != known["2"][name]["finish"]
+    assert known.keys() == {"2", "6"}
+    # frames of 6 are finished as those of 2
+    assert known["6"][name]["finish"] == known["2"][name]["finish"]
     assert known["6"][name]["total"] == pytest.approx(
-        known["6"][name]["sample"]["total"] + known["4"][name]["finish"]["total"]
+        known["6"][name]["sample"]["total"] + known["2"][name]["finish"]["total"]
     )
+    point = {p["samples"]: p for p in result["shots"] if p["method"] == DEFAULT}
+    few, half, many = (point[n]["seconds_per_frame"] for n in (2, 4, 6))
+    assert half == pytest.approx((few + max(few, many)) / 2)  # on the line
     assert "Of frames of 48x32" in (blend.parent / "out/report.md").read_text()
     drawn = (blend.parent / "out/error-pan.svg").read_text()
     assert "XRDS, radius 4" not in drawn  # only what was timed

@@ -12,7 +12,7 @@ from PIL import Image
 from xrds_lab.bench.windows import Shot, Window
 from xrds_lab.shots import answer, estimate
 from xrds_lab.shots.crops import REFERENCE, SIZE, crop_key
-from xrds_lab.shots.figures import DEFAULT, XRDS
+from xrds_lab.shots.methods import DEFAULT, XRDS
 
 
 def pair(gain: float, samples: int = 2) -> list[dict[str, Any]]:

@@ -9,7 +9,8 @@ import pytest
 
 from xrds_lab.shots import comparison, equal_seconds, paired, verdicts
 from xrds_lab.shots.bench import compared
-from xrds_lab.shots.figures import DEFAULT, MEDIAN, REACH, XRDS
+from xrds_lab.shots.frames import REACH
+from xrds_lab.shots.methods import DEFAULT, MEDIAN, XRDS
 
 SCENES = ("car", "house", "cave", "room")
 

@@ -13,7 +13,7 @@ from browser import run_page
 from xrds_lab.shots import page
 from xrds_lab.shots.bench import compared
 from xrds_lab.shots.crops import REFERENCE, SIZE, SceneCrops, crop_key
-from xrds_lab.shots.figures import DEFAULT, XRDS
+from xrds_lab.shots.methods import DEFAULT, XRDS
 
 SCENES = ("car", "house", "<b>cave")
 PSNR = {"car": 30.0, "house": 34.0, "<b>cave": 26.0}

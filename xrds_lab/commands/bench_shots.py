@@ -48,6 +48,12 @@ def add_shots(benches: Any) -> argparse.ArgumentParser:
         metavar="WxH",
         help="of the frames that are timed; the files' own",
     )
+    add(
+        "--seconds-samples",
+        type=arguments.integers,
+        default=(),
+        help="that are timed, as 2,16: others lie on a line; all",
+    )
     add("--rounds", type=arguments.positive, default=3, help="runs of each timed stage")
     add("--films", action="store_true", help="also the best and the worst shot as WebP")
     command.set_defaults(work=_shots)
@@ -123,6 +129,7 @@ def _shots(options: argparse.Namespace) -> dict[str, Any]:
             options.seeds,
             seconds=options.seconds,
             seconds_at=options.seconds_resolution,
+            seconds_samples=options.seconds_samples,
             films=options.films,
             rounds=options.rounds,
         ),

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 from xrds_core.files import replacing
 
 from .crops import REFERENCE, SIZE, crop_key
-from .figures import DEFAULT, REACH, XRDS
+from .frames import REACH
+from .methods import DEFAULT, XRDS
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

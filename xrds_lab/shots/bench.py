@@ -30,8 +30,8 @@ from . import (
     report,
     verdicts,
 )
-from .figures import REACH, Clip, SceneFigures
-from .frames import ShotFrames
+from .figures import Clip, SceneFigures
+from .frames import REACH, ShotFrames
 from .motions import MADE
 from .seconds import SceneSeconds
 from .seeds import over_seeds
@@ -61,6 +61,7 @@ class Measure:
     seeds: int = 1
     seconds: bool = False
     seconds_at: tuple[int, int] | None = None  # width, height; the shots' own
+    seconds_samples: tuple[int, ...] = ()  # that are timed; all
     films: bool = False
     rounds: int = ROUNDS
 
@@ -152,7 +153,7 @@ class _Scene:
 
     def time(self) -> None:
         """Time whole frames at every number of samples."""
-        for samples in self.measure.samples:
+        for samples in self.measure.seconds_samples or self.measure.samples:
             with self.journal.attempt(f"{self.shot.name}: seconds, {samples} spp"):
                 self.seconds.measure(samples, self.measure.radii, self.measure.rounds)
 

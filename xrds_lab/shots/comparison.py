@@ -5,7 +5,8 @@ from __future__ import annotations
 import statistics
 from typing import TYPE_CHECKING, Any
 
-from .figures import DEFAULT, MEDIAN, NL_MEANS, REACH, XRDS
+from .frames import REACH
+from .methods import DEFAULT, MEDIAN, NL_MEANS, XRDS
 from .paired import LEVEL, MEASURES
 from .verdicts import NAMES, sentence
 

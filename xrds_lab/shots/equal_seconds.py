@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..bench import pareto
-from .figures import DEFAULT, MEDIAN, NL_MEANS, REACH, XRDS
+from .frames import REACH
+from .methods import DEFAULT, MEDIAN, NL_MEANS, XRDS
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence

@@ -26,6 +26,7 @@ from ..metrics import metrics_of_pair, to_srgb
 from . import blocks, nl_means, rivals
 from .crops import REFERENCE, SceneCrops, crop_key
 from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests
+from .methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 from .motions import MOTIONS
 from .truth import Truth, requests_of_truth
 
@@ -42,8 +43,6 @@ if TYPE_CHECKING:
     Paint = Callable[[int], Array]
 
 GENERATION = 3  # counts up whenever this file makes other figures
-DEFAULT, BEST, MEDIAN = "cycles_oidn_default", "cycles_oidn_best", "median_of_three"
-NL_MEANS, XRDS = "nl_means", "xrds"
 RIVALS = {DEFAULT: 0, BEST: 0, MEDIAN: 1, NL_MEANS: nl_means.REACH}
 """Each rival, and how many frames before and after it looks at."""
 

@@ -11,7 +11,9 @@ from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_core.files import replacing
 
 from ..metrics import to_srgb
-from .figures import REACH, XRDS, Clip
+from .figures import Clip
+from .frames import REACH
+from .methods import XRDS
 from .report import cases, compared
 
 if TYPE_CHECKING:

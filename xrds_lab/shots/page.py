@@ -17,7 +17,7 @@ from xrds_core.files import replacing
 
 from ..bench.plots import MEASURES as LABELS
 from .crops import REFERENCE, crop_key
-from .figures import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
+from .methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 from .motions import MOTIONS
 from .plot import LINES, PERCENTILES
 from .seeds import over_seeds

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..bench.plots import svg_of, two_panels
-from .figures import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
+from .methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

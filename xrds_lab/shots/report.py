@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 from xrds_core.files import replacing
 
 from . import blocks, comparison
-from .figures import BEST, DEFAULT, MEDIAN, NL_MEANS, REACH, XRDS
+from .frames import REACH
+from .methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 from .motions import MOTIONS
 from .seeds import over_seeds
 

@@ -1,8 +1,9 @@
 """Seconds per frame of whole frames: a shot by XRDS beside Cycles + OIDN.
 
 To be run on a quiet machine. The runs of both take turns; each figure is a median.
-What finishing takes is timed up to a few samples. More of them leave it less to do:
-frames of many are finished, on paper, in the seconds of few.
+What finishing takes is timed up to a few samples, and hardly depends on them: frames of
+many are finished, on paper, in the seconds of few. What is not timed lies on the line
+through the fewest and the most samples that are: Cycles' seconds are linear in them.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ from xrds_core.files import write_json
 
 from ..bench.inputs import open_scene
 from ..bench.windows import Window
-from .figures import DEFAULT, XRDS
 from .frames import MIDDLE
+from .methods import DEFAULT, XRDS
 from .motions import animate
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-_FINISHED = 4  # samples, at most, of frames whose finishing is timed
+_FINISHED = 2  # samples, at most, of frames whose finishing is timed
 
 
 class SceneSeconds:
@@ -58,9 +59,14 @@ class SceneSeconds:
             self.known = json.loads(self._path.read_text("utf-8"))
 
     def per_frame(self, method: str, samples: int, radius: int) -> float | None:
-        """Seconds of all that the user waits for, per frame; None if not timed."""
-        timed = self.known.get(str(samples), {}).get(_name(method, radius))
-        return None if timed is None else timed["total"]
+        """Seconds of all that the user waits for, per frame; None if nothing tells."""
+        name = _name(method, radius)
+        seconds = {int(n): x[name]["total"] for n, x in self.known.items() if name in x}
+        if samples in seconds or len(seconds) < 2:
+            return seconds.get(samples)
+        few, many = min(seconds), max(seconds)
+        slope = (seconds[many] - seconds[few]) / (many - few)
+        return float(seconds[few] + max(slope, 0.0) * (samples - few))
 
     def measure(self, samples: int, radii: Sequence[int], rounds: int) -> None:
         """Time what is missing: a frame's samples, finishing it, and the rival."""

@@ -31,8 +31,7 @@ from ..cards.cycles import CPU
 from ..csv_table import write_table
 from ..gallery.judge import compare
 from ..progress import report_line
-from .figures import REACH
-from .frames import MIDDLE, ShotFrames
+from .frames import MIDDLE, REACH, ShotFrames
 from .motions import animate
 from .truth import Truth, requests_of_truth
 

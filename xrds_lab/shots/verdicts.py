@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .figures import DEFAULT, REACH, XRDS
+from .frames import REACH
+from .methods import DEFAULT, XRDS
 from .paired import MEASURES
 
 if TYPE_CHECKING:
