@@ -18,6 +18,7 @@ from xrds_core.progress import duration
 from ..csv_table import write_table
 from ..progress import report_line
 from . import analysis, machine, report, workload
+from .folder_of_report import make_folder
 from .inputs import Folder
 from .journal import Journal
 from .measure import SceneBench, Settings
@@ -67,7 +68,7 @@ def bench(
     ask for. Raises UsageError for missing files and unknown names, before anything is
     rendered.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     networks = Networks(weights, device)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal.json", report_line)

@@ -17,6 +17,7 @@ from xrds_blender.command import console
 from xrds_core.files import read_json, write_json
 
 from ..bench import machine
+from ..bench.folder_of_report import make_folder
 from ..bench.journal import Journal
 from ..csv_table import write_table
 from ..gallery.table import SHOTS as ALL_SHOTS
@@ -60,7 +61,7 @@ def bench_devices(
     *Same Picture* are `picture_samples`. Without a card `card` is the processor, too,
     which always accumulates.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     kept = out / "cache"
     kept.mkdir(exist_ok=True)
     journal = Journal(kept / "journal.json", report_line)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..bench import machine, workload
+from ..bench.folder_of_report import make_folder
 from ..bench.journal import Journal
 from ..progress import report_line
 from . import report
@@ -42,7 +43,7 @@ def bench_gallery(
     with neighbours judged and not. Raises UsageError for unknown names.
     """
     shots = chosen(tuple(names), half)
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     run = _Run(shots, out, measure, Store(cache or out / "cache"))
     if references_only:
         return run.references()

@@ -14,6 +14,7 @@ from xrds_core.errors import UsageError
 from xrds_core.files import write_json
 
 from ..bench import machine, workload
+from ..bench.folder_of_report import make_folder
 from ..bench.inputs import Folder
 from ..bench.journal import Journal
 from ..bench.windows import find_shots
@@ -91,7 +92,7 @@ def bench_shots(
     `reference_samples` each, without their noise. `resolution` replaces the files' own.
     Raises UsageError for missing files, before anything is rendered.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-shots.json", report_line)
     with console.stdout_to(folder.directory / "blender.log"):

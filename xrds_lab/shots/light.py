@@ -23,6 +23,7 @@ from xrds_core.finish import finish_frame
 
 from .. import metrics
 from ..bench import machine
+from ..bench.folder_of_report import make_folder
 from ..bench.inputs import Folder, open_scene
 from ..bench.journal import Journal
 from ..bench.windows import find_shots
@@ -78,7 +79,7 @@ def bench_light_parts(
     PSNR is of each part as light, in sRGB at the scene's exposure, against two renders
     of `reference_samples` without their noise. Raises UsageError for missing files.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-light-parts.json", report_line)
     rows: list[Row] = []

@@ -37,6 +37,7 @@ from xrds_core.overlap import Overlap
 from xrds_core.shot import Shot
 
 from ..bench import machine
+from ..bench.folder_of_report import make_folder
 from ..progress import report_line
 from .synthetic import frame
 
@@ -80,7 +81,7 @@ def bench_own_seconds(
     `size` is (width, height); `cores` are as many as are used, by default one, two and
     so on, doubled.
     """
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     counts = cores or _doubled(processors())
     bandwidth = _bandwidth()
     points = [

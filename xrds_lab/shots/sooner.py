@@ -24,6 +24,7 @@ from xrds_core.files import read_json, write_json
 
 from .. import metrics
 from ..bench import machine
+from ..bench.folder_of_report import make_folder
 from ..bench.inputs import Folder, open_scene, sample_adaptively
 from ..bench.journal import Journal
 from ..bench.windows import find_shots
@@ -119,7 +120,7 @@ def bench_same_picture(
     """
     if frames < 2 * REACH + 1:
         raise UsageError(f"{frames} frames: give {2 * REACH + 1} or more")
-    out.mkdir(parents=True, exist_ok=True)
+    make_folder(out)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-same-picture.json", report_line)
     with console.stdout_to(folder.directory / "blender.log"):
