@@ -5,7 +5,6 @@ from __future__ import annotations
 from statistics import mean, median
 from typing import TYPE_CHECKING
 
-from ..shots.frames import REACH
 from .results import OLD_PATTERN, beside_cycles, only
 
 if TYPE_CHECKING:
@@ -18,8 +17,7 @@ def figures(results: Results) -> Figures:
     """Return every figure that docs/figures.toml may name."""
     return {
         **_shots(results),
-        **_by_samples(results),
-        **_same_seconds(results),
+        **_own_seconds(results),
         **_held_out(results),
         **_gallery(results),
         **_parts(results),
@@ -39,54 +37,36 @@ def _installs(results: Results) -> Figures:
 
 
 def _shots(results: Results) -> Figures:
+    """Of shots over Cycles + OIDN: decibels, and flicker taken away in percent."""
     found: Figures = {}
-    for samples in (2, 16):
-        gains = results.gains("pan", samples).values()
-        name = f"shots.pan.{samples}"
+    for samples in results.pan_samples:
+        rows = results.pans(samples)
+        gains = [x["gain"] for x in rows]
+        flicker = mean(x["flicker_ratio"] for x in rows)
+        name = f"shots.{samples}"
         found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
-        ratios = [
-            ours / cycles for cycles, ours in results.shot_seconds(samples).values()
-        ]
-        name = f"shots.seconds.{samples}"
-        found |= {f"{name}.least": min(ratios), f"{name}.most": max(ratios)}
-        rows = only(results.shots["equal_quality"], motion="pan", samples=samples)
-        needed = [x["cycles_samples"] for x in rows if x["cycles_samples"] is not None]
-        name = f"shots.equal.{samples}"
-        found |= {f"{name}.least": min(needed), f"{name}.most": max(needed)}
+        found[f"{name}.steadier"] = 100.0 * (1.0 - flicker)
     return found
 
 
-def _by_samples(results: Results) -> Figures:
-    """Of shots over their frames alone: decibels, and flicker taken away in percent."""
-    found: Figures = {}
-    for samples in sorted({x["samples"] for x in results.by_samples}):
-        rows = only(results.by_samples, samples=samples)
-        flicker = mean(x["flicker_along"] / x["flicker_along_alone"] for x in rows)
-        found[f"by_samples.{samples}.gain"] = mean(x["gain"] for x in rows)
-        found[f"by_samples.{samples}.steadier"] = 100.0 * (1.0 - flicker)
-    return found
+def _own_seconds(results: Results) -> Figures:
+    """Seconds of finishing a 1080p frame on two cores: of a shot, and of one alone."""
+    points = results.read("own-seconds/own-seconds.json")["points"]
+    rows = only(points, samples=16, cores=2)
+    return {
+        f"own.{part}": only(rows, part=part)[0]["seconds"] for part in ("shot", "alone")
+    }
 
 
 def _held_out(results: Results) -> Figures:
     """Gains in dB over Cycles + OIDN."""
     found: Figures = {}
     for samples in sorted({x["samples"] for x in results.held_out}):
-        rows = beside_cycles(only(results.held_out, samples=samples), REACH)
+        rows = beside_cycles(only(results.held_out, samples=samples))
         gains = [x["gain"] for x in rows]
         name = f"held_out.{samples}"
         found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
         found[f"{name}.scenes"] = len(gains)
-    return found
-
-
-def _same_seconds(results: Results) -> Figures:
-    """Shots over Cycles + OIDN in the seconds of the shots' few samples."""
-    found: Figures = {}
-    for samples in (1, 2):
-        rows = only(results.shots["equal_seconds"], motion="pan", at="xrds")
-        gains = [x["gain"] for x in only(rows, samples=samples)]
-        name = f"shots.same_seconds.{samples}"
-        found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
     return found
 
 

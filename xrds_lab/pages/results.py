@@ -9,6 +9,7 @@ from statistics import mean
 from typing import TYPE_CHECKING, Any
 
 from ..shots.frames import REACH
+from ..shots.methods import DEFAULT, XRDS
 from ..shots.seeds import over_seeds
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ SCENES = (
 )
 OLD_PATTERN = ("bmw27", "crystal-cave")
 """Files with Cycles' classic sampling pattern, which XRDS replaces at full size."""
-MEDIAN = -1
 _UNLIT = 90.0  # dB: the PSNR of a part without light
 _NAMES = {"bmw27": "car", "crystal-cave": "cave"}
 
@@ -43,20 +43,21 @@ def only(rows: Iterable[dict[str, Any]], **values: Any) -> Rows:
     return [x for x in rows if all(x[key] == value for key, value in values.items())]
 
 
-def beside_cycles(rows: Rows, radius: int) -> Rows:
-    """Return XRDS' rows of one shot with their `gain` and `flicker_ratio`.
+def beside_cycles(rows: Rows, method: str = XRDS, radius: int = REACH) -> Rows:
+    """Return a method's rows with `gain` and the ratios of FLIP and flicker.
 
-    `rows` hold those of Cycles + OIDN, too; `radius` is as in `shot_rows`.
+    `rows` hold those of Cycles + OIDN, too, of one shot of each scene. The radius is
+    that of XRDS alone.
     """
-    method = "median_of_three" if radius == MEDIAN else "xrds"
-    usual = {x["scene"]: x for x in only(rows, method="cycles_oidn_default")}
+    usual = {x["scene"]: x for x in only(rows, method=DEFAULT)}
     chosen = only(rows, method=method)
-    if radius != MEDIAN:
+    if method == XRDS:
         chosen = only(chosen, radius=radius)
     return [
         {
             **x,
             "gain": x["psnr"] - usual[x["scene"]]["psnr"],
+            "flip_ratio": x["flip"] / usual[x["scene"]]["flip"],
             "flicker_ratio": x["flicker"] / usual[x["scene"]]["flicker"],
         }
         for x in chosen
@@ -85,10 +86,10 @@ class Results:
         return found | {"shots": over_seeds(found["shots"])}
 
     @cached_property
-    def by_samples(self) -> Rows:
-        """Shots of the seven scenes over the frame alone, by samples; a camera pans."""
+    def both(self) -> Rows:
+        """Shots of the scenes where camera and objects move, over the frame alone."""
         rows = self.read("shots/by-samples.json")["rows"]
-        return [x for x in rows if x.get("motion") == "pan" and "flicker_along" in x]
+        return [x for x in rows if x.get("motion") == "both"]
 
     @cached_property
     def held_out(self) -> Rows:
@@ -103,7 +104,7 @@ class Results:
     @cached_property
     def same_picture(self) -> Rows:
         """*Same Picture*: seconds and errors."""
-        return self.read("shots/same-picture.json")["shots"]
+        return self.read("same-picture/results.json")["shots"]
 
     @cached_property
     def gallery(self) -> Rows:
@@ -131,31 +132,15 @@ class Results:
         """Seconds on a graphics card."""
         return self.read("card/h200.json")
 
-    def shot_rows(self, motion: str, samples: int, radius: int) -> Rows:
-        """Return XRDS' rows of `shots` with their `gain` and `flicker_ratio`.
-
-        Those of a median of three denoised frames for `MEDIAN` in place of a radius.
-        """
-        rows = only(self.shots["shots"], motion=motion, samples=samples)
-        return beside_cycles(rows, radius)
-
-    def gains(self, motion: str, samples: int) -> dict[str, float]:
-        """Return what shots of radius 4 gain over Cycles + OIDN, by scene."""
-        rows = self.shot_rows(motion, samples, REACH)
-        if not rows:  # measured, but kept in the notebook alone
-            typed = self.read("shots/gains.json")["gains"]
-            rows = only(typed, motion=motion, samples=samples)
-        return {x["scene"]: x["gain"] for x in rows}
-
-    def shot_seconds(self, samples: int) -> dict[str, tuple[float, float]]:
-        """Return a frame's seconds by scene: Cycles + OIDN, and XRDS at radius 4."""
+    def pans(self, samples: int, method: str = XRDS, radius: int = REACH) -> Rows:
+        """Return a method's rows of `shots` beside those of Cycles + OIDN."""
         rows = only(self.shots["shots"], motion="pan", samples=samples)
-        found = {}
-        for scene in SCENES:
-            of = [x for x in rows if x["scene"] == scene and x["seconds_per_frame"]]
-            seconds = {(x["method"], x["radius"]): x["seconds_per_frame"] for x in of}
-            found[scene] = (seconds["cycles_oidn_default", 0], seconds["xrds", REACH])
-        return found
+        return beside_cycles(rows, method, radius)
+
+    @property
+    def pan_samples(self) -> list[int]:
+        """Samples per frame of `shots`, the fewest first."""
+        return sorted({x["samples"] for x in self.shots["shots"]})
 
     def unit(self, units: float) -> Rows:
         """Return what fits a budget, by scene: rows with `default`, `rival`, `xrds`."""

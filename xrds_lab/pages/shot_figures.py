@@ -28,11 +28,7 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
     # flicker is judged in the gallery where the camera stands still
     flicker = [x for x in results.gallery if x["flicker"] is not None]
     stills = {x["shot"] for x in flicker}
-    same = [
-        x
-        for x in results.same_picture
-        if x["by"] == "processor" and x["method"] == "same_picture"
-    ]
+    same = only(results.same_picture, method="same_picture", motion="pan")
     even = [x for x in same if not x["noise_threshold"]]
     noisy = [x for x in same if x["noise_threshold"]]
     locked = results.read("shots/locked-off.json")
@@ -51,8 +47,8 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
                 (x for x in gallery if x["shot"] not in stills), lambda x: x["gain"]
             ),
             "flicker": _means(
-                results.by_samples,
-                lambda x: x["flicker_along"] / x["flicker_along_alone"],
+                (x for n in results.pan_samples for x in results.pans(n)),
+                lambda x: x["flicker_ratio"],
             ),
             "same_flicker": _mean(_flicker_ratios(results.same_picture, same)),
         },
@@ -67,8 +63,8 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
         "threshold_share": _mean(x["late_share"] for x in noisy),
         "by_radius": {
             str(radius): _mean(
-                fmean(x["gain"] for x in results.shot_rows("pan", n, radius))
-                / fmean(x["gain"] for x in results.shot_rows("pan", n, 4))
+                fmean(x["gain"] for x in results.pans(n, radius=radius))
+                / fmean(x["gain"] for x in results.pans(n))
                 for n in (2, 16)
             )
             for radius in (1, 2, 4)
@@ -81,7 +77,7 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
     }
 
 
-_SAME_FRAMES = 21  # of each shot in `same-picture.json`
+_SAME_FRAMES = 21  # of each shot of *Same Picture*
 _NEIGHBOURS = 8
 
 
@@ -99,7 +95,7 @@ def _mean(values: Iterable[float]) -> float:
 
 def _flicker_ratios(rows: list[Any], ours: list[Any]) -> Iterable[float]:
     """Yield flicker beside that of Cycles + OIDN with the file's samples."""
-    names = ("scene", "motion", "samples", "noise_threshold", "size", "by")
+    names = ("scene", "motion", "samples", "noise_threshold", "size")
     for row in ours:
         same = {name: row[name] for name in names}
         (cycles,) = only(rows, method="cycles_oidn", **same)

@@ -6,6 +6,8 @@ from operator import itemgetter
 from statistics import mean, median
 from typing import TYPE_CHECKING
 
+from ..shots.frames import REACH
+from ..shots.methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
 from .results import SCENES, Results, only, scene_name
 
 if TYPE_CHECKING:
@@ -15,7 +17,6 @@ if TYPE_CHECKING:
 
     Table = list[list[str]]
 
-MOTIONS = ("pan", "objects", "both")
 UNITS = (1.0, 2.0, 4.0, 8.0)
 QUALITIES = (
     "HIGH-ACCURATE",
@@ -33,41 +34,17 @@ def shots_in_short(results: Results) -> Table:
     """Shots of the seven scenes: Cycles + OIDN, and what XRDS gains."""
     names = [scene_name(x) for x in SCENES]
     table = [["", *names, "mean"]]
-    for samples in (2, 16):
-        usual = only(
-            results.shots["shots"],
-            motion="pan",
-            samples=samples,
-            method="cycles_oidn_default",
-        )
+    for samples in (2, 16, 64):
+        usual = results.pans(samples, DEFAULT)
         psnr = {x["scene"]: x["psnr"] for x in usual}
         cells = [psnr[x] for x in SCENES]
-        table.append(
-            [
-                f"Cycles + OIDN, {samples} samples per frame",
-                *(f"{x:.1f}" for x in [*cells, mean(cells)]),
-            ]
-        )
-        gains = results.gains("pan", samples)
+        label = f"Cycles + OIDN, {samples} samples per frame"
+        table.append([label, *(f"{x:.1f}" for x in [*cells, mean(cells)])])
+        gains = {x["scene"]: x["gain"] for x in results.pans(samples)}
         cells = [gains[x] for x in SCENES]
         label = f"**XRDS, {samples} samples per frame: gain**"
         table.append([label, *(f"{x:+.1f}" for x in cells), f"**{mean(cells):+.1f}**"])
     return table
-
-
-def shot_motions(results: Results) -> Table:
-    """What shots gain under three motions, at 2 and 16 samples, by scene."""
-    table = [["", *(scene_name(x) for x in SCENES), "mean"]]
-    for motion in MOTIONS:
-        few, many = (results.gains(motion, samples) for samples in (2, 16))
-        means = [mean(gains[x] for x in SCENES) for gains in (few, many)]
-        cells = [_two(few[x], many[x]) for x in SCENES]
-        table.append([f"`{motion}`", *cells, _two(*means)])
-    return table
-
-
-def _two(few: float, many: float) -> str:
-    return f"{few:+.1f}, {many:+.1f}"
 
 
 def _signed(decibels: float) -> str:
@@ -76,17 +53,40 @@ def _signed(decibels: float) -> str:
 
 
 def shots_by_samples(results: Results) -> Table:
-    """What shots bring over their frames alone, by samples."""
+    """What shots bring over Cycles + OIDN, by samples; `both` over the frame alone."""
     head = ["samples", "scenes", "mean gain", "worst gain", "FLIP", "flicker"]
-    table = [[*head, "worst flicker"]]
-    for samples in sorted({x["samples"] for x in results.by_samples}):
-        rows = only(results.by_samples, samples=samples)
+    table = [[*head, "worst flicker", "`both`: gain", "worst"]]
+    for samples in results.pan_samples:
+        rows = results.pans(samples)
         gains = [x["gain"] for x in rows]
-        errors = mean(x["flip"] / x["flip_alone"] for x in rows)
-        flicker = [x["flicker_along"] / x["flicker_along_alone"] for x in rows]
+        flicker = [x["flicker_ratio"] for x in rows]
+        both = [x["gain"] for x in only(results.both, samples=samples)]
         cells = [samples, len(rows), f"{mean(gains):+.1f}", f"{min(gains):+.1f}"]
-        cells += [f"{errors:.2f}", f"{mean(flicker):.2f}", f"{max(flicker):.2f}"]
+        cells += [f"{mean(x['flip_ratio'] for x in rows):.2f}"]
+        cells += [f"{mean(flicker):.2f}", f"{max(flicker):.2f}"]
+        cells += [f"{mean(both):+.1f}", f"{min(both):+.1f}"]
         table.append(list(map(str, cells)))
+    return table
+
+
+def peers(results: Results) -> Table:
+    """PSNR and flicker of the same samples by other ways to steady pictures."""
+    ways = {
+        "Cycles + OIDN": (DEFAULT, 0),
+        "its best mode": (BEST, 0),
+        "median of three": (MEDIAN, 0),
+        "non-local means": (NL_MEANS, 0),
+        "XRDS, frame alone": (XRDS, 0),
+        "XRDS, shot": (XRDS, REACH),
+    }
+    table = [["samples", *ways]]
+    for samples in results.pan_samples:
+        cells = [str(samples)]
+        for method, radius in ways.values():
+            rows = results.pans(samples, method, radius)
+            flicker = mean(x["flicker_ratio"] for x in rows)
+            cells.append(f"{mean(x['psnr'] for x in rows):.1f}, {flicker:.2f}")
+        table.append(cells)
     return table
 
 
@@ -118,33 +118,31 @@ def light_parts(results: Results) -> Table:
 def same_picture(results: Results) -> Table:
     """Seconds and errors of *Same Picture* as ratios to Cycles + OIDN's.
 
-    What a card rendered, only of scenes that the processor did not.
+    Held-out scenes are those that move as their files say.
     """
     head = ["samples", "pictures", "scenes", "share of them", "seconds", "late"]
     table = [[*head, "PSNR", "worst", "FLIP", "flicker"]]
-    case = itemgetter("scene", "samples", "noise_threshold")
-    timed = {case(x) for x in only(results.same_picture, by="processor")}
-    rows = [
-        x
-        for x in results.same_picture
-        if x["by"] == "processor" or case(x) not in timed
-    ]
-    names = ("samples", "noise_threshold", "size", "by")
-    for kind in dict.fromkeys(map(itemgetter(*names), rows)):
+    rows = results.same_picture
+    names = ("motion", "samples", "noise_threshold", "size")
+    kinds = dict.fromkeys(map(itemgetter(*names), only(rows, method="same_picture")))
+    for kind in kinds:
         file = dict(zip(names, kind, strict=True))
         ours = only(rows, method="same_picture", **file)
         cycles = only(rows, method="cycles_oidn", **file)
         alone = {x["scene"]: x for x in cycles}
         worst = min(ours, key=lambda x: float(x["gain"]))
-        samples, threshold, size, by = kind
+        motion, samples, threshold, size = kind
         label = "" if threshold is None else f", threshold {threshold:g}"
+        held = ", held out" if motion == "file" else ""
         table.append(
             [
                 f"{samples}{label}",
-                f"{size}, card" if by == "card" else size,
-                str(len(ours)),
-                f"{mean(x['late_share'] for x in ours):.2f}",
-                *(_mean_if_timed(ours, name) for name in ("ratio", "late_ratio")),
+                size,
+                f"{len(ours)}{held}",
+                *(
+                    _mean_of(ours, name)
+                    for name in ("late_share", "processor_ratio", "late_ratio")
+                ),
                 f"{mean(x['gain'] for x in ours):+.1f}",
                 f"{worst['gain']:+.1f} {scene_name(worst['scene'])}",
                 *(
@@ -156,11 +154,10 @@ def same_picture(results: Results) -> Table:
     return table
 
 
-def _mean_if_timed(rows: Rows, name: str) -> str:
-    """The mean of seconds; nothing where other work ran beside it."""
-    if any(x[name] is None for x in rows):
-        return "-"
-    return f"{mean(x[name] for x in rows):.2f}"
+def _mean_of(rows: Rows, name: str) -> str:
+    """The mean of what was measured."""
+    known = [x[name] for x in rows if x[name] is not None]
+    return f"{mean(known):.2f}" if known else "-"
 
 
 def stills(results: Results) -> Table:
@@ -253,8 +250,8 @@ def card(results: Results) -> Table:
 
 TABLES: Mapping[str, Callable[[Results], Table]] = {
     "shots in short": shots_in_short,
-    "shots by motion": shot_motions,
     "shots by samples": shots_by_samples,
+    "peers": peers,
     "gallery": gallery,
     "passes of light": light_parts,
     "same picture": same_picture,

@@ -35,34 +35,38 @@ def error_plot(
 ) -> bytes | None:
     """SVG of medians over scenes, with the 5th to 95th percentile of errors.
 
-    A line joins the samples per pixel at which all scenes were timed; None where there
-    are none. Flicker is left out where it was not told. `resolution` is that of the
-    frames that were timed, whole ones with None.
+    A line joins the samples per pixel at which all scenes were measured; None where
+    there are none. It goes over the seconds of frames of `resolution`, whole ones with
+    None; over the samples where no frame was timed.
     """
-    timed = [p for p in points if p["motion"] == motion and p["seconds_per_frame"]]
-    scenes = {p["scene"] for p in timed}
+    shown = [p for p in points if p["motion"] == motion]
+    price = "samples"
+    axis = "samples per pixel"
+    if any(p["seconds_per_frame"] for p in shown):
+        shown = [p for p in shown if p["seconds_per_frame"]]
+        price = "seconds_per_frame"
+        size = "whole frame"
+        if resolution is not None:
+            size = "frame of {}x{}".format(*resolution)
+        axis = f"seconds of a {size}"
+    scenes = {p["scene"] for p in shown}
     title = f"shots, `{motion}`: median of {len(scenes)} scenes"
-    frame = (
-        "whole frame" if resolution is None else "frame of {}x{}".format(*resolution)
-    )
-    figure, panels = two_panels(title, f"seconds of a {frame}", MEASURES)
+    figure, panels = two_panels(title, axis, MEASURES)
     drawn = False
     for (method, radius), (name, colour, dash, mark) in LINES.items():
-        own = [p for p in timed if (p["method"], p["radius"]) == (method, radius)]
+        own = [p for p in shown if (p["method"], p["radius"]) == (method, radius)]
         counts = sorted({p["samples"] for p in own})
         groups = [[p for p in own if p["samples"] == n] for n in counts]
         whole = [g for g in groups if {p["scene"] for p in g} == scenes]
         if not whole:
             continue
         drawn = True
-        seconds = [np.median([p["seconds_per_frame"] for p in g]) for g in whole]
+        prices = [np.median([p[price] for p in g]) for g in whole]
         for panel, measure in zip(panels, MEASURES, strict=True):
-            if any(p[measure] is None for g in whole for p in g):
-                continue
             low, middle, high = np.transpose(
                 [np.percentile([p[measure] for p in g], PERCENTILES) for g in whole]
             )
             style = {"color": colour, "linestyle": dash, "linewidth": 1.4}
-            panel.plot(seconds, middle, label=name, marker=mark, markersize=4, **style)
-            panel.vlines(seconds, low, high, color=colour, alpha=0.35, linewidth=1)
+            panel.plot(prices, middle, label=name, marker=mark, markersize=4, **style)
+            panel.vlines(prices, low, high, color=colour, alpha=0.35, linewidth=1)
     return svg_of(figure, panels, outside=True) if drawn else None
