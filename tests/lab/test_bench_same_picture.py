@@ -82,8 +82,9 @@ def test_more_can_be_rendered_than_is_judged(blend: Path) -> None:
     small, large = measured(None), measured((64, 72))
     assert small[CYCLES]["size"] == "32x32"
     assert large[CYCLES]["size"] == "64x72"
-    # the same window of the same frame; a denoiser sees what is around it
-    assert large[CYCLES]["psnr"] == pytest.approx(small[CYCLES]["psnr"], abs=2.0)
+    # the same window of the same frame; a denoiser sees what is around it, and gains
+    gained = large[CYCLES]["psnr"] - small[CYCLES]["psnr"]
+    assert -1.0 < gained < 2.0
     with pytest.raises(UsageError, match="16x72 is not between the window, 32x32"):
         measured((16, 72))
 

@@ -17,8 +17,7 @@ from xrds_blender.rendering.render import render_scene
 from xrds_blender.rendering.sampling import noisy_frame
 from xrds_blender.rendering.shot import render_shot
 
-from ..shots.rivals import cycles_oidn
-from ..shots.truth import mean_of
+from ..shots.truth import Truth
 from .scene import MIDDLE, SHOT
 
 if TYPE_CHECKING:
@@ -93,10 +92,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Reference:
-    """What is true: a picture, and two raw renders of both frames of `PAIR`."""
+    """What is true of both frames of `PAIR`, and its picture to be shown."""
 
     picture: Entry
-    renders: tuple[tuple[Frame, Frame], tuple[Frame, Frame]]
+    truth: Truth
 
 
 def fitting(seconds: float, fixed: float, each: float) -> int:
@@ -161,9 +160,9 @@ class Contest:
         one, two = (tuple(self._raw(half, seed, n) for n in PAIR) for seed in _SEEDS)
         seconds = (time.perf_counter() - started) / len(PAIR)
         way = replace(CYCLES, name="reference", label="Reference")
-        frames = {MIDDLE: cycles_oidn(mean_of(one[0], two[0]))}
-        picture = Entry(way, 2 * half, seconds, frames)
-        return Reference(picture, ((one[0], one[1]), (two[0], two[1])))
+        truth = Truth.of_renders(((one[0], one[1]), (two[0], two[1])))
+        picture = Entry(way, 2 * half, seconds, {MIDDLE: truth.clean})
+        return Reference(picture, truth)
 
     def samples_in(self, way: Way, seconds: float) -> int:
         """The samples that fit into so many seconds; one at least."""

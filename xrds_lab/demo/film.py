@@ -144,9 +144,6 @@ def _film(options: argparse.Namespace) -> list[str]:
             mean = round(statistics.fmean(seconds), 3)
             rows.append({"way": label, "samples": count, "seconds": mean})
         stops = float(shot.scene.view_settings.exposure)
-        for row, pictures in zip(rows, films, strict=True):
-            name = f"{row['way'].partition(' ')[0].lower()}.npz"
-            np.savez_compressed(out / name, np.asarray(pictures, np.float16))
     labels = [f"{r['way']}, {r['samples']} samples\n{r['seconds']:.1f} s" for r in rows]
     light = [[frame * np.float32(2.0**stops) for frame in film] for film in films]
     comparison.play(light, labels, out / "film.webp", LARGEST)

@@ -12,7 +12,6 @@ from xrds_core.files import write_json
 
 from .. import metrics
 from ..bench import machine
-from ..shots.flicker import flicker
 from . import comparison
 from .contest import PAIR
 from .scene import MIDDLE, SHOT
@@ -90,13 +89,8 @@ def _flicker(entry: Entry, reference: Reference) -> float | None:
     """How errors change from frame to frame; None for a still."""
     if not set(PAIR) <= set(entry.frames):
         return None
-    shown = [metrics.to_srgb(entry.frames[number]) for number in PAIR]
-    one, two = (
-        (metrics.to_srgb(before.radiance), metrics.to_srgb(after.radiance))
-        for before, after in reference.renders
-    )
-    frames = reference.renders[0]
-    return round(flicker((shown[0], shown[1]), (one, two), frames), 5)
+    shown = entry.frames[PAIR[0]], entry.frames[PAIR[1]]
+    return round(reference.truth.flicker(shown, 0.0), 5)
 
 
 def _write_comparisons(out: Path, outcome: Outcome, rows: Sequence[Row]) -> None:

@@ -29,12 +29,13 @@ _NAMES = {
 _INTRODUCTION = """# Shots
 
 Written by `xrds bench shots`. Each scene is made a shot of nine frames (17 for a
-temporal radius of 8), whose middle frame is the file's own view, so that the scene's
-reference judges it. All methods get the same samples. PSNR in dB and FLIP are of the
-middle frame, in sRGB at the scene's exposure. A *gain* is in dB over Cycles + OIDN's
-default on that frame alone. *Best mode* is the best of Cycles' nine modes for each
-scene and shot, found with the reference. *Median of three* moves the denoised
-neighbours onto the frame by the Vector pass and takes the median, as SID-Temporal does.
+temporal radius of 8), whose middle frame is the file's own view. Two raw renders judge
+it, without their noise, or a reference that was given. All methods get the same
+samples. PSNR in dB and FLIP are of the middle frame, in sRGB at the scene's exposure. A
+*gain* is in dB over Cycles + OIDN's default on that frame alone. *Best mode* is the
+best of Cycles' nine modes for each scene and shot, found with the reference. *Median of
+three* moves the denoised neighbours onto the frame by the Vector pass and takes the
+median, as SID-Temporal does.
 *Non-local means* averages what looks alike in three noisy frames, as noice does: an
 implementation of our own, small, with guides cleaned by Open Image Denoise.
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .frames import ShotFrames
 
     Pair = tuple[Array, Array]
+    Renders = tuple[tuple[Frame, Frame], tuple[Frame, Frame]]
 
 _SEEDS = (101, 102)
 
@@ -42,7 +43,7 @@ class Truth:
 
     pair: Pair
     clean: Array
-    renders: tuple[tuple[Frame, Frame], tuple[Frame, Frame]]
+    renders: Renders
 
     @classmethod
     def of(cls, frames: ShotFrames, motion: str, samples: int) -> Truth:
@@ -52,8 +53,13 @@ class Truth:
         if frames.shot.reference is not None:
             own = reference_file(frames.shot.reference)
             return cls((own, own), own, renders)
+        return cls.of_renders(renders)
+
+    @classmethod
+    def of_renders(cls, renders: Renders) -> Truth:
+        """Take two renders of a frame and the next, each of as many samples."""
         both = renders[0][0], renders[1][0]
-        return cls(_radiance(*both), cycles_oidn(mean_of(*both)), renders)
+        return cls(_radiance(*both), cycles_oidn(_mean_of(*both)), renders)
 
     def flicker(self, shown: Pair, stops: float) -> float:
         """Return that of radiance (H, W, 3) of both frames, seen at `stops`."""
@@ -61,7 +67,7 @@ class Truth:
         return flicker(_shown(shown, stops), (one, two), self.renders[0])
 
 
-def mean_of(one: Frame, two: Frame) -> Frame:
+def _mean_of(one: Frame, two: Frame) -> Frame:
     """A frame of the samples of both, of which each has as many."""
     names = ("radiance", "albedo", "normal")
     means = {name: (getattr(one, name) + getattr(two, name)) / 2 for name in names}
