@@ -281,8 +281,9 @@ def _add_other_half(
 
 
 _REMEDY = {
-    "camera": "give --camera cameras.json, or --temporal-radius 0 to denoise each "
-    "frame by itself",
+    "camera": "give --camera cameras.json (of a .blend file: xrds cameras "
+    "shot.blend -o cameras.json), or --temporal-radius 0 to denoise each frame by "
+    "itself",
     "depth": "render Position or Depth too, name it with --position or --depth, or "
     "give --temporal-radius 0",
 }
