@@ -246,6 +246,6 @@ def programs() -> list[Path]:
     """The Blenders to test: $XRDS_BLENDERS, or what make test-app fetched."""
     told = os.environ.get("XRDS_BLENDERS")
     if told:
-        return [Path(part) for part in told.split(os.pathsep)]
+        return [Path(part).resolve() for part in told.split(os.pathsep)]
     fetched = HERE.parents[1] / "build" / "blender"
     return sorted(path.parent for path in fetched.glob("*/.complete"))

@@ -58,36 +58,37 @@ def test_the_check_asks_xrds_for_what_there_is() -> None:
         assert callable(getattr(module, each))
 
 
-def test_progress_counts_frames_ahead(
+def test_progress_is_that_of_all_frames(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Frames are sampled before their turn; it never falls, and ends at 100."""
+    """Two animations, of 4 frames and of 1; it never falls, and ends at 100."""
     yaml = pytest.importorskip("yaml")
     bpy = MagicMock()
     scene, handlers = bpy.context.scene, bpy.app.handlers
-    scene.render.engine, handlers.render_write, handlers.render_stats = "XRDS", [], []
-    now = ""
-    stages = SimpleNamespace(stages=SimpleNamespace(current=lambda: now))
+    scene.render.engine, handlers.render_stats = "XRDS", []
+    now: dict[str, Any] = {"text": None, "part": None}
+    stages = SimpleNamespace(current=lambda: now["text"], progress=lambda: now["part"])
+    package = SimpleNamespace(stages=stages)
     monkeypatch.setitem(sys.modules, "bpy", bpy)
-    monkeypatch.setitem(sys.modules, "xrds_blender.rendering", stages)
+    monkeypatch.setitem(sys.modules, "xrds_blender.rendering", package)
     files = yaml.safe_load(TEMPLATE.read_text("utf-8"))["steps"][0]["script"]
-    code = files["embeddedFiles"][0]["data"].replace("{{Task.Param.Frame}}", "11-14")
-    bpy.ops.render.render = lambda animation: {"FINISHED"}
+    code = files["embeddedFiles"][0]["data"].replace("{{Task.Param.Frame}}", "11-14,9")
+
+    def render(animation: bool) -> set[str]:
+        (note,) = handlers.render_stats
+        for part in (0.0, 0.5, 0.4, 0.75):
+            now.update(text="XRDS: frame 12 of 14, samples", part=part)
+            note("Sample 1/2")
+        now.update(text=None, part=None)
+        note("")
+        return {"FINISHED"}
+
+    bpy.ops.render.render = render
     exec(code, {})  # noqa: S102  # the template is ours
-    sampled = [(11, 12, 13), (14,), (), ()]
-    for frames in sampled:
-        for frame in frames:
-            now = f"XRDS 1/2: Samples of frame {frame}"
-            for sample in (1, 2, 1, 2):  # two halves
-                handlers.render_stats[0](f"Sample {sample}/2")
-        now = "XRDS 2/2: Denoising"
-        handlers.render_stats[0]("")
-        handlers.render_write[0]()
     out = capsys.readouterr().out
     told = [float(x) for x in re.findall(r"openjd_progress: ([\d.]+)", out)]
-    assert told == sorted(told)
-    assert told[5] == 60.0  # three of four are sampled, none is finished
-    assert told[-1] == 100.0
+    assert told == [40.0, 60.0, 80.0, 90.0, 95.0, 100.0]
+    assert out.count("openjd_status: XRDS: frame 12 of 14, samples") == 8
 
 
 RENDER_JOB = {
@@ -291,7 +292,9 @@ def test_an_open_job_renders_chunks_as_animations(
         check=False,
     )
     assert done.returncode == 0, done.stdout + done.stderr
-    assert (tmp_path / "animations").read_text().splitlines() == animations
+    lines = (tmp_path / "animations").read_text().splitlines()
+    assert [x for x in lines if not x.startswith("openjd_")] == animations
+    assert lines[-1] == "openjd_progress: 100.0"
 
 
 # --- Deadline -------------------------------------------------------------------------

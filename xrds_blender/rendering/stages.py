@@ -172,21 +172,27 @@ def current() -> str | None:
     return f"XRDS {run.number}/{run.of}: {run.stage}{time_left}"
 
 
+def progress() -> float | None:
+    """The part of all the work that is done, 0 to 1; None between renders."""
+    state = RENDER_JOB.of(Current)
+    run = state.run
+    if run is None:
+        return None
+    if state.clock is not None:
+        return state.clock.fraction()
+    spent, left = time.perf_counter() - run.start, _left(run)
+    part = 0.0 if left is None else spent / max(spent + left, 1e-6)
+    return state.before + state.share * part
+
+
 def show() -> None:
     """Set Blender's progress bar to the part of all the work that is done.
 
     For the main thread, while the engine renders.
     """
-    state = RENDER_JOB.of(Current)
-    run = state.run
-    if run is None:
-        return
-    if state.clock is not None:
-        run.engine.update_progress(state.clock.fraction())
-        return
-    spent, left = time.perf_counter() - run.start, _left(run)
-    part = 0.0 if left is None else spent / max(spent + left, 1e-6)
-    run.engine.update_progress(state.before + state.share * part)
+    run, part = RENDER_JOB.of(Current).run, progress()
+    if run is not None and part is not None:
+        run.engine.update_progress(part)
 
 
 def _learn(run: _Run, now: float) -> None:
