@@ -7,6 +7,8 @@ transform is the plain sRGB curve, so that no figure depends on a tone mapper.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from xrds_core.arrays import Array
@@ -77,14 +79,13 @@ def metrics_of_pair(
 ) -> dict[str, float]:
     """The standard row, by two references of independent noise.
 
-    The mean of (x - r)(x - s) is the squared error of x without the noise of r and s;
-    where both are one reference this is `all_metrics`. FLIP is told by a `clean` one.
+    Where both are one reference this is `all_metrics`. FLIP is told by a `clean` one.
     """
     for reference in pair:
         _check(picture, reference)
     one, two = (np.asarray(x, np.float64) for x in pair)
     shown, *true = (to_srgb(x, exposure) for x in (picture, *pair))
-    error = float(np.mean((shown - true[0]) * (shown - true[1]), dtype=np.float64))
+    error = float(squared_error(shown, true).mean())
     relative = (picture - one) * (picture - two)
     relative /= ((one + two) / 2) ** 2 + RELMSE_EPSILON
     pixels = np.sort(relative.mean(axis=2), axis=None)
@@ -95,6 +96,16 @@ def metrics_of_pair(
         "relmse_trimmed": float(pixels[:kept].mean()),
         "flip": flip(picture, clean, exposure),
     }
+
+
+def squared_error(picture: Array, pair: Sequence[Array]) -> Array:
+    """(H, W) of (H, W, C), mean over channels, by two references of independent noise.
+
+    The mean of (x - r)(x - s) is the squared error of x without the noise of r and s;
+    single pixels may be negative.
+    """
+    first, second = (np.subtract(picture, x, dtype=np.float64) for x in pair)
+    return np.asarray((first * second).mean(axis=-1))
 
 
 def _check(picture: Array, reference: Array) -> None:

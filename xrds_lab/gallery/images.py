@@ -12,8 +12,8 @@ from xrds_core.accumulation.reprojection import pair
 from xrds_core.accumulation.virtual_images import find_images
 from xrds_core.arrays import Array
 
-from ..metrics import to_srgb
-from .judge import BARE, squared_error
+from ..metrics import squared_error, to_srgb
+from .judge import BARE
 
 
 def figures(

@@ -15,7 +15,7 @@ import numpy as np
 from xrds_core.accumulation.local_filters import block_means
 from xrds_core.arrays import Array
 
-from ..metrics import to_srgb
+from ..metrics import squared_error, to_srgb
 
 BLOCK = 32  # pixels
 UNSEEN = 1e-5
@@ -70,12 +70,6 @@ def compare(picture: Array, alone: Array, references: Sequence[Array]) -> Verdic
         psnr_alone=_psnr(theirs),
         place=(int(row) * BLOCK, int(column) * BLOCK),
     )
-
-
-def squared_error(picture: Array, references: Sequence[Array]) -> Array:
-    """(H, W): (x - R)(x - S), mean over the channels; single pixels may be negative."""
-    first, second = (np.subtract(picture, r, dtype=np.float64) for r in references)
-    return np.asarray((first * second).mean(axis=-1))
 
 
 def block_gains(ours: Array, theirs: Array, unseen: float) -> Array:

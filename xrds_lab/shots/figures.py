@@ -21,8 +21,7 @@ from xrds_core.files import write_json
 from xrds_core.shot import Shot
 
 from ..checksum import checksum
-from ..gallery.judge import squared_error
-from ..metrics import metrics_of_pair, to_srgb
+from ..metrics import metrics_of_pair, squared_error, to_srgb
 from . import blocks, nl_means, rivals
 from .crops import REFERENCE, SceneCrops, crop_key
 from .frames import MIDDLE, REACH, FrameRequest, ShotFrames, requests
