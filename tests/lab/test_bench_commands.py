@@ -31,7 +31,7 @@ def test_every_bench_is_listed(capfd: pytest.CaptureFixture[str]) -> None:
     assert main.main(["bench", "--help"]) == 0
     listed = capfd.readouterr().out
     names = [add.__name__.removeprefix("add_").replace("_", "-") for add in BENCHES]
-    assert len(names) == 7
+    assert len(names) == 8
     assert all(f"\n    {name}" in listed for name in names)
 
 

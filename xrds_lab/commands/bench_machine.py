@@ -1,8 +1,9 @@
-"""`xrds bench device-report` and `own-seconds`: what stages cost on this machine."""
+"""`xrds bench device-report`, `own-seconds`, `left-out`: seconds on this machine."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from xrds_blender.command import arguments
@@ -44,6 +45,20 @@ def add_own_seconds(benches: Any) -> argparse.ArgumentParser:
     return command
 
 
+def add_left_out(benches: Any) -> argparse.ArgumentParser:
+    """Add `xrds bench left-out`."""
+    command: argparse.ArgumentParser = benches.add_parser(
+        "left-out",
+        help="seconds that a super-resolution picture saves by what a scene lacks",
+    )
+    add = command.add_argument
+    add("scenes", type=Path, nargs="+", metavar="SCENE.blend")
+    add("--resolution", type=arguments.size, metavar="WxH", help="of the pictures")
+    add("--rounds", type=arguments.positive, default=3, help="runs of each picture")
+    command.set_defaults(work=_left_out)
+    return command
+
+
 def _device_report(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("bench")
     from ..cards.report import SAMPLES, SIZES, bench_devices
@@ -63,4 +78,16 @@ def _own_seconds(options: argparse.Namespace) -> dict[str, Any]:
 
     return bench_own_seconds(
         options.out, options.size, samples=options.samples, rounds=options.rounds
+    )
+
+
+def _left_out(options: argparse.Namespace) -> dict[str, Any]:
+    need_blender("bench")
+    from ..bench.left_out import bench_left_out
+
+    return bench_left_out(
+        options.scenes,
+        options.out,
+        resolution=options.resolution,
+        rounds=options.rounds,
     )

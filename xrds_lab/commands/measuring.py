@@ -24,6 +24,7 @@ BENCHES = (
     bench_gallery.add_gallery,
     bench_machine.add_device_report,
     bench_machine.add_own_seconds,
+    bench_machine.add_left_out,
 )
 
 
