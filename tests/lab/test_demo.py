@@ -207,9 +207,11 @@ def test_a_film_shows_both_in_the_samples_chosen(blend: Path, tmp_path: Path) ->
     bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 10
     bpy.ops.wm.save_mainfile()
     asked = [str(blend), "-o", str(tmp_path), "--samples", "2"]
-    assert film.main([*asked, "--resolution", "48x32"]) == 0
+    asked += ["--resolution", "48x32", "--part", "24x16+20+10", "--stops", "1"]
+    assert film.main(asked) == 0
     report = json.loads((tmp_path / "film.json").read_text())
     assert [row["way"] for row in report["ways"]] == ["Cycles + OIDN", "XRDS"]
     assert report["ratio"] > 0.0
     with Image.open(tmp_path / "film.webp") as picture:
         assert picture.n_frames == 10
+        assert picture.height == comparison.LABEL + 64  # the part is as high again

@@ -22,6 +22,7 @@ from xrds_blender.planning.request import render_request
 from xrds_blender.planning.settings import DEFAULT_DENOISING
 from xrds_blender.rendering.render import render_scene
 from xrds_blender.rendering.shot import render_shot
+from xrds_core.errors import UsageError
 from xrds_core.files import write_json
 
 from ..bench import machine
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from xrds_core.arrays import Array
+
+    Part = tuple[tuple[int, int], tuple[int, int]]
 
 LARGEST = 3_500_000  # bytes
 _WARM = 3  # frames that are timed, after one that loads what is needed
@@ -123,6 +126,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     add("-o", "--out", type=Path, required=True, help="folder")
     add("--samples", type=arguments.positive, default=16, help="about; 16")
     add("--resolution", type=arguments.size, default=(640, 360), metavar="WxH")
+    add(
+        "--part",
+        type=arguments.crop,
+        metavar="WxH+X+Y",
+        help="shown enlarged below: a half or a third as wide and high",
+    )
+    add("--stops", type=float, default=0.0, help="brighter than the scene's exposure")
     options = parser.parse_args(argv)
     return console.status_of(lambda: _film(options), lambda lines: lines)
 
@@ -143,15 +153,34 @@ def _film(options: argparse.Namespace) -> list[str]:
             films.append(pictures)
             mean = round(statistics.fmean(seconds), 3)
             rows.append({"way": label, "samples": count, "seconds": mean})
-        stops = float(shot.scene.view_settings.exposure)
+        stops = float(shot.scene.view_settings.exposure) + options.stops
     labels = [f"{r['way']}, {r['samples']} samples\n{r['seconds']:.1f} s" for r in rows]
-    light = [[frame * np.float32(2.0**stops) for frame in film] for film in films]
+    light = [
+        [_shown(frame * np.float32(2.0**stops), options.part) for frame in film]
+        for film in films
+    ]
     comparison.play(light, labels, out / "film.webp", LARGEST)
     ratio = round(rows[1]["seconds"] / rows[0]["seconds"], 3)
     about = {"scene": options.scene.stem, "resolution": list(options.resolution)}
     report = {**about, "machine": machine.describe(), "ways": rows, "ratio": ratio}
     write_json(out / "film.json", report)
     return [f"{out / 'film.webp'}: {ratio:.3f} of Cycles' seconds"]
+
+
+def _shown(frame: Array, part: Part | None) -> Array:
+    """A frame (H, W, 3), with a part of it enlarged to the same size below."""
+    if part is None:
+        return frame
+    (left, top), (right, bottom) = part
+    detail = frame[top : bottom + 1, left : right + 1]
+    times = frame.shape[0] // (bottom + 1 - top)
+    enlarged = detail.repeat(times, axis=0).repeat(times, axis=1)
+    if enlarged.shape != frame.shape:
+        raise UsageError(
+            f"--part at {left}, {top} does not fill {frame.shape[1]}x{frame.shape[0]} "
+            "pixels: give a half or a third of them"
+        )
+    return np.concatenate([frame, enlarged])
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 FRAME_MILLISECONDS = 83  # 12 frames a second
 FILM_MILLISECONDS = 62  # 16: of longer ones
-QUALITIES = (60, 45, 30, 20)
+QUALITIES = (90, 75, 60, 45, 30, 20)
 LARGEST = 600_000  # bytes: pages show several
 _GAP = 4  # white pixels between both
 
