@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from .results import Results
 from .writing import Pages
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -16,7 +17,7 @@ def main() -> int:
     parser = argparse.ArgumentParser("python -m xrds_lab.pages", description=__doc__)
     parser.add_argument("--check", action="store_true", help="write nothing")
     parser.add_argument(
-        "--draw", action="store_true", help="the figures of method and source, too"
+        "--draw", action="store_true", help="figures of shots, method, source, too"
     )
     options = parser.parse_args()
     pages = Pages(ROOT)
@@ -26,9 +27,11 @@ def main() -> int:
         return 1 if faults else 0
     pages.write()
     if options.draw:
-        from . import architecture, method  # matplotlib, which checking does not need
+        # matplotlib, which checking does not need
+        from . import architecture, method, shot_plot
 
         method.draw(ROOT / "docs/images/method.svg")
+        shot_plot.draw(Results(ROOT / "docs/results"), ROOT / "docs/images/shots.svg")
         architecture.draw(ROOT / "docs/images/architecture.svg")
     return 0
 

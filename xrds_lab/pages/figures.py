@@ -5,6 +5,8 @@ from __future__ import annotations
 from statistics import mean, median
 from typing import TYPE_CHECKING
 
+from ..shots.frames import REACH
+from ..shots.methods import DEFAULT, XRDS
 from .results import OLD_PATTERN, beside_cycles, only
 
 if TYPE_CHECKING:
@@ -17,6 +19,7 @@ def figures(results: Results) -> Figures:
     """Return every figure that docs/figures.toml may name."""
     return {
         **_shots(results),
+        **_equal_seconds(results),
         **_own_seconds(results),
         **_held_out(results),
         **_gallery(results),
@@ -49,6 +52,27 @@ def _shots(results: Results) -> Figures:
     return found
 
 
+def _equal_seconds(results: Results) -> Figures:
+    """Of shots in the seconds of Cycles + OIDN; what a frame takes beside one alone."""
+    entries = only(results.shots["equal_seconds"], motion="pan", at=DEFAULT)
+    known = [x for x in entries if x["gain"] is not None]
+    found: Figures = {"equal.scenes": len({x["scene"] for x in known})}
+    for samples in {x["samples"] for x in known}:
+        rows = only(known, samples=samples)
+        name = f"equal.{samples}"
+        found[f"{name}.mean"] = mean(x["gain"] for x in rows)
+        found[f"{name}.worst"] = min(x["gain"] for x in rows)
+        found[f"{name}.steadier"] = 100.0 * (1.0 - mean(x["flicker"] for x in rows))
+    means = [found[f"equal.{samples}.mean"] for samples in (8, 16, 64)]
+    found |= {"equal.least": min(means), "equal.most": max(means)}
+    timed = [x for x in results.shots["shots"] if x["seconds_per_frame"]]
+    ways = {"shot": (XRDS, REACH), "alone": (XRDS, 0), "cycles": (DEFAULT, 0)}
+    for way, (method, radius) in ways.items():
+        rows = only(timed, method=method, radius=radius, motion="pan", samples=16)
+        found[f"frame.{way}"] = median(x["seconds_per_frame"] for x in rows)
+    return found
+
+
 def _own_seconds(results: Results) -> Figures:
     """Seconds of finishing a 1080p frame on two cores: of a shot, and of one alone."""
     points = results.read("own-seconds/own-seconds.json")["points"]
@@ -67,6 +91,8 @@ def _held_out(results: Results) -> Figures:
         name = f"held_out.{samples}"
         found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
         found[f"{name}.scenes"] = len(gains)
+        steady = mean(x["flicker_ratio"] for x in rows)
+        found[f"{name}.steadier"] = 100.0 * (1.0 - steady)
     return found
 
 

@@ -93,8 +93,8 @@ class Results:
 
     @cached_property
     def held_out(self) -> Rows:
-        """Shots on which no constant was chosen: all methods."""
-        return self.read("held-out/results.json")["shots"]
+        """Shots on which no constant was chosen: all methods; means over seeds."""
+        return over_seeds(self.read("held-out/results.json")["shots"])
 
     @cached_property
     def installs(self) -> Rows:
@@ -105,6 +105,11 @@ class Results:
     def same_picture(self) -> Rows:
         """*Same Picture*: seconds and errors."""
         return self.read("same-picture/results.json")["shots"]
+
+    @cached_property
+    def left_out(self) -> Rows:
+        """Super-resolution: seconds as planned and with nothing left out."""
+        return self.read("left-out/results.json")["shots"]
 
     @cached_property
     def gallery(self) -> Rows:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..shots.frames import REACH
 from ..shots.methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
-from .results import SCENES, Results, only, scene_name
+from .results import SCENES, Results, beside_cycles, only, scene_name
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -86,6 +86,53 @@ def peers(results: Results) -> Table:
             rows = results.pans(samples, method, radius)
             flicker = mean(x["flicker_ratio"] for x in rows)
             cells.append(f"{mean(x['psnr'] for x in rows):.1f}, {flicker:.2f}")
+        table.append(cells)
+    return table
+
+
+def equal_seconds(results: Results) -> Table:
+    """A shot in the seconds of Cycles + OIDN, where both were timed on both sides."""
+    head = ["seconds of Cycles + OIDN with", "scenes", "gain", "worst", "flicker"]
+    table = [[*head, "worst", "median of three: gain", "non-local means"]]
+    entries = only(results.shots["equal_seconds"], motion="pan", at=DEFAULT)
+    known = [x for x in entries if x["gain"] is not None]
+    for samples in sorted({x["samples"] for x in known}):
+        rows = only(known, samples=samples)
+        least = min(rows, key=lambda x: float(x["gain"]))
+        most = max(rows, key=lambda x: float(x["flicker"]))
+        table.append(
+            [
+                f"{samples} samples",
+                str(len(rows)),
+                f"{mean(x['gain'] for x in rows):+.1f}",
+                f"{least['gain']:+.1f} {scene_name(least['scene'])}",
+                f"{mean(x['flicker'] for x in rows):.2f}",
+                f"{most['flicker']:.2f} {scene_name(most['scene'])}",
+                *(
+                    f"{mean(x['peers'][way] - x[DEFAULT] for x in rows):+.1f}"
+                    for way in (MEDIAN, NL_MEANS)
+                ),
+            ]
+        )
+    return table
+
+
+def held_out(results: Results) -> Table:
+    """Shots on which no constant was chosen, over Cycles + OIDN's samples."""
+    head = ["samples", "scenes", "mean gain", "worst gain", "FLIP", "flicker"]
+    table = [[*head, "worst flicker", "median of three: gain, flicker"]]
+    for samples in sorted({x["samples"] for x in results.held_out}):
+        here = only(results.held_out, samples=samples)
+        rows, medians = beside_cycles(here), beside_cycles(here, MEDIAN)
+        least = min(rows, key=lambda x: float(x["gain"]))
+        most = max(rows, key=lambda x: float(x["flicker_ratio"]))
+        cells = [str(samples), str(len(rows)), f"{mean(x['gain'] for x in rows):+.1f}"]
+        cells += [f"{least['gain']:+.1f} {scene_name(least['scene'])}"]
+        for name in ("flip_ratio", "flicker_ratio"):
+            cells.append(f"{mean(x[name] for x in rows):.2f}")
+        cells += [f"{most['flicker_ratio']:.2f} {scene_name(most['scene'])}"]
+        gain = mean(x["gain"] for x in medians)
+        cells += [f"{gain:+.1f}, {mean(x['flicker_ratio'] for x in medians):.2f}"]
         table.append(cells)
     return table
 
@@ -248,13 +295,39 @@ def card(results: Results) -> Table:
     return table
 
 
+def left_out(results: Results) -> Table:
+    """What is left out of each scene: of an animation, a still, an enlarged picture."""
+    head = ["", "animation: samples left out", "its seconds saved"]
+    table = [[*head, "still: seconds of denoising", "super-resolution: seconds saved"]]
+    times = {x["scene"]: x["denoise_seconds"] for x in results.bench["scenes"]}
+    ours = {x["scene"]: x["seconds"] for x in results.denoiser("XRDS-HIGH", 1)}
+    enlarged = {x["scene"]: x for x in results.left_out}
+    for scene in SCENES:
+        shot = only(results.same_picture, scene=scene, samples=16, motion="pan")
+        shot = only(shot, method="same_picture")
+        cells = ["-", "-"]
+        if shot:
+            left = 1.0 - shot[0]["mean_share"], 1.0 - shot[0]["processor_ratio"]
+            cells = [f"{x:.0%}" for x in left]
+        usual, own = times[scene]["HIGH-ACCURATE"], ours[scene]["denoise"]
+        cells.append(f"{usual:.1f} -> {own:.1f}")
+        x = enlarged[scene]
+        before, after = x["seconds_all"], x["seconds_planned"]
+        cells.append(f"{before:.1f} -> {after:.1f}, {x['saved']:.0%}")
+        table.append([scene_name(scene), *cells])
+    return table
+
+
 TABLES: Mapping[str, Callable[[Results], Table]] = {
     "shots in short": shots_in_short,
     "shots by samples": shots_by_samples,
     "peers": peers,
+    "equal seconds": equal_seconds,
+    "held out": held_out,
     "gallery": gallery,
     "passes of light": light_parts,
     "same picture": same_picture,
+    "left out": left_out,
     "stills": stills,
     "denoisers": denoisers,
     "low budgets": low_budgets,

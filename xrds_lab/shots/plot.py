@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..bench.plots import svg_of, two_panels
-from .methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
+from .frames import REACH
+from .methods import BEST, DEFAULT, MEDIAN, NL_MEANS, SAME_PICTURE, XRDS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -24,6 +25,7 @@ LINES = {
     (XRDS, 1): ("XRDS, radius 1", "#56b4e9", "--", "d"),
     (XRDS, 2): ("XRDS, radius 2", "#009e73", "-.", "v"),
     (XRDS, 4): ("XRDS, radius 4", "#0072b2", "-", "D"),
+    (SAME_PICTURE, REACH): ("XRDS, Same Picture, late", "#882255", "", "*"),
 }
 MEASURES = {"psnr": "PSNR, dB (sRGB)", "flicker": "flicker (sRGB)"}
 PERCENTILES = (5, 50, 95)
