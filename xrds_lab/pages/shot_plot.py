@@ -22,7 +22,7 @@ MOTION = "pan"
 def draw(results: Results, path: Path) -> None:
     """Write the figure as SVG.
 
-    Raises ValueError where no shot was timed.
+    Raises ValueError where there are no shots.
     """
     points = only(results.shots["shots"], motion=MOTION)
     cycles = {(x["scene"], x["samples"]): x for x in only(points, method=DEFAULT)}
@@ -31,7 +31,7 @@ def draw(results: Results, path: Path) -> None:
     size = results.shots["settings"]["seconds_resolution"]
     svg = error_plot(shown, MOTION, size)
     if svg is None:
-        raise ValueError(f"{MOTION}: no shot was timed")
+        raise ValueError(f"no shots of the motion {MOTION}")
     with replacing(path) as part:
         part.write_bytes(svg)
 

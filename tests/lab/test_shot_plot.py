@@ -1,0 +1,62 @@
+"""The figure of the first page: points that were timed, Same Picture beside them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from xrds_lab.pages import shot_plot
+from xrds_lab.pages.results import Results
+from xrds_lab.shots.methods import DEFAULT, MEDIAN, SAME_PICTURE
+from xrds_lab.shots.plot import LINES
+
+RESULTS = Path(__file__).resolve().parents[2] / "docs/results"
+
+
+def point(method: str, seconds: float | None, samples: int = 16) -> dict[str, object]:
+    return {
+        "scene": "cubes",
+        "motion": "pan",
+        "method": method,
+        "samples": samples,
+        "radius": 0 if method == DEFAULT else 1,
+        "seconds_per_frame": seconds,
+        "psnr": 30.0,
+        "flicker": 0.02,
+    }
+
+
+def test_the_figure_is_drawn_from_the_results(tmp_path: Path) -> None:
+    shot_plot.draw(Results(RESULTS), tmp_path / "shots.svg")
+    assert b"<svg" in (tmp_path / "shots.svg").read_bytes()
+
+
+def test_what_is_made_of_cycles_frames_takes_their_seconds() -> None:
+    cycles = {("cubes", 16): point(DEFAULT, 12.0)}
+    priced = shot_plot._priced(point(MEDIAN, None), cycles)
+    assert priced["seconds_per_frame"] == 12.0
+
+
+def test_same_picture_lies_where_its_share_and_gain_put_it() -> None:
+    row = {"scene": "cubes", "motion": "pan", "samples": 16, "noise_threshold": None}
+    small = {"size": "64x48", "late_ratio": 0.9, "gain": -1.0, "flicker": 0.02}
+    large = {"size": "128x96", "late_ratio": 0.25, "gain": 0.5, "flicker": 0.01}
+    rows = [
+        row | {"size": x["size"], "method": "cycles_oidn", "flicker": 0.02}
+        for x in (small, large)
+    ]
+    rows += [row | x | {"method": SAME_PICTURE} for x in (large, small)]
+    cycles = {("cubes", 16): point(DEFAULT, 12.0)}
+    (found,) = shot_plot._sooner(rows, cycles)
+    assert (found["seconds_per_frame"], found["psnr"]) == (3.0, 30.5)  # of the large
+    assert found["flicker"] == pytest.approx(0.01)
+    assert (found["method"], found["radius"]) in LINES
+
+
+def test_results_without_shots_are_told(tmp_path: Path) -> None:
+    results = Results(tmp_path)
+    nothing = {"shots": [], "settings": {"seconds_resolution": None}}
+    results.__dict__.update(shots=nothing, same_picture=[])
+    with pytest.raises(ValueError, match="no shots"):
+        shot_plot.draw(results, tmp_path / "shots.svg")
