@@ -8,7 +8,8 @@ import pytest
 
 from xrds_lab.pages import shot_plot
 from xrds_lab.pages.results import Results
-from xrds_lab.shots.methods import DEFAULT, MEDIAN, SAME_PICTURE
+from xrds_lab.shots.frames import REACH
+from xrds_lab.shots.methods import DEFAULT, MEDIAN, SAME_PICTURE, XRDS
 from xrds_lab.shots.plot import LINES
 
 RESULTS = Path(__file__).resolve().parents[2] / "docs/results"
@@ -20,7 +21,7 @@ def point(method: str, seconds: float | None, samples: int = 16) -> dict[str, ob
         "motion": "pan",
         "method": method,
         "samples": samples,
-        "radius": 0 if method == DEFAULT else 1,
+        "radius": {DEFAULT: 0, XRDS: REACH}.get(method, 1),
         "seconds_per_frame": seconds,
         "psnr": 30.0,
         "flicker": 0.02,
@@ -40,16 +41,16 @@ def test_what_is_made_of_cycles_frames_takes_their_seconds() -> None:
 
 def test_same_picture_lies_where_its_share_and_gain_put_it() -> None:
     row = {"scene": "cubes", "motion": "pan", "samples": 16, "noise_threshold": None}
-    small = {"size": "64x48", "late_ratio": 0.9, "gain": -1.0, "flicker": 0.02}
-    large = {"size": "128x96", "late_ratio": 0.25, "gain": 0.5, "flicker": 0.01}
+    small = {"size": "64x48", "late_share": 0.9, "gain": -1.0, "flicker": 0.02}
+    large = {"size": "128x96", "late_share": 0.25, "gain": 0.5, "flicker": 0.01}
     rows = [
         row | {"size": x["size"], "method": "cycles_oidn", "flicker": 0.02}
         for x in (small, large)
     ]
     rows += [row | x | {"method": SAME_PICTURE} for x in (large, small)]
-    cycles = {("cubes", 16): point(DEFAULT, 12.0)}
-    (found,) = shot_plot._sooner(rows, cycles)
-    assert (found["seconds_per_frame"], found["psnr"]) == (3.0, 30.5)  # of the large
+    points = [point(DEFAULT, 12.0), point(XRDS, 6.0, 2), point(XRDS, 20.0)]
+    (found,) = shot_plot._sooner(rows, points)
+    assert (found["seconds_per_frame"], found["psnr"]) == (8.0, 30.5)  # of 4 samples
     assert found["flicker"] == pytest.approx(0.01)
     assert (found["method"], found["radius"]) in LINES
 

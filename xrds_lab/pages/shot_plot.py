@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from xrds_core.files import replacing
 
 from ..shots.frames import REACH
-from ..shots.methods import DEFAULT, MEDIAN, NL_MEANS, SAME_PICTURE
+from ..shots.methods import DEFAULT, MEDIAN, NL_MEANS, SAME_PICTURE, XRDS
 from ..shots.plot import error_plot
 from .results import only
 
@@ -27,7 +29,7 @@ def draw(results: Results, path: Path) -> None:
     points = only(results.shots["shots"], motion=MOTION)
     cycles = {(x["scene"], x["samples"]): x for x in only(points, method=DEFAULT)}
     shown = [_priced(x, cycles) for x in points]
-    shown += _sooner(results.same_picture, cycles)
+    shown += _sooner(results.same_picture, points)
     size = results.shots["settings"]["seconds_resolution"]
     svg = error_plot(shown, MOTION, size)
     if svg is None:
@@ -47,25 +49,33 @@ def _priced(point: dict[str, Any], cycles: dict[Any, Any]) -> dict[str, Any]:
     return point | {"seconds_per_frame": own["seconds_per_frame"]}
 
 
-def _sooner(rows: Rows, cycles: dict[Any, Any]) -> Rows:
+def _sooner(rows: Rows, points: Rows) -> Rows:
     """Late frames of *Same Picture* beside the points of Cycles + OIDN.
 
-    They were judged in other windows: differences and ratios are taken over, those of
-    the largest pictures.
+    They take the seconds of a shot's frame of their samples. They were judged in other
+    windows: differences and ratios are taken over, those of the largest pictures.
     """
-    points = {}
+    found = {}
     ours = only(rows, method=SAME_PICTURE, motion=MOTION, noise_threshold=None)
     for own in sorted(ours, key=lambda x: int(x["size"].partition("x")[0])):
-        usual = cycles.get((own["scene"], own["samples"]))
-        if usual is None or not (own["late_ratio"] and usual["seconds_per_frame"]):
+        here = only(points, scene=own["scene"])
+        shot = only(here, method=XRDS, radius=REACH)
+        timed = sorted(
+            (x["samples"], x["seconds_per_frame"])
+            for x in shot
+            if x["seconds_per_frame"]
+        )
+        usual = only(here, method=DEFAULT, samples=own["samples"])
+        if not (timed and usual):
             continue
         same = {x: own[x] for x in ("scene", "samples", "motion", "noise_threshold")}
         (alone,) = only(rows, method="cycles_oidn", size=own["size"], **same)
-        points[own["scene"], own["samples"]] = usual | {
+        taken = own["late_share"] * own["samples"]
+        found[own["scene"], own["samples"]] = usual[0] | {
             "method": SAME_PICTURE,
             "radius": REACH,
-            "seconds_per_frame": usual["seconds_per_frame"] * own["late_ratio"],
-            "psnr": usual["psnr"] + own["gain"],
-            "flicker": usual["flicker"] * own["flicker"] / alone["flicker"],
+            "seconds_per_frame": float(np.interp(taken, *zip(*timed, strict=True))),
+            "psnr": usual[0]["psnr"] + own["gain"],
+            "flicker": usual[0]["flicker"] * own["flicker"] / alone["flicker"],
         }
-    return list(points.values())
+    return list(found.values())
