@@ -9,7 +9,7 @@ import numpy as np
 from xrds_core.files import replacing
 
 from ..shots.frames import REACH
-from ..shots.methods import DEFAULT, MEDIAN, NL_MEANS, SAME_PICTURE, XRDS
+from ..shots.methods import CYCLES, DEFAULT, MEDIAN, NL_MEANS, SAME_PICTURE, XRDS
 from ..shots.plot import error_plot
 from .results import only
 
@@ -69,7 +69,7 @@ def _sooner(rows: Rows, points: Rows) -> Rows:
         if not (timed and usual):
             continue
         same = {x: own[x] for x in ("scene", "samples", "motion", "noise_threshold")}
-        (alone,) = only(rows, method="cycles_oidn", size=own["size"], **same)
+        (alone,) = only(rows, method=CYCLES, size=own["size"], **same)
         taken = own["late_share"] * own["samples"]
         found[own["scene"], own["samples"]] = usual[0] | {
             "method": SAME_PICTURE,

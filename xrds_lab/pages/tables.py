@@ -7,7 +7,15 @@ from statistics import mean, median
 from typing import TYPE_CHECKING
 
 from ..shots.frames import REACH
-from ..shots.methods import BEST, DEFAULT, MEDIAN, NL_MEANS, XRDS
+from ..shots.methods import (
+    BEST,
+    CYCLES,
+    DEFAULT,
+    MEDIAN,
+    NL_MEANS,
+    SAME_PICTURE,
+    XRDS,
+)
 from .results import SCENES, Results, beside_cycles, only, scene_name
 
 if TYPE_CHECKING:
@@ -50,6 +58,18 @@ def shots_in_short(results: Results) -> Table:
 def _signed(decibels: float) -> str:
     """Return a difference; what rounds to nothing is +0.00."""
     return f"{round(decibels, 2) + 0.0:+.2f}"
+
+
+def _least_gain(rows: Rows) -> str:
+    """The smallest gain in dB, and its scene."""
+    least = min(rows, key=lambda x: float(x["gain"]))
+    return f"{least['gain']:+.1f} {scene_name(least['scene'])}"
+
+
+def _most_flicker(rows: Rows, name: str) -> str:
+    """The largest ratio of flicker, and its scene."""
+    most = max(rows, key=lambda x: float(x[name]))
+    return f"{most[name]:.2f} {scene_name(most['scene'])}"
 
 
 def shots_by_samples(results: Results) -> Table:
@@ -98,16 +118,14 @@ def equal_seconds(results: Results) -> Table:
     known = [x for x in entries if x["gain"] is not None]
     for samples in sorted({x["samples"] for x in known}):
         rows = only(known, samples=samples)
-        least = min(rows, key=lambda x: float(x["gain"]))
-        most = max(rows, key=lambda x: float(x["flicker"]))
         table.append(
             [
                 f"{samples} samples",
                 str(len(rows)),
                 f"{mean(x['gain'] for x in rows):+.1f}",
-                f"{least['gain']:+.1f} {scene_name(least['scene'])}",
+                _least_gain(rows),
                 f"{mean(x['flicker'] for x in rows):.2f}",
-                f"{most['flicker']:.2f} {scene_name(most['scene'])}",
+                _most_flicker(rows, "flicker"),
                 *(
                     f"{mean(x['peers'][way] - x[DEFAULT] for x in rows):+.1f}"
                     for way in (MEDIAN, NL_MEANS)
@@ -124,13 +142,11 @@ def held_out(results: Results) -> Table:
     for samples in sorted({x["samples"] for x in results.held_out}):
         here = only(results.held_out, samples=samples)
         rows, medians = beside_cycles(here), beside_cycles(here, MEDIAN)
-        least = min(rows, key=lambda x: float(x["gain"]))
-        most = max(rows, key=lambda x: float(x["flicker_ratio"]))
         cells = [str(samples), str(len(rows)), f"{mean(x['gain'] for x in rows):+.1f}"]
-        cells += [f"{least['gain']:+.1f} {scene_name(least['scene'])}"]
+        cells += [_least_gain(rows)]
         for name in ("flip_ratio", "flicker_ratio"):
             cells.append(f"{mean(x[name] for x in rows):.2f}")
-        cells += [f"{most['flicker_ratio']:.2f} {scene_name(most['scene'])}"]
+        cells += [_most_flicker(rows, "flicker_ratio")]
         gain = mean(x["gain"] for x in medians)
         cells += [f"{gain:+.1f}, {mean(x['flicker_ratio'] for x in medians):.2f}"]
         table.append(cells)
@@ -171,13 +187,12 @@ def same_picture(results: Results) -> Table:
     table = [[*head, "PSNR", "worst", "FLIP", "flicker"]]
     rows = results.same_picture
     names = ("motion", "samples", "noise_threshold", "size")
-    kinds = dict.fromkeys(map(itemgetter(*names), only(rows, method="same_picture")))
+    kinds = dict.fromkeys(map(itemgetter(*names), only(rows, method=SAME_PICTURE)))
     for kind in kinds:
         file = dict(zip(names, kind, strict=True))
-        ours = only(rows, method="same_picture", **file)
-        cycles = only(rows, method="cycles_oidn", **file)
+        ours = only(rows, method=SAME_PICTURE, **file)
+        cycles = only(rows, method=CYCLES, **file)
         alone = {x["scene"]: x for x in cycles}
-        worst = min(ours, key=lambda x: float(x["gain"]))
         motion, samples, threshold, size = kind
         label = "" if threshold is None else f", threshold {threshold:g}"
         held = ", held out" if motion == "file" else ""
@@ -191,7 +206,7 @@ def same_picture(results: Results) -> Table:
                     for name in ("late_share", "processor_ratio", "late_ratio")
                 ),
                 f"{mean(x['gain'] for x in ours):+.1f}",
-                f"{worst['gain']:+.1f} {scene_name(worst['scene'])}",
+                _least_gain(ours),
                 *(
                     f"{mean(x[name] / alone[x['scene']][name] for x in ours):.2f}"
                     for name in ("flip", "flicker")
@@ -295,6 +310,16 @@ def card(results: Results) -> Table:
     return table
 
 
+_SHOT = {
+    "method": SAME_PICTURE,
+    "motion": "pan",
+    "samples": 16,
+    "noise_threshold": None,
+    "size": "960x512",
+}
+"""The rows of *Same Picture* that docs/left-out.md tells of."""
+
+
 def left_out(results: Results) -> Table:
     """What is left out of each scene: of an animation, a still, an enlarged picture."""
     head = ["", "animation: samples left out", "its seconds saved"]
@@ -303,8 +328,7 @@ def left_out(results: Results) -> Table:
     ours = {x["scene"]: x["seconds"] for x in results.denoiser("XRDS-HIGH", 1)}
     enlarged = {x["scene"]: x for x in results.left_out}
     for scene in SCENES:
-        shot = only(results.same_picture, scene=scene, samples=16, motion="pan")
-        shot = only(shot, method="same_picture")
+        shot = only(results.same_picture, scene=scene, **_SHOT)
         cells = ["-", "-"]
         if shot:
             left = 1.0 - shot[0]["mean_share"], 1.0 - shot[0]["processor_ratio"]
