@@ -215,3 +215,14 @@ def test_a_film_shows_both_in_the_samples_chosen(blend: Path, tmp_path: Path) ->
     with Image.open(tmp_path / "film.webp") as picture:
         assert picture.n_frames == 10
         assert picture.height == comparison.LABEL + 64  # the part is as high again
+
+
+@pytest.mark.parametrize("part", ["24x15+0+0", "24x16+30+0", "24x16-1+0", "60x40+0+0"])
+def test_a_part_that_does_not_fit_is_refused_before_rendering(
+    part: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    asked = [str(tmp_path / "a.blend"), "-o", str(tmp_path / "out")]
+    asked += ["--resolution", "48x32", f"--part={part}"]
+    assert film.main(asked) == 2
+    assert f"--part {part} does not fit 48x32 pixels" in capfd.readouterr().err
+    assert not (tmp_path / "out").exists()

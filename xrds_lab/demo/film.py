@@ -138,7 +138,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _film(options: argparse.Namespace) -> list[str]:
-    out = options.out
+    out, part = options.out, options.part
+    times = 1 if part is None else _enlargement(part, options.resolution)
     out.mkdir(parents=True, exist_ok=True)
     with console.stdout_to(out / "blender.log"):
         shot = Shot(options.scene, options.resolution)
@@ -156,7 +157,7 @@ def _film(options: argparse.Namespace) -> list[str]:
         stops = float(shot.scene.view_settings.exposure) + options.stops
     labels = [f"{r['way']}, {r['samples']} samples\n{r['seconds']:.1f} s" for r in rows]
     light = [
-        [_shown(frame * np.float32(2.0**stops), options.part) for frame in film]
+        [_shown(frame * np.float32(2.0**stops), part, times) for frame in film]
         for film in films
     ]
     comparison.play(light, labels, out / "film.webp", LARGEST)
@@ -167,20 +168,30 @@ def _film(options: argparse.Namespace) -> list[str]:
     return [f"{out / 'film.webp'}: {ratio:.3f} of Cycles' seconds"]
 
 
-def _shown(frame: Array, part: Part | None) -> Array:
+def _enlargement(part: Part, size: tuple[int, int]) -> int:
+    """Return how many times as wide and high a part is to be, to fill a frame's size.
+
+    Raises UsageError where no whole number does, or the frame does not hold the part.
+    """
+    (left, top), (right, bottom) = part
+    width, height = right + 1 - left, bottom + 1 - top
+    times = size[1] // height
+    fills = (width * times, height * times) == size
+    if not fills or min(left, top) < 0 or right >= size[0] or bottom >= size[1]:
+        raise UsageError(
+            f"--part {width}x{height}{left:+}{top:+} does not fit {size[0]}x{size[1]} "
+            "pixels: give a half or a third of their width and height, within them"
+        )
+    return times
+
+
+def _shown(frame: Array, part: Part | None, times: int) -> Array:
     """A frame (H, W, 3), with a part of it enlarged to the same size below."""
     if part is None:
         return frame
     (left, top), (right, bottom) = part
     detail = frame[top : bottom + 1, left : right + 1]
-    times = frame.shape[0] // (bottom + 1 - top)
-    enlarged = detail.repeat(times, axis=0).repeat(times, axis=1)
-    if enlarged.shape != frame.shape:
-        raise UsageError(
-            f"--part at {left}, {top} does not fill {frame.shape[1]}x{frame.shape[0]} "
-            "pixels: give a half or a third of them"
-        )
-    return np.concatenate([frame, enlarged])
+    return np.concatenate([frame, detail.repeat(times, axis=0).repeat(times, axis=1)])
 
 
 if __name__ == "__main__":
