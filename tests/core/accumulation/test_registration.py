@@ -55,7 +55,7 @@ def test_a_polynomial_of_second_degree_is_taken_out_exactly() -> None:
         moments(*d.reshape(2, -1), w.ravel()) for d, w in zip(off, weight, strict=True)
     )
     found = changes(np.moveaxis(polynomial(x, y), -1, 0), told)
-    apart = [polynomial(x, y) - polynomial(x + d[0] / 8, y + d[1] / 8) for d in off]
+    apart = [polynomial(x + d[0] / 8, y + d[1] / 8) - polynomial(x, y) for d in off]
     expected = sum(w[..., None] * a for w, a in zip(weight, apart, strict=True))
     inner = np.s_[2:-2, 2:-2]
     assert found.T.reshape(9, 12, 3)[inner] == pytest.approx(expected[inner], abs=0.01)
@@ -174,3 +174,22 @@ def test_a_lamp_of_any_brightness_stays_finite() -> None:
         return replace(frame, radiance=light)
 
     assert np.isfinite(gathered(shot(), lit).radiance).all()
+
+
+def test_a_lamp_has_no_dark_rim() -> None:
+    """A bulb on a dark wall that all frames see, each with its own part of a pixel."""
+    views = shot(noise=0.02)
+    across = np.arange(WIDTH, dtype=np.float32)
+
+    def lit(frame: Frame) -> Frame:
+        centre = WIDTH / 2 - 0.37 * frame.number  # as the wall moves
+        covered = np.clip(1.5 - np.abs(across - centre), 0, 1)
+        light = np.full((HEIGHT, WIDTH, 3), 0.05, np.float32)
+        light[22:26] += 500 * covered[:, None]
+        even = np.full_like(frame.albedo, 0.5)
+        return replace(frame, radiance=light, albedo=even)
+
+    found = gathered(views, lit)
+    assert found.radiance is not None
+    assert found.samples[MIDDLE].mean() > 4 * SAMPLES
+    assert found.radiance.min() > 0.04

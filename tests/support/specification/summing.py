@@ -10,7 +10,7 @@ import numpy as np
 
 from tests.support.specification.filters import Array, extreme
 from tests.support.specification.places import places, rims
-from tests.support.specification.registration import changes, moments
+from tests.support.specification.registration import changes, moments, registered
 from tests.support.specification.similarity import GuideSimilarity, LightSimilarity
 from xrds_core.accumulation.frame import Stored
 from xrds_core.accumulation.noise import brightness as root_of_luminance
@@ -123,9 +123,25 @@ class Work:
                 shaped = picture[:, : frame.picture.shape[1]].reshape(*frame.shape, -1)
                 judge.add(shaped, *(x.reshape(frame.shape) for x in (*light, weight)))
         if guess is not None:
-            change = changes(guess, summed)
-            values, bright = values + change[:-1].T, bright + change[-1]
+            values, bright = self.registered(values, bright, weights, guess, summed)
         return floats(values), floats(bright), floats(weights), floats(shares)
+
+    def registered(
+        self, values: Array, bright: Array, weights: Array, guess: Array, summed: Array
+    ) -> tuple[Array, Array]:
+        """Values (n, C) and brightness less what offsets change.
+
+        Parts of the light take out the shares that count of the whole.
+        """
+        together, own = np.vstack([values.T, bright]), self.target.picture.shape[1]
+        found, shares = registered(together, weights, guess, summed)
+        if self.target.has_light and self.lit:
+            of_parts = np.tile(shares[:3], (len(self.lit), 1))
+            with np.errstate(invalid="ignore"):
+                change = of_parts * changes(guess[own:-1], summed)
+            change[~np.isfinite(change)] = 0.0
+            found[own:-1] = together[own:-1] - change
+        return found[:-1].T, found[-1]
 
     def taken(self, found: Neighbour, registers: bool) -> tuple[Array, ...]:
         """Pixels taken of a neighbour, samples of each, weights, and offsets."""
