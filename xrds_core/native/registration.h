@@ -29,17 +29,17 @@ static const float BEND[3] = {-30.0f / 24, 16.0f / 24, -1.0f / 24};
      + BEND[2] * (x[(i) + 2 * (step)] + x[(i) - 2 * (step)]))
 
 typedef struct {
-    float *guess, *slopes;                      // of the block and REACH more on each side
-    float *change, *least, *most, *low, *high;  // of a row
-    float *shares[3][GROUPS];                   // of a change of radiance that counts
+    float *guess, *slopes;     // of the block and REACH more on each side
+    float *change[GROUPS], *least, *most, *low, *high;  // of a row
+    float *shares[3][GROUPS];  // of a change of radiance that counts
 } Offsets;
 
 static Offsets lay_out_offsets(const Block *b, char **next) {
     const size_t wide = (size_t)b->width + 2 * REACH, high = (size_t)b->rows + 2 * REACH;
     Offsets o = {.guess = take_floats(next, wide * high),
                  .slopes = take_floats(next, wide * high)};
-    float **rows[] = {&o.change, &o.least, &o.most, &o.low, &o.high};
-    EACH(k, 5) *rows[k] = take_floats(next, wide);
+    float **rows[] = {&o.change[0], &o.change[1], &o.least, &o.most, &o.low, &o.high};
+    EACH(k, 6) *rows[k] = take_floats(next, wide);
     if (b->target->parts)
         EACH(c, 3) EACH(g, GROUPS) o.shares[c][g] = take_floats(next, b->count);
     return o;
@@ -78,15 +78,20 @@ static void range_of(In at, const Offsets *o, int w, int wide) {
     }
 }
 
-// What the offsets of a group put into the sums of a row; `at` and `slope` are of the guess.
-static void changes_of(Row change, In at, In slope, float *const *moments, size_t row, int w,
-                       int wide) {
-    LANES(i, w) {
+// What offsets put into the sums of a row, by group; `at` and `slope` are of the guess.
+static void changes_of(const Block *b, float *const change[GROUPS], In at, In slope,
+                       size_t row, int wide) {
+    Row one = change[0], two = change[1];
+    float *const *m = b->sums[0].moments, *const *n = b->sums[1].moments;
+    LANES(i, b->width) {
         const float power[MOMENTS] = {slope[i], SLOPE_OF(at, i, wide), BEND_OF(at, i, 1),
                                       SLOPE_OF(slope, i, wide), BEND_OF(at, i, wide)};
-        float sum = 0.0f;
-        EACH(k, MOMENTS) sum += moments[k][row + i] * power[k];
-        change[i] = sum;
+        float of_one = 0.0f, of_two = 0.0f;
+        EACH(k, MOMENTS) {
+            of_one += m[k][row + i] * power[k];
+            of_two += n[k][row + i] * power[k];
+        }
+        one[i] = of_one, two[i] = of_two;
     }
 }
 
@@ -132,13 +137,12 @@ static void register_plane(const Block *b, const half *plane, float *const sums[
         In slope = o->slopes + (size_t)(y + REACH) * wide;
         const size_t row = (size_t)y * w;
         if (!is_part) range_of(at, o, w, wide);
+        changes_of(b, o->change, at, slope, row, wide);
         EACH(g, GROUPS) {
-            const Sums *s = b->sums + g;
-            Row change = o->change, sum = sums[g] + row;
+            Row change = o->change[g], sum = sums[g] + row;
             float *share = shares && shares[g] ? shares[g] + row : NULL;
-            changes_of(change, at, slope, s->moments, row, w, wide);
             if (is_part) take_shares(sum, change, share, w);
-            else take_within_range(sum, change, s->weights + row, at, o, share, w);
+            else take_within_range(sum, change, b->sums[g].weights + row, at, o, share, w);
         }
     }
 }

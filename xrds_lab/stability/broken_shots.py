@@ -128,14 +128,18 @@ def crashes(frames: Frames) -> int:
         replace(own, number=6, vector=None),
         replace(own, number=6, inverse_depth=np.full_like(own.inverse_depth, np.nan)),
         replace(own, number=6, samples=64.0),
-        replace(own, number=6, picture=own.picture.astype(np.float32)),
     )
+    cases: list[tuple[Stored, type[Exception]]] = [(x, PictureError) for x in others]
+    # numbers of another type are the caller's mistake, not a picture's
+    cases += [
+        (replace(own, number=6, picture=own.picture.astype(np.float32)), ValueError)
+    ]
     failed = 0
-    for other in others:
+    for other, refusal in cases:
         try:
             result = accumulate(own, [other])
             failed += not np.isfinite(result.radiance).all()
-        except (PictureError, ValueError) as error:  # of other numbers
+        except refusal as error:
             failed += "\n" in str(error)
     return failed
 
