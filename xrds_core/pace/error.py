@@ -49,12 +49,12 @@ class Rendered:
 
 def measure_errors(
     picture: Array,
+    alone: Array,
     noisy: Array,
     parts: tuple[Rendered, Rendered],
     exposure: float = 1.0,
-    share: float = 0.5,
 ) -> Errors:
-    """Return the squared errors of a picture, and of a frame of all samples.
+    """Return the squared errors of a frame with and without neighbours.
 
     Errors count as they are seen: relative to the local light of their channel, and
     less where it is beyond white.
@@ -63,32 +63,35 @@ def measure_errors(
     ----------
     picture : (H, W, 3) float32 array
         Radiance of a picture that was made without `parts`.
+    alone : (H, W, 3) float32 array
+        The same without neighbours.
     noisy : (H, W, 3) float32 array
         Radiance, the mean of samples that the parts do not have either.
     parts : tuple of Rendered
-        Two renders, each with a share of all samples and a seed of its own.
+        Two renders, each with all samples and a seed of its own.
     exposure : float
         White is a radiance of 1 / `exposure`.
-    share : float
-        Share of all samples that each part has.
 
     Returns
     -------
     errors : Errors
     """
     with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
-        errors, part_errors = _measure_errors(picture, noisy, parts, exposure)
-        return Errors(errors, part_errors * share**FALL)
+        return _measure_errors((picture, alone), noisy, parts, exposure)
 
 
 def _measure_errors(
-    picture: Array, noisy: Array, parts: tuple[Rendered, Rendered], exposure: float
-) -> tuple[Array, Array]:
-    """Return the errors of the picture and of one of the parts, by blocks.
+    pictures: tuple[Array, Array],
+    noisy: Array,
+    parts: tuple[Rendered, Rendered],
+    exposure: float,
+) -> Errors:
+    """Return the errors of two pictures, and of one of the parts, by blocks.
 
-    An error by two noisy renders has the product of their noises in it. So the
-    picture's is that of a part, and their difference by one render.
+    An error by two noisy renders has the product of their noises in it. So a picture's
+    is that of a part, and their difference by one render.
     """
+    picture, _ = pictures
     first_part, second_part = parts
     shown = (picture + first_part.denoised + second_part.denoised) / 3
     dark = max(float(np.nan_to_num(luminance(shown)).mean()) * _DARKEST, _TINY)
@@ -105,18 +108,18 @@ def _measure_errors(
         first_part.noisy - second_part.noisy, first_part.noisy - second_part.noisy
     )
     kept = noise <= np.quantile(noise, 1.0 - _NOISIEST)
-    half, more = np.zeros((2, *noise.shape))
+    whole, more = np.zeros(noise.shape), np.zeros((2, *noise.shape))
     for made, other in (
         (first_part.denoised, second_part.noisy),
         (second_part.denoised, first_part.noisy),
     ):
         apart = made - other
-        half += product(apart, made - noisy)
+        whole += product(apart, made - noisy)
         # the difference of two squares: noise counts once in it, and little
-        step = picture - made
-        more += product(step, step + 2.0 * apart)
-    half, more = half[kept] / 2, more[kept] / 2
-    return half + more, half
+        steps = (x - made for x in pictures)
+        more += [product(step, step + 2.0 * apart) for step in steps]
+    with_neighbours, alone = (whole + more)[:, kept] / 2
+    return Errors(with_neighbours, whole[kept] / 2, alone)
 
 
 @dataclass(frozen=True)

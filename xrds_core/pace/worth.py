@@ -25,7 +25,12 @@ _USUAL, _SPREAD = 0.45, 0.25
 _EXACT = 0.06
 _CAUTION = 0.16  # probability of a lower value: the mean less its standard error
 FALL = 0.7
-"""The error of a denoised picture falls with about this power of its samples."""
+"""The error of a denoised picture falls with about this power of its samples.
+
+It is half where a denoiser guesses well, and 1 where texture leaves it little to do.
+"""
+_FALL_SPREAD = 0.2  # its standard deviation, from scene to scene and file to file
+_FALLS = np.linspace(0.2, 1.3, 111)
 _STEPS = np.linspace(0.0, 1.0, 201)
 _TINY = 1e-30
 
@@ -39,10 +44,13 @@ class Errors(NamedTuple):
         Of fewer samples with neighbours.
     all : (n,) array
         Of all samples without.
+    alone : (n,) array
+        Of fewer samples without.
     """
 
     fewer: Array
     all: Array
+    alone: Array
 
     @property
     def ratio(self) -> float:
@@ -51,28 +59,60 @@ class Errors(NamedTuple):
         return max(float(self.fewer.sum()), 0.0) / whole if whole > 0.0 else np.inf
 
     def misfit(self, ratio: Array) -> Array:
-        """Return by how many standard errors each of some ratios is off.
+        """By how many standard errors each of some ratios of fewer to all is off."""
+        return _misfit(self.fewer, self.all, ratio)
 
-        Neither error need be known for that: blocks that are hard to render are so both
-        ways, and what is left says how much is chance.
-        """
-        fewer, whole = self.fewer.astype(np.float64), self.all.astype(np.float64)
-        left = fewer - ratio[:, None] * whole
-        chance = left.std(axis=1) * np.sqrt(len(whole))
-        inexact = _EXACT * ratio * max(float(whole.sum()), 0.0)
-        return np.asarray(
-            left.sum(axis=1) / np.maximum(np.hypot(chance, inexact), _TINY)
-        )
+    def misfit_alone(self, ratio: Array) -> Array:
+        """The same of fewer samples without neighbours."""
+        return _misfit(self.alone, self.all, ratio)
+
+
+def _misfit(one: Array, other: Array, ratio: Array) -> Array:
+    """Return by how many standard errors each of some ratios of two errors is off.
+
+    Neither need be known for that: blocks that are hard to render are so both ways, and
+    what is left says how much is chance.
+    """
+    one, other = one.astype(np.float64), other.astype(np.float64)
+    left = one - ratio[:, None] * other
+    chance = left.std(axis=1) * np.sqrt(len(other))
+    inexact = _EXACT * ratio * max(float(other.sum()), 0.0)
+    return np.asarray(left.sum(axis=1) / np.maximum(np.hypot(chance, inexact), _TINY))
+
+
+def _likely(misfits: Array) -> Array:
+    """How likely values are, whose misfits have these sums of squares."""
+    return np.asarray(np.exp(-0.5 * (misfits - misfits.min())))
+
+
+class _Measurement(NamedTuple):
+    errors: Errors
+    share: float
+    gain: float
 
 
 @dataclass
 class Worth:
-    """The value, from 0 to 1, of the samples of neighbours in one shot."""
+    """The value, from 0 to 1, of the samples of neighbours in one shot.
 
-    _misfit: Array = field(default_factory=lambda: np.zeros_like(_STEPS))
+    Attributes
+    ----------
+    fall : float
+        The power of samples with which errors fall; `FALL` where noise hides it.
+    value : float
+        A cautious estimate; that of other shots where noise hides all errors.
+    """
+
+    fall: float = FALL
+    value: float = 0.0
+    _falls: Array = field(default_factory=lambda: np.zeros_like(_FALLS))
+    _measurements: list[_Measurement] = field(default_factory=list)
     _neighbours: int = 0
     _frames: int = 0
     _next: int = 1
+
+    def __post_init__(self) -> None:
+        self._estimate()
 
     def is_due(self, neighbours: int) -> bool:
         """Count a frame; return whether it is to be measured in."""
@@ -89,12 +129,13 @@ class Worth:
         """Add the measurement of a frame.
 
         Where a frame has few neighbours these lie on one side only and are less
-        valuable: earlier measurements with fewer neighbours are dropped.
+        valuable: what earlier measurements with fewer neighbours say of them is
+        dropped.
 
         Parameters
         ----------
         errors : Errors
-            Of the frame with its neighbours, and of one of all samples.
+            Of the frame with its neighbours and by itself, and of one of all samples.
         share : float
             Share of all samples that the frame has.
         gain : float
@@ -103,16 +144,19 @@ class Worth:
             How many neighbours it has.
         """
         if neighbours > self._neighbours:
-            self._misfit[:] = 0.0
+            self._measurements.clear()
         self._neighbours = neighbours
         self._next = max(3 * self._frames, _SOON)
-        expected = (share * (1.0 + (gain - 1.0) * _STEPS)) ** -FALL
-        self._misfit += np.square(errors.misfit(expected))
+        self._falls += np.square(errors.misfit_alone(share**-_FALLS))
+        self._measurements.append(_Measurement(errors, share, gain))
+        self._estimate()
 
-    @property
-    def value(self) -> float:
-        """A cautious estimate: that of other shots where noise hides all errors."""
-        usual = np.square((_STEPS - _USUAL) / _SPREAD)
-        logarithms = -0.5 * (usual + self._misfit)
-        below = np.cumsum(np.exp(logarithms - logarithms.max()))
-        return float(np.interp(_CAUTION, below / below[-1], _STEPS))
+    def _estimate(self) -> None:
+        usual = np.square((_FALLS - FALL) / _FALL_SPREAD)
+        self.fall = float(np.average(_FALLS, weights=_likely(usual + self._falls)))
+        misfits = np.square((_STEPS - _USUAL) / _SPREAD)
+        for errors, share, gain in self._measurements:
+            equal = share * (1.0 + (gain - 1.0) * _STEPS)
+            misfits += np.square(errors.misfit(equal**-self.fall))
+        below = np.cumsum(_likely(misfits))
+        self.value = float(np.interp(_CAUTION, below / below[-1], _STEPS))

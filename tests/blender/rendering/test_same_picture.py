@@ -60,12 +60,17 @@ def picture(path: Path) -> np.ndarray:
     return np.dstack([channels[name] for name in "RGB"])
 
 
+def errors_of(ratio: float) -> Errors:
+    """The error of fewer samples is this, over that of all; by themselves as usual."""
+    return Errors(np.array([ratio]), np.array([1.0]), np.array([0.25**-FALL]))
+
+
 def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[tuple[int, int]]:
     """Let the error of fewer samples be this, over that of all.
 
     Returns the counts that are rendered beside frames' own, and those of a sequence.
     """
-    errors = Errors(np.array([ratio]), np.array([1.0]))
+    errors = errors_of(ratio)
     monkeypatch.setattr(measuring, "measure_errors", lambda *_: errors)
     lengths: list[tuple[int, int]] = []
     inner = more.more_samples
@@ -96,21 +101,21 @@ def test_all_samples_are_taken_where_neighbours_are_of_no_use(
     lengths = measured(monkeypatch, 100.0)
     frames = render(shot, "same")
     # the second was sampled when the first had shown that all are needed
-    shares = [{1: 1.25, 4: 2.0}.get(number, 1.0) for number in FRAMES]
+    shares = [{1: 2.25, 4: 3.0}.get(number, 1.0) for number in FRAMES]
     assert [frame["share"] for frame in frames] == pytest.approx(shares)
-    # two halves in the first frame, and where neighbours lie on both sides; then the
+    # two of all in the first frame, and where neighbours lie on both sides; then the
     # rest of those sampled before it was done
-    half = SAMPLES // 2, SAMPLES // 2
-    assert lengths[:2] == [half, half]
-    assert lengths.count(half) == 4
+    whole = SAMPLES, SAMPLES
+    assert lengths[:2] == [whole, whole]
+    assert lengths.count(whole) == 4
     # of sequences as long as that of the frame sampled last, which has all: for another
     # length Cycles would sync the scene again
-    assert {*lengths} == {half, (SAMPLES - SAMPLES // 4, SAMPLES)}
+    assert {*lengths} == {whole, (SAMPLES - SAMPLES // 4, SAMPLES)}
 
 
 def test_one_frame_that_needs_more_does_not_raise_those_of_the_rest() -> None:
     pace = same_picture.SamePicture(SAMPLES, neighbours=8)
-    errors = Errors(np.full(4, 0.8), np.ones(4))
+    errors = errors_of(0.8)
     pace._worth.add(errors, share=0.375, gain=4.0, neighbours=8)
     shares = []
     for gain in (4.0, 4.0, 4.0, 4.0, 3.2, 4.0, 4.0, 4.0, 4.0):
@@ -137,7 +142,7 @@ def test_all_samples_are_taken_where_fewer_are_hardly_sooner(
     shares = [frame["share"] for frame in render(shot, "same")]
     # decided in frame 1, when frames 2 and 3 had been sampled
     assert shares[3:] == [1.0] * 4
-    assert lengths == [(SAMPLES // 2, SAMPLES // 2)] * 2  # measured once
+    assert lengths == [(SAMPLES, SAMPLES)] * 2  # measured once
     said = capsys.readouterr().err
     assert said.count("fewer samples are hardly sooner") == 1
 
@@ -247,7 +252,10 @@ def test_a_noise_threshold_is_kept_and_raised(
     # Cycles would look at a pixel's noise too seldom.
     assert not any(is_even[:3])
     assert all(is_even[3:])
-    assert max(asked) < 64  # Cycles lets the first of many samples stop later
+    # Cycles lets the first of many samples stop later: only what is measured by is as
+    # the file has it
+    assert asked.count(64) == 2 * len(MEASURED)
+    assert max(asked) == 64
     scene = bpy.context.scene
     assert scene.cycles.adaptive_threshold == pytest.approx(0.2)
 
@@ -319,7 +327,14 @@ def test_the_plan_of_a_shot_says_so(
 
 @pytest.mark.parametrize(
     ("shape", "share"),
-    [((1080, 1920), 0.13), ((2160, 3840), 0.13), ((540, 960), 0.24), ((200, 250), 1.0)],
+    [
+        ((1080, 1920), 0.07),
+        ((2160, 3840), 0.07),
+        ((540, 960), 0.13),
+        ((256, 384), 0.5),
+        ((200, 250), 0.51),
+        ((96, 128), 1.0),
+    ],
 )
 def test_large_pictures_are_measured_in_parts_from_top_to_bottom(
     shape: tuple[int, int], share: float
@@ -373,18 +388,18 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
     assert len(measured_regions((96, 288))) == 2
     sizes: list[int] = []
 
-    def noted(ours: Any, noisy: Any, parts: Any, *_: Any) -> Errors:
+    def noted(ours: Any, alone: Any, noisy: Any, parts: Any, *_: Any) -> Errors:
         sizes.append(ours.shape[0] * ours.shape[1])
-        assert ours.shape == noisy.shape == parts[0].noisy.shape
-        return Errors(np.array([100.0]), np.array([1.0]))
+        assert ours.shape == alone.shape == noisy.shape == parts[0].noisy.shape
+        return errors_of(100.0)
 
     monkeypatch.setattr(measuring, "measure_errors", noted)
     frames = render(shot, "same")
     assert sizes == [2 * 64 * 96] * 2
     shares = {number: x["share"] for number, x in zip(FRAMES, frames, strict=True)}
-    # all samples everywhere; where it was measured, frame 1 has a quarter more, and
-    # frame 4 had them all before
+    # all samples everywhere; where it was measured, frame 1 has those and a quarter
+    # more, and frame 4 had them all before
     part = 2 * 64 / 288
-    expected = {1: 1.0 + 0.25 * part, 4: 1.0 + part}
+    expected = {1: 1.0 + 1.25 * part, 4: 1.0 + 2.0 * part}
     for number in FRAMES:
         assert shares[number] == pytest.approx(expected.get(number, 1.0)), shares

@@ -14,7 +14,6 @@ from shots import World, camera, view
 
 from xrds_blender.rendering.pace.threshold import (
     Threshold,
-    counts_of_file,
     learn_threshold,
 )
 from xrds_core.accumulation.frame import Stored, store
@@ -33,26 +32,6 @@ def stored(noise: NDArray[np.float32]) -> Stored:
         x.astype(np.float32) for x in (frame.noise.brightness, frame.noise.guides)
     )
     return replace(frame, noise=Noise.of(light, noise.ravel(), guides))
-
-
-@pytest.mark.parametrize(
-    ("both", "least", "expected"),
-    [
-        # by Cycles' own counts: at a threshold of 0.1, whose least number is 32, it
-        # first looks after 48; halves of least 16 first after 32
-        (64, 32, 48),
-        (96, 32, 96),
-        (80, 32, 80),
-        (96, 64, 80),
-        (32, 4, 16),
-        (5000, 32, 4096),
-    ],
-)
-def test_samples_of_the_file_follow_from_halves(
-    both: int, least: int, expected: int
-) -> None:
-    found = counts_of_file(np.array([both], np.float32), least, 4096)
-    assert found.tolist() == [expected]
 
 
 def test_noisy_blocks_take_more_samples() -> None:

@@ -36,15 +36,19 @@ def denoised(truth: Array, deviation: float, seed: int) -> Array:
     return truth + np.float32(deviation) * error.repeat(4, 0).repeat(4, 1)
 
 
-def errors(ours: float, theirs: float, noise: float = 0.3) -> Errors:
+def errors(
+    ours: float, theirs: float, noise: float = 0.3, alone: float = 0.0
+) -> Errors:
     """Of pictures whose errors have these deviations; `theirs` of all samples."""
     truth = np.full((*SHAPE, 3), 0.5, np.float32)
-    half = theirs * 2.0**0.35  # half of the samples have 2 ** 0.7 times the error
     first, second = (
-        Rendered(noisy(truth, noise, i), denoised(truth, half, i + 10)) for i in (1, 2)
+        Rendered(noisy(truth, noise, i), denoised(truth, theirs, i + 10))
+        for i in (1, 2)
     )
     picture, own = denoised(truth, ours, 3), noisy(truth, noise * 1.4, 4)
-    return measure_errors(picture, own, (first, second))
+    return measure_errors(
+        picture, denoised(truth, alone or ours, 5), own, (first, second)
+    )
 
 
 @pytest.mark.parametrize("expected", [0.25, 1.0, 4.0])
@@ -55,12 +59,18 @@ def test_errors_are_measured_without_a_reference(expected: float) -> None:
     assert abs(near) < 2.0 < abs(far)
 
 
-def test_the_picture_of_half_of_the_samples_is_known_from_much_noise() -> None:
-    """Its error is that of half, whatever noise says."""
+def test_a_picture_as_good_as_that_of_all_samples_is_known_from_much_noise() -> None:
+    """Noise counts in the difference of both errors little."""
     for noise in (0.1, 0.6):
-        found = errors(0.05 * 2.0**0.35, 0.05, noise)
-        assert found.ratio == pytest.approx(2.0**0.7, rel=0.1)
-        assert found.misfit(np.array([1.0]))[0] > 2.0
+        found = errors(0.05, 0.05, noise)
+        assert found.ratio == pytest.approx(1.0, rel=0.15)
+        assert abs(found.misfit(np.array([1.6]))[0]) > 2.0
+
+
+def test_the_error_without_neighbours_is_measured_as_well() -> None:
+    found = errors(0.05, 0.05, 0.2, alone=0.1)
+    near, far = found.misfit_alone(np.array([4.0, 2.5]))
+    assert abs(near) < 2.0 < abs(far)
 
 
 def test_any_ratio_may_be_true_where_noise_hides_errors() -> None:
@@ -73,7 +83,7 @@ def test_radiance_beyond_all_bounds_is_survived() -> None:
     bad = truth.copy()
     bad[3, 4] = 3e38
     parts = Rendered(bad, truth), Rendered(-bad, truth)
-    found = measure_errors(truth, bad, parts)
+    found = measure_errors(truth, truth, bad, parts)
     assert np.isfinite(found.misfit(np.array([0.1, 1.0, 10.0]))).all()
 
 

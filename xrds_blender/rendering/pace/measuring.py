@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,6 @@ from xrds_core.pace.worth import Errors
 from ..methods import Finishing
 from ..sampling import Sampled
 from .more import Extra, Part, measured_regions, pixels_of
-from .threshold import counts_of_file
 
 Render = Callable[[Part], dict[str, Passes]]
 """Renders more samples of a frame, by view."""
@@ -26,9 +26,9 @@ Render = Callable[[Part], dict[str, Passes]]
 class Measured(NamedTuple):
     """What was measured in some regions of a frame, and the samples that it took.
 
-    `errors` are those of its picture and of one of all samples; denoising a frame of
-    this size by itself takes so many seconds. `asked` (H, W) are the samples that the
-    file takes, 0 elsewhere.
+    `errors` are those of its picture, of one of all samples and of its own alone;
+    denoising a frame of this size by itself takes so many seconds. `asked` (H, W) are
+    the samples that the file takes, 0 elsewhere.
     """
 
     errors: Errors
@@ -44,30 +44,31 @@ def measure(
     samples: int,
     exposure: float,
     more: Render,
-    least: int | None = None,
 ) -> Measured:
     """Compare an accumulated frame with one of all `samples` without neighbours.
 
-    In `measured_regions`, by two renders of half of the samples each, of two seeds:
-    halves of one sequence would not be independent. White is a luminance of 1 /
-    `exposure`. Under a noise threshold a pixel takes at `least` so many.
+    In `measured_regions`, by two renders of all samples each, of two seeds. Renders of
+    half of them would not do: where texture is fine one sequence of all is far better
+    than two of half as many. White is a luminance of 1 / `exposure`.
     """
-    view, length = next(iter(own.views)), max(1, samples // 2)
+    view = next(iter(own.views))
     shape = own.views[view].shape
     regions = measured_regions(shape)
     cells: list[list[Rendered]] = []
     seconds = 0.0
     extra: list[Extra] = []
-    both = np.zeros(shape, np.float32)
+    asked = np.zeros(shape, np.float32)
     for region in regions:
         place = None if (region.height, region.width) == shape else region
-        halves = [more(Part(length, 0.5, place, sequence=-i)) for i in (1, 2)]
+        pair = [more(Part(samples, 1.0, place, sequence=-i)) for i in (1, 2)]
         started = time.perf_counter()
-        cells.append([_rendered(method, half[view]) for half in halves])
+        cells.append([_rendered(method, one[view]) for one in pair])
         seconds += time.perf_counter() - started
-        views = {name: mean_of([half[name] for half in halves]) for name in own.views}
+        views = {name: mean_of([one[name] for one in pair]) for name in own.views}
         extra.append(Extra(region, views))
-        both[pixels_of(region)] = views[view].counts
+        both = views[view].counts
+        assert both is not None
+        asked[pixels_of(region)] = both / 2
     parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
     area = sum(region.width * region.height for region in regions)
     # with the neighbours' samples: what may be wrong in them has nothing to do with
@@ -75,17 +76,14 @@ def measure(
     noisy = own.gathered[view].radiance
     assert noisy is not None
     places = [pixels_of(region) for region in regions]
-    # a part by itself, as its halves are
-    together = [method.radiance(own, others, view, place) for place in places]
-    asked = both if least is None else counts_of_file(both, least, samples)
-    asked = np.where(both > 0.0, asked, np.float32(0.0))
-    errors = measure_errors(
-        np.concatenate(together),
-        np.concatenate([noisy[place] for place in places]),
-        parts,
-        exposure,
-        float(both.sum() / 2 / asked.sum()),
+    single = replace(own, views={view: own.views[view]}, gathered={})
+    # each part by itself, as the renders of all samples are
+    together, alone = (
+        np.concatenate([method.radiance(frame, beside, view, x) for x in places])
+        for frame, beside in ((own, others), (single, []))
     )
+    around = np.concatenate([noisy[place] for place in places])
+    errors = measure_errors(together, alone, around, parts, exposure)
     denoising = seconds / 2 * shape[0] * shape[1] / area
     return Measured(errors, extra, denoising, asked)
 

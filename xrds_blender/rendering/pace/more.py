@@ -93,23 +93,24 @@ def with_more(own: Sampled, extra: Sequence[Extra], weight: float) -> Sampled:
     return replace(own, views=views, gathered=gathered)
 
 
-# Of a picture so much is measured in, but so many pixels, in strips of two blocks.
-_SHARE, _LEAST_AREA = 0.125, 120_000
+# Of a picture so much is measured in, but so many pixels, and half of it at most where
+# strips are not narrower than two blocks.
+_SHARE, _LEAST_AREA, _NARROWEST = 0.0625, 60_000, 2
 
 
 def measured_regions(shape: tuple[int, int]) -> list[Region]:
     """The parts of a picture (H, W) that show how large its errors are.
 
-    Two strips from top to bottom, an eighth of a large picture and more of a smaller
-    one; all where that would be more than half.
+    Two strips of blocks from top to bottom; all of a picture that these would cover.
     """
     height, width = shape
     area = max(_SHARE * height * width, _LEAST_AREA)
-    across = max(math.ceil(area / (2 * height * BLOCK)), 2) * BLOCK
-    if 4 * across > width:
+    wanted = math.ceil(area / (2 * height * BLOCK))
+    across = max(min(wanted, width // (4 * BLOCK)), _NARROWEST) * BLOCK
+    if 2 * across >= width:
         return [Region(0, 0, width, height)]
     middles = (width // 4, 3 * width // 4)
-    starts = [(x - across // 2) // BLOCK * BLOCK for x in middles]
+    starts = [max(x - across // 2, 0) // BLOCK * BLOCK for x in middles]
     return [Region(x, 0, across, height) for x in starts]
 
 

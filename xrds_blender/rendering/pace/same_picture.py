@@ -48,9 +48,9 @@ _LEAST = 2  # samples of a frame, which has halves then
 _LACKING, _ENOUGH = 0.5, 0.8
 _MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
 _PARTS = 2  # of a frame that get more: for each Cycles syncs the scene again
-# The share of the next frames stays as it is as long as it is off by no more from what
-# the last frames needed: Cycles syncs the scene again for another number of samples.
-_TOO_MUCH, _TOO_LITTLE = 0.9, 1.1
+# The share of the next frames stays as it is as long as the last frames needed so much
+# of it, and no more: Cycles syncs the scene again for another number of samples.
+_TOO_MUCH = 0.85
 _LAST = 4  # frames: one alone may need more by chance
 _CHANGED = 0.5  # of what neighbours add: a frame with less shows something new
 # Where so many are needed all are taken: a frame of a few less is no sooner, and worse.
@@ -149,9 +149,7 @@ class SamePicture:
         # as far beside this one's. So it is not to be among the neighbours.
         is_due = self._worth.is_due(len(beside)) and self._measured_in not in beside
         if beside and is_due and not self._takes_all:
-            measured = measure(
-                method, own, others, self.samples, self.exposure, render, self.least
-            )
+            measured = measure(method, own, others, self.samples, self.exposure, render)
             extra += measured.extra
             self._learn(own, measured, gained, len(beside))
         share = self._shares.get(own.number, 1.0)
@@ -345,7 +343,7 @@ class SamePicture:
         needed = 1.0 / float(self._equal(1.0, np.mean(self._gains)))
         least = _LEAST_SHARE if self.history is None else 0.0
         needed = max(needed, least, self.share * _FALL)
-        if not _TOO_MUCH <= needed / self.share <= _TOO_LITTLE:
+        if not _TOO_MUCH <= needed / self.share <= 1.0:
             self.share = self.possible(needed)
 
     def possible(self, share: float) -> float:

@@ -12,25 +12,12 @@ from xrds_core.accumulation.local_filters import block_means
 from xrds_core.arrays import Array
 from xrds_core.pace.error import root_noise
 
-from ...cycles.settings import LOOKS_EVERY, first_look
+from ...cycles.settings import LOOKS_EVERY
 
 # Fewer samples than this, on the mean, are taken evenly: both halves of a frame under a
 # threshold have at least one step, and two to differ in. So where a file takes 48, its
 # halves would take 64.
 _FEW = 4 * LOOKS_EVERY
-
-
-def counts_of_file(both: Array, least: int, most: int) -> Array:
-    """Samples that pixels take in the file, from those of two renders of a half each.
-
-    `both` is how many these have taken together. Where each stopped as soon as it
-    could, so does the file. `least` and `most` are the samples of a pixel that the file
-    allows.
-    """
-    soonest = first_look(least)
-    at_once = both < 2 * first_look(least // 2) + 1  # counts are not quite whole
-    asked = np.where(at_once, np.float32(soonest), both)
-    return np.clip(asked, min(soonest, most), most)
 
 
 @dataclass(frozen=True)
