@@ -393,7 +393,15 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
         assert ours.shape == alone.shape == noisy.shape == parts[0].noisy.shape
         return errors_of(100.0)
 
+    lent: dict[int, float] = {}
+    inner = same_picture.SamePicture._lent
+
+    def noted_lent(self: Any, share: float, others: Any) -> float:
+        lent.update(self._shares)
+        return inner(self, share, others)
+
     monkeypatch.setattr(measuring, "measure_errors", noted)
+    monkeypatch.setattr(same_picture.SamePicture, "_lent", noted_lent)
     frames = render(shot, "same")
     assert sizes == [2 * 64 * 96] * 2
     shares = {number: x["share"] for number, x in zip(FRAMES, frames, strict=True)}
@@ -403,3 +411,7 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
     expected = {1: 1.0 + 1.25 * part, 4: 1.0 + 2.0 * part}
     for number in FRAMES:
         assert shares[number] == pytest.approx(expected.get(number, 1.0)), shares
+    # what it is measured by is lent as well: others seemed to gain by their neighbours
+    # what they gain by these few alone
+    assert lent[1] == pytest.approx(0.25 + 2.0 * part)
+    assert lent[4] == pytest.approx(1.0 + 2.0 * part)

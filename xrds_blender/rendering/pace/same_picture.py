@@ -107,7 +107,8 @@ class SamePicture:
     _takes_all: bool = False  # because it does not
     _reason: str = ""
     _measured_in: int | None = None
-    _shares: dict[int, float] = field(default_factory=dict)  # that all pixels have
+    # of frames: what all pixels have, with what was measured by where that was done
+    _shares: dict[int, float] = field(default_factory=dict)
     _gains: deque[float] = field(default_factory=partial(deque, maxlen=_LAST))
     _newest: int = 0  # samples of the frame that was sampled last
     _taken: int = 0  # of the sequence that frames continue under a still camera
@@ -145,6 +146,7 @@ class SamePicture:
         if self._is_new(own, beside, gained):
             self._worth = Worth()
         extra: list[Extra] = []
+        beyond = 0.0  # the share of all samples that it is measured by
         # One frame of many samples is worth less than many of few: all its pixels lie
         # as far beside this one's. So it is not to be among the neighbours.
         is_due = self._worth.is_due(len(beside)) and self._measured_in not in beside
@@ -152,6 +154,7 @@ class SamePicture:
             measured = measure(method, own, others, self.samples, self.exposure, render)
             extra += measured.extra
             self._learn(own, measured, gained, len(beside))
+            beyond = 2.0 * float(measured.asked.mean()) / self._of_file
         share = self._shares.get(own.number, 1.0)
         shares = np.full_like(gained.errors, share)
         if self._threshold is not None and own.samples is not None:  # even ones
@@ -167,9 +170,8 @@ class SamePicture:
             extra += self._top_up(frame.shape, shares, gained, part, render)
         own = with_more(own, extra, self._weight)
         self._note_seconds(own, share, bool(regions))
+        self._shares[own.number] = share + beyond  # what it lends
         share *= own.views[view].samples / frame.samples
-        if len(regions) == 1:  # all of the picture
-            self._shares[own.number] = share
         return replace(
             own,
             samples=None,
