@@ -55,7 +55,7 @@ class Animation:
     `sample`: None where nothing is known. `radius` frames before and after are reused;
     0 where they cannot be. `obstacle` says why *Same Picture* is not possible, and
     `share` how much of the samples it took here. It `is_noisy` where Cycles does not
-    denoise it.
+    denoise it. `measuring` *Same Picture* takes the samples of so many frames.
     """
 
     frames: int
@@ -69,6 +69,7 @@ class Animation:
     is_noisy: bool = False
     obstacle: str = ""
     share: float | None = None
+    measuring: float = 0.0
 
     def seconds(self, samples: float) -> float | None:
         """Of all frames in XRDS."""
@@ -107,7 +108,7 @@ def _same_picture(animation: Animation, figures: ShotFigures) -> Offer:
     samples = share * animation.samples
     seconds = animation.seconds(samples)
     if seconds is not None:
-        seconds += figures.measuring * animation.samples * animation.sample
+        seconds += animation.measuring * animation.samples * animation.sample
     is_measured = animation.share is not None
     flicker = figures.of_camera(animation.is_still).same_flicker
     return Offer(Kind.PICTURE, seconds, samples, 0.0, flicker, is_measured)

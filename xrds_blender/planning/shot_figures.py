@@ -54,11 +54,10 @@ class ShotFigures:
     """All of them; `by_radius` is what a radius gains, over radius 4.
 
     In *Same Picture* late frames take a `share` of the file's samples, by these, under
-    a noise threshold `threshold_share`; a camera that stands still may take less. Its
-    measuring takes as many samples as `measuring` frames of the file. `accumulate`:
-    seconds for each neighbour, over those of our denoiser of quality high, and `again`:
-    how often a part of the picture is denoised a second time, which small ones are as a
-    whole.
+    a noise threshold `threshold_share`; a camera that stands still may take less.
+    `accumulate`: seconds for each neighbour, over those of our denoiser of quality
+    high, and `again`: how often a part of the picture is denoised a second time, which
+    small ones are as a whole.
     """
 
     moving: CameraFigures
@@ -66,7 +65,6 @@ class ShotFigures:
     share: Points
     threshold_share: float
     by_radius: Points
-    measuring: float
     accumulate: float
     again: float
 
@@ -107,7 +105,6 @@ def shipped() -> ShotFigures:
         Points.of(content["share"]),
         content["threshold_share"],
         Points.of(content["by_radius"]),
-        content["measuring"],
         content["accumulate"],
         content["again"],
     )

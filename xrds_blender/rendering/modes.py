@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..cycles import session
+from ..cycles.view import picture_size
 from ..planning import budget, shot_figures
 from ..planning import estimates as estimating
 from ..planning.estimates import Capabilities, Estimate, resolved
@@ -15,6 +16,7 @@ from ..planning.settings import Denoising, Mode, Settings
 from ..scene.contents import stands_still
 from . import history
 from .loading import has_library
+from .pace.measuring import samples_of_measuring
 from .pace.obstacles import obstacle
 from .sampling import has_neighbours
 
@@ -72,6 +74,7 @@ def offers_of(scene: Any, request: Request, frames: int) -> Offers:
         has_threshold=scene.cycles.use_adaptive_sampling,
         obstacle=obstacle(scene, request, frames),
         share=history.share(scene),
+        measuring=samples_of_measuring(picture_size(scene.render)[::-1], frames),
     )
     curves = budget.shipped().errors.full_size
     curve = curves.get(BEST) or next(iter(curves.values()))

@@ -35,6 +35,11 @@ _STEPS = np.linspace(0.0, 1.0, 201)
 _TINY = 1e-30
 
 
+def measurements(frames: int) -> int:
+    """In how many frames of a shot it is measured where nothing changes."""
+    return 2 + sum(_SOON * 3**i <= frames for i in range(10))
+
+
 class Errors(NamedTuple):
     """Squared errors, by blocks; single ones may be negative, where noise hides them.
 

@@ -69,15 +69,11 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
             )
             for radius in (1, 2, 4)
         },
-        "measuring": _mean(
-            (x["mean_share"] - x["late_share"]) * _SAME_FRAMES for x in same
-        ),
         "accumulate": _accumulating(results),
         "again": _mean(x["twice"] > 0.0 for x in gallery),
     }
 
 
-_SAME_FRAMES = 21  # of each shot of *Same Picture*
 _NEIGHBOURS = 8
 
 

@@ -42,13 +42,12 @@ FIGURES = ShotFigures(
     share=Points.of({16: 0.25, 64: 0.5}),
     threshold_share=0.6,
     by_radius=Points.of({1: 0.4, 4: 1.0}),
-    measuring=2.0,
     accumulate=0.01,
     again=0.2,
 )
 CURVE = Curve.of({1: 30.0, 16: 38.0, 64: 42.0})
 # A frame of 64 samples: in Cycles 64 + 6 s, in XRDS 64 + 4 s.
-SHOT = Animation(100, 64, cycles=70.0, fixed=4.0, sample=1.0, radius=4)
+SHOT = Animation(100, 64, cycles=70.0, fixed=4.0, sample=1.0, radius=4, measuring=2.0)
 
 
 def found(animation: Animation) -> dict[Kind, Offer]:

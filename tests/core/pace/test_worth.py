@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from xrds_core.pace.worth import FALL, Errors, Worth
+from xrds_core.pace.worth import FALL, Errors, Worth, measurements
 
 SHARE, GAIN, NEIGHBOURS = 0.25, 9.0, 8
 
@@ -88,3 +88,14 @@ def test_it_is_measured_ever_more_seldom() -> None:
     assert due[0] == 1
     assert due[-1] > 40
     assert len(due) <= 8
+
+
+@pytest.mark.parametrize("frames", [19, 20, 59, 60, 200])
+def test_how_often_it_is_measured_is_known_before(frames: int) -> None:
+    found, due = Worth(), 0
+    for frame in range(1, frames + 1):
+        neighbours = NEIGHBOURS if frame > 5 else 4
+        if found.is_due(neighbours):
+            found.add(errors(0.5), SHARE, GAIN, neighbours)
+            due += 1
+    assert due == measurements(frames)

@@ -13,14 +13,19 @@ from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
 from xrds_core.pace.error import Rendered, measure_errors
 from xrds_core.pace.extra_samples import mean_of
-from xrds_core.pace.worth import Errors
+from xrds_core.pace.worth import Errors, measurements
 
 from ..methods import Finishing
 from ..sampling import Sampled
-from .more import Extra, Part, measured_regions, pixels_of
+from .more import Extra, Part, measured_regions, measured_share, pixels_of
 
 Render = Callable[[Part], dict[str, Passes]]
 """Renders more samples of a frame, by view."""
+
+
+def samples_of_measuring(shape: tuple[int, int], frames: int) -> float:
+    """What measuring takes in a shot, in frames (H, W) of all samples."""
+    return 2.0 * measurements(frames) * measured_share(shape)
 
 
 class Measured(NamedTuple):

@@ -114,6 +114,11 @@ def measured_regions(shape: tuple[int, int]) -> list[Region]:
     return [Region(x, 0, across, height) for x in starts]
 
 
+def measured_share(shape: tuple[int, int]) -> float:
+    """What `measured_regions` are of a picture (H, W)."""
+    return sum(x.width * x.height for x in measured_regions(shape)) / math.prod(shape)
+
+
 def blocks_beside(
     blocks: NDArray[np.bool_], regions: Sequence[Region]
 ) -> list[NDArray[np.bool_]]:
