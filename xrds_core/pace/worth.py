@@ -108,8 +108,8 @@ class Worth:
         A cautious estimate; that of other shots where noise hides all errors.
     """
 
-    fall: float = FALL
-    value: float = 0.0
+    fall: float = field(default=FALL, init=False)
+    value: float = field(default=0.0, init=False)
     _falls: Array = field(default_factory=lambda: np.zeros_like(_FALLS))
     _measurements: list[_Measurement] = field(default_factory=list)
     _neighbours: int = 0
