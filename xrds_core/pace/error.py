@@ -47,6 +47,7 @@ class Rendered:
     denoised: Array
 
 
+@np.errstate(over="ignore", invalid="ignore")  # radiance near float's limit
 def measure_errors(
     picture: Array,
     alone: Array,
@@ -57,7 +58,9 @@ def measure_errors(
     """Return the squared errors of a frame with and without neighbours.
 
     Errors count as they are seen: relative to the local light of their channel, and
-    less where it is beyond white.
+    less where it is beyond white. An error by two noisy renders has the product of
+    their noises in it. So a picture's is that of a part, and their difference by one
+    render.
 
     Parameters
     ----------
@@ -76,22 +79,6 @@ def measure_errors(
     -------
     errors : Errors
     """
-    with np.errstate(over="ignore", invalid="ignore"):  # radiance near float's limit
-        return _measure_errors((picture, alone), noisy, parts, exposure)
-
-
-def _measure_errors(
-    pictures: tuple[Array, Array],
-    noisy: Array,
-    parts: tuple[Rendered, Rendered],
-    exposure: float,
-) -> Errors:
-    """Return the errors of two pictures, and of one of the parts, by blocks.
-
-    An error by two noisy renders has the product of their noises in it. So a picture's
-    is that of a part, and their difference by one render.
-    """
-    picture, _ = pictures
     first_part, second_part = parts
     shown = (picture + first_part.denoised + second_part.denoised) / 3
     dark = max(float(np.nan_to_num(luminance(shown)).mean()) * _DARKEST, _TINY)
@@ -116,10 +103,10 @@ def _measure_errors(
         apart = made - other
         whole += product(apart, made - noisy)
         # the difference of two squares: noise counts once in it, and little
-        steps = (x - made for x in pictures)
+        steps = picture - made, alone - made
         more += [product(step, step + 2.0 * apart) for step in steps]
-    with_neighbours, alone = (whole + more)[:, kept] / 2
-    return Errors(with_neighbours, whole[kept] / 2, alone)
+    fewer, by_itself = (whole + more)[:, kept] / 2
+    return Errors(fewer, whole[kept] / 2, by_itself)
 
 
 @dataclass(frozen=True)

@@ -264,7 +264,7 @@ def test_what_is_told_is_what_a_frame_has() -> None:
     pace = same_picture.SamePicture(64)
     assert pace._decision(0.25).value == "25% of the file's samples"
     # under a noise threshold the pixels decide: of what the file takes on the mean
-    pace = same_picture.SamePicture(4096, least=32)
+    pace = same_picture.SamePicture(4096, has_threshold=True)
     pace._threshold = Threshold(54.0, 48.0, 4096.0, 1.0)
     frame = SimpleNamespace(samples=27.0)
     share = pace._share(Sampled(1, {"": frame}, {}), asked=0.25)

@@ -474,12 +474,18 @@ def test_a_sample_holds_what_is_busy() -> None:
     assert input_images.sample(guide[:500, :500]) is None
 
 
+def multiplies_half_floats() -> bool:
+    described = Path("/proc/cpuinfo")
+    return described.is_file() and "avx512_fp16" in described.read_text("utf-8")
+
+
 def test_threads(high: Denoiser) -> None:
     given = render(96, 96)[1:]
     alone = high(*given).radiance
     one = Denoiser(device="cpu", threads=1)(*given).radiance
     # a processor that multiplies half floats rounds as the work is divided
-    np.testing.assert_allclose(one, alone, atol=0.01)
+    atol = 0.01 if multiplies_half_floats() else 1e-5
+    np.testing.assert_allclose(one, alone, atol=atol)
     assert np.abs(one - alone).mean() < 1e-3  # another network is off by 0.03
     results: list[Array] = []
     calls = [

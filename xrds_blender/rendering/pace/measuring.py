@@ -75,13 +75,13 @@ def measure(
         assert both is not None
         asked[pixels_of(region)] = both / 2
     parts = _joined([one for one, _ in cells]), _joined([two for _, two in cells])
-    area = sum(region.width * region.height for region in regions)
     # with the neighbours' samples: what may be wrong in them has nothing to do with
     # what denoising takes, and the frame's own few are far noisier
     noisy = own.gathered[view].radiance
     assert noisy is not None
     places = [pixels_of(region) for region in regions]
-    single = replace(own, views={view: own.views[view]}, gathered={})
+    single = replace(own, views={view: own.views[view]})
+    single = replace(single, gathered={view: method.accumulate(single, [], view)})
     # each part by itself, as the renders of all samples are
     together, alone = (
         np.concatenate([method.radiance(frame, beside, view, x) for x in places])
@@ -89,8 +89,7 @@ def measure(
     )
     around = np.concatenate([noisy[place] for place in places])
     errors = measure_errors(together, alone, around, parts, exposure)
-    denoising = seconds / 2 * shape[0] * shape[1] / area
-    return Measured(errors, extra, denoising, asked)
+    return Measured(errors, extra, seconds / 2 / measured_share(shape), asked)
 
 
 def _rendered(method: Finishing, samples: Passes) -> Rendered:

@@ -28,7 +28,6 @@ from xrds_core.pace.history import History
 from xrds_core.pace.savings import Savings
 from xrds_core.pace.worth import Worth
 
-from ...cycles.settings import stops_at
 from ...planning.plan import SAME_PICTURE, Decision
 from ...planning.request import Request
 from ...scene.contents import stands_still
@@ -67,15 +66,12 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
     if not can_save(scene, request, frames):
         return None
     history = History() if can_continue(scene, request) else None
-    least = None
-    if not is_even(scene, request):
-        _, least = stops_at(scene.cycles, scene.cycles.samples)
     pace = SamePicture(
         scene.cycles.samples,
         history,
         neighbours=2 * request.settings.temporal_radius,
         exposure=2.0**scene.view_settings.exposure,
-        least=least,
+        has_threshold=not is_even(scene, request),
         moves=not stands_still(scene.camera),
     )
     pace.share = pace.possible(_FIRST)
@@ -86,11 +82,11 @@ def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | Non
 class SamePicture:
     """How many samples the frames of a shot take, from the first that is finished.
 
-    `samples` are the file's, with a noise threshold the most that a pixel takes, and
-    `least` the fewest. Under a camera that stands still, and never `moves`, frames that
-    have left the window count, as `history`. The next frame to be sampled takes a
-    `share` of what the file does. Frames have so many `neighbours`, but fewer near the
-    ends of the shot. White is a luminance of 1 / `exposure`.
+    `samples` are the file's, where it `has_threshold` the most that a pixel takes.
+    Under a camera that stands still, and never `moves`, frames that have left the
+    window count, as `history`. The next frame to be sampled takes a `share` of what the
+    file does. Frames have so many `neighbours`, but fewer near the ends of the shot.
+    White is a luminance of 1 / `exposure`.
     """
 
     samples: int
@@ -98,7 +94,7 @@ class SamePicture:
     share: float = _FIRST
     neighbours: int = 0
     exposure: float = 1.0
-    least: int | None = None
+    has_threshold: bool = False
     moves: bool = True
     _threshold: Threshold | None = None
     _worth: Worth = field(default_factory=Worth)
@@ -234,7 +230,7 @@ class SamePicture:
     ) -> None:
         """Learn from a frame what neighbours' samples are worth."""
         share = self._shares.get(own.number, 1.0)
-        if self.least is not None:
+        if self.has_threshold:
             is_first = self._threshold is None
             frame = next(iter(own.views.values()))
             self._threshold = learn_threshold(frame, measured.asked)
