@@ -76,5 +76,6 @@ def _licence(told: Message) -> str | None:
 def _metadata(wheel: bytes) -> Message:
     """What a wheel says about itself."""
     with zipfile.ZipFile(io.BytesIO(wheel)) as file:
-        (name,) = (n for n in file.namelist() if n.endswith(".dist-info/METADATA"))
+        told = (n for n in file.namelist() if n.endswith(".dist-info/METADATA"))
+        (name,) = (n for n in told if n.count("/") == 1)  # others are of what it holds
         return BytesHeaderParser().parsebytes(file.read(name))

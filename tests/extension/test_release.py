@@ -24,6 +24,7 @@ sys.path.insert(0, str(ROOT / "extension"))
 
 import build
 import release
+import sbom
 
 SITE = "https://xrds.example"
 VERSION = tomllib.loads((ROOT / build.MANIFEST).read_text("utf-8"))["version"]
@@ -135,6 +136,17 @@ def test_a_bill_names_what_a_zip_holds(laid_out: Path) -> None:
     assert own["licenses"] == [{"license": {"id": "GPL-3.0-or-later"}}]
     (needs,) = (d for d in bill["dependencies"] if d["ref"] == whole["bom-ref"])
     assert needs["dependsOn"] == [own["bom-ref"]]
+
+
+def test_a_wheel_that_holds_others_is_told_by_its_own_name(tmp_path: Path) -> None:
+    wheel = tmp_path / "tools-2.0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as file:
+        for name in ("tools/vendor/held-1.0", "tools-2.0"):
+            package, _, version = Path(name).name.partition("-")
+            told = f"Metadata-Version: 2.1\nName: {package}\nVersion: {version}\n"
+            file.writestr(f"{name}.dist-info/METADATA", told)
+    bill = json.loads(sbom.write_bill(wheel, "2.0", tmp_path).read_text("utf-8"))
+    assert [x["purl"] for x in bill["components"]] == ["pkg:pypi/tools@2.0"]
 
 
 def test_notes_are_those_of_the_version() -> None:
