@@ -47,8 +47,8 @@ class Finishing(Protocol):
     ) -> Array:
         """Rows and columns of the picture of one view, (H, W, 3), denoised alone."""
 
-    def denoised(self, radiance: Array, albedo: Array, normal: Array) -> Array:
-        """Samples by themselves, denoised."""
+    def as_by_cycles(self, radiance: Array, albedo: Array, normal: Array) -> Array:
+        """Samples by themselves, denoised as Cycles does in a new file."""
 
 
 class Pace(Protocol):

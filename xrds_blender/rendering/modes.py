@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from xrds_core.pace.worth import measurements
+
 from ..cycles import session
 from ..cycles.view import picture_size
 from ..planning import budget, shot_figures
@@ -16,7 +18,7 @@ from ..planning.settings import Denoising, Mode, Settings
 from ..scene.contents import stands_still
 from . import history
 from .loading import has_library
-from .pace.measuring import samples_of_measuring
+from .pace.measuring import price_of_measuring
 from .pace.obstacles import obstacle
 from .sampling import has_neighbours
 
@@ -62,6 +64,7 @@ def offers_of(scene: Any, request: Request, frames: int) -> Offers:
         history.seconds(scene, replace(whole, samples=n), radius) for n in (1, 2)
     )
     sample = 0.0 if one is None or two is None else two - one
+    price = price_of_measuring(picture_size(scene.render)[::-1])
     animation = Animation(
         frames,
         known.samples,
@@ -74,7 +77,7 @@ def offers_of(scene: Any, request: Request, frames: int) -> Offers:
         has_threshold=scene.cycles.use_adaptive_sampling,
         obstacle=obstacle(scene, request, frames),
         share=history.share(scene),
-        measuring=samples_of_measuring(picture_size(scene.render)[::-1], frames),
+        measuring=measurements(frames, 2 * radius, price) * price,
     )
     curves = budget.shipped().errors.full_size
     curve = curves.get(BEST) or next(iter(curves.values()))

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 QUALITIES = {
     "best": "High",
+    "accurate": "High",
     "high": "High",
     "medium": "Balanced",
     "balanced": "Balanced",
@@ -43,6 +44,8 @@ QUALITIES = {
 `high` is the large network on guides that a smaller one has denoised first; `best`
 uses a large one for albedo, too, which preserves its texture, and the mean of two such
 pictures, one made upside down, in 1.8 of the seconds;
+`accurate` uses a large one for both guides, as Blender does unless told otherwise: what
+others are compared with;
 `medium` is a smaller network on such guides; `balanced` and `fast` are smaller ones
 on the guides as they are.
 """
@@ -82,7 +85,9 @@ _FOR_PARTS = (
     _ForParts("Balanced", 0.45, 8),
     _ForParts("Fast", 0.25, float("inf")),
 )
-_WITH_PREFILTER = ("best", "high", "medium")
+_WITH_PREFILTER = ("best", "accurate", "high", "medium")
+# The guides that a large network denoises first; a small one does the others.
+_BY_LARGE = {"best": ("albedo",), "accurate": ("albedo", "normal")}
 _NO_ALBEDO = 0.5  # what Cycles gives with a normal alone: OIDN wants both
 _MOST_MEBIBYTES = 2**31 - 1  # the library counts them in 32 bits
 # What a filter takes on the processor unless told otherwise: all that a picture of
@@ -123,7 +128,7 @@ class Denoiser:
 
     Parameters
     ----------
-    quality : {'best', 'high', 'medium', 'balanced', 'fast'}
+    quality : {'best', 'accurate', 'high', 'medium', 'balanced', 'fast'}
         See `QUALITIES`.
     device : {'auto', 'cpu', 'cuda', 'metal'}
         `auto` is the fastest there is.
@@ -373,7 +378,7 @@ class Denoiser:
 
     def _choose_network(self, name: str) -> str:
         """Return OIDN's quality for prefiltering a guide."""
-        return _LARGE if (self.quality, name) == ("best", "albedo") else _SMALL
+        return _LARGE if name in _BY_LARGE.get(self.quality, ()) else _SMALL
 
     def _choose_part_network(self, count: int) -> _ForParts:
         """Return the network for so many parts, none better than the picture's."""

@@ -21,8 +21,6 @@ from ..arrays import floats
 from .worth import FALL, Errors
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from ..accumulation.accumulate import Accumulated
     from ..accumulation.frame import Stored
     from ..arrays import Array
@@ -33,9 +31,6 @@ _NOISIEST = 0.01
 _DARKEST = 0.02  # of the mean luminance, added to the light of each channel
 _SMOOTH = 7  # pixels across
 _SEEN = 3  # pixels across: the light that an error is relative to
-# Standard deviation of noise that nobody sees, of the square root of luminance and
-# relative to it: 0.2 % of the light.
-_UNSEEN = 1e-3
 _TINY = 1e-12
 
 
@@ -109,42 +104,8 @@ def measure_errors(
     return Errors(fewer, whole[kept] / 2, by_itself)
 
 
-@dataclass(frozen=True)
-class Gain:
-    """What the samples of neighbours bring to a frame, by blocks.
-
-    Attributes
-    ----------
-    errors : (rows, columns) array
-        What is left of each block's error, 1 where neighbours bring nothing.
-    noise : (rows, columns) array
-        Noise of the frame's own samples.
-    seen : (rows, columns) bool array
-        Whether that noise is visible.
-    """
-
-    errors: Array
-    noise: Array
-    seen: NDArray[np.bool_]
-
-    @property
-    def blocks(self) -> Array:
-        """How many times its own samples a block equals; infinite without noise."""
-        return np.where(self.seen, self.errors ** (-1.0 / FALL), np.inf)
-
-    @property
-    def whole(self) -> float:
-        """How many times its own samples the frame equals."""
-        return self.of(self.errors > 0.0)  # not NaN, as where light knows no bounds
-
-    def of(self, blocks: NDArray[np.bool_]) -> float:
-        """How many times their own samples some blocks together equal."""
-        error = float(np.average(self.errors[blocks], weights=self.noise[blocks]))
-        return float(max(error, _TINY) ** (-1.0 / FALL))
-
-
-def gain(accumulated: Accumulated, own: Stored, factor: float = 1.0) -> Gain:
-    """Return what a frame has gained by the samples of its neighbours.
+def gain(accumulated: Accumulated, own: Stored, factor: float = 1.0) -> float:
+    """Return how many times its own samples a frame equals with its neighbours'.
 
     Errors fall with `FALL`; the noise of a pixel is its weight.
 
@@ -159,21 +120,14 @@ def gain(accumulated: Accumulated, own: Stored, factor: float = 1.0) -> Gain:
 
     Returns
     -------
-    gain : Gain
+    gain : float
+        1 where neighbours bring nothing.
     """
-    noise = root_noise(own)
+    assert own.noise is not None
+    halves = np.square(floats(own.noise.difference)).reshape(own.shape)
+    noise = box(halves, _SMOOTH) + np.float32(_TINY)  # halves may agree by chance
     alone = sample_counts(own).reshape(own.shape)
     reused = np.maximum(accumulated.samples - alone, 0.0) * np.float32(factor)
     share = alone / np.maximum(alone + reused, _TINY)
-    weights, weighted = block_means(noise), block_means(noise * share**FALL)
-    assert own.noise is not None
-    light = np.square(floats(own.noise.brightness)).reshape(own.shape)
-    seen = weights > np.maximum(_UNSEEN**2 * block_means(light), 2.0 * _TINY)
-    return Gain(np.maximum(weighted / weights, _TINY), weights, seen)
-
-
-def root_noise(frame: Stored) -> Array:
-    """Return the noise (H, W) of a frame: the variance of the root of its luminance."""
-    assert frame.noise is not None
-    noise = np.square(floats(frame.noise.difference)).reshape(frame.shape)
-    return box(noise, _SMOOTH) + np.float32(_TINY)  # halves may agree by chance
+    left = float(np.average(share**FALL, weights=noise))
+    return float(max(left, _TINY) ** (-1.0 / FALL))

@@ -18,7 +18,7 @@ class Savings:
     Attributes
     ----------
     denoising : float
-        Seconds of our denoiser for one picture; Cycles' takes about as long.
+        Seconds that Cycles' denoiser takes for one picture.
     """
 
     denoising: float = 0.0

@@ -1,14 +1,18 @@
 """The value of a neighbour: of its samples beside a frame's own, in a shot.
 
-It is measured in the first frame, again in the first one beyond its neighbours, in the
-20th, and then each time that the shot is three times as far: chance counts less and
-less, and the seconds of measuring are a small part of the shot's. Where a small picture
-shows more chance than anything else, what other shots have shown counts.
+It is measured in the first frame, again in the first one beyond its neighbours, and
+from there on as often as a small part of the shot's samples allows: other content has
+another value, and so have other places of a picture. The last few measurements count
+together. Where a small picture shows more chance than anything else, what other shots
+have shown counts.
 """
 
 from __future__ import annotations
 
+import math
+from collections import deque
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -16,7 +20,10 @@ import numpy as np
 if TYPE_CHECKING:
     from ..arrays import Array
 
-_SOON = 20  # frames; one of those before has all its neighbours
+# Frames from one measurement to the next: so many, or as many as let it take this share
+# of their samples.
+_SOON, _MOST = 12, 0.03
+_LAST = 4  # measurements that count, each of them at another place
 # What is known before anything is measured: mean and standard deviation over the
 # choosing half of the gallery, 4 samples with neighbours against 16 without.
 _USUAL, _SPREAD = 0.45, 0.25
@@ -35,9 +42,21 @@ _STEPS = np.linspace(0.0, 1.0, 201)
 _TINY = 1e-30
 
 
-def measurements(frames: int) -> int:
-    """In how many frames of a shot it is measured where nothing changes."""
-    return 2 + sum(_SOON * 3**i <= frames for i in range(10))
+def frames_between(price: float) -> int:
+    """Frames from one measurement to the next, if each takes `price` times a frame's.
+
+    The samples of all the file's settings are meant.
+    """
+    return max(_SOON, math.ceil(price / _MOST))
+
+
+def measurements(frames: int, neighbours: int, price: float) -> int:
+    """In how many frames of a shot it is measured where nothing changes.
+
+    Half of a frame's `neighbours` lie before it. For `price` see `frames_between`.
+    """
+    both_sides = neighbours // 2 + 2  # the first such frame beyond the first one's
+    return 1 + math.ceil(max(frames + 1 - both_sides, 0) / frames_between(price))
 
 
 class Errors(NamedTuple):
@@ -111,7 +130,9 @@ class Worth:
     fall: float = field(default=FALL, init=False)
     value: float = field(default=0.0, init=False)
     _falls: Array = field(default_factory=lambda: np.zeros_like(_FALLS))
-    _measurements: list[_Measurement] = field(default_factory=list)
+    _measurements: deque[_Measurement] = field(
+        default_factory=partial(deque, maxlen=_LAST)
+    )
     _neighbours: int = 0
     _frames: int = 0
     _next: int = 1
@@ -130,7 +151,14 @@ class Worth:
         """Whether enough frames were counted to measure anew where a shot changes."""
         return self._frames >= _SOON
 
-    def add(self, errors: Errors, share: float, gain: float, neighbours: int) -> None:
+    def add(
+        self,
+        errors: Errors,
+        share: float,
+        gain: float,
+        neighbours: int,
+        price: float = 0.0,
+    ) -> None:
         """Add the measurement of a frame.
 
         Where a frame has few neighbours these lie on one side only and are less
@@ -147,11 +175,13 @@ class Worth:
             How many times its own samples the frame has with its neighbours.
         neighbours : int
             How many neighbours it has.
+        price : float
+            What measuring takes, as in `frames_between`.
         """
         if neighbours > self._neighbours:
             self._measurements.clear()
         self._neighbours = neighbours
-        self._next = max(3 * self._frames, _SOON)
+        self._next = self._frames + frames_between(price)
         self._falls += np.square(errors.misfit_alone(share**-_FALLS))
         self._measurements.append(_Measurement(errors, share, gain))
         self._estimate()

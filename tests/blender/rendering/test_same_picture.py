@@ -20,11 +20,9 @@ from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
 from xrds_blender.rendering import sampling
 from xrds_blender.rendering.pace import measuring, more, obstacles, same_picture
-from xrds_blender.rendering.pace.more import blocks_beside, measured_regions, pixels_of
-from xrds_blender.rendering.pace.threshold import Threshold
+from xrds_blender.rendering.pace.more import measured_regions, pixels_of
 from xrds_blender.rendering.sampling import Sampled
 from xrds_core.accumulation.frame import Frame, Stored
-from xrds_core.pace.error import Gain
 from xrds_core.pace.savings import Savings
 from xrds_core.pace.worth import FALL, Errors
 
@@ -175,17 +173,13 @@ def test_a_frame_that_shows_something_new_is_told_by_what_neighbours_add() -> No
     pace._gains.extend([6.0] * 4)
     own, beside = Sampled(30, {}, {}), [28, 29, 31, 32]
 
-    def gained(times: float) -> Gain:
-        errors = np.full((4, 4), times**-FALL)
-        return Gain(errors, np.ones((4, 4)), np.ones((4, 4), bool))
-
-    assert not pace._is_new(own, beside, gained(2.0))  # too soon after the first
+    assert not pace._is_new(own, beside, 2.0)  # too soon after the first
     for _ in range(20):
         pace._worth.is_due(8)
-    assert pace._is_new(own, beside, gained(2.0))
-    assert not pace._is_new(own, beside, gained(5.0))
-    assert pace._is_new(own, [31, 32], gained(5.0))  # after a cut
-    assert not pace._is_new(own, [], gained(1.0))
+    assert pace._is_new(own, beside, 2.0)
+    assert not pace._is_new(own, beside, 5.0)
+    assert pace._is_new(own, [31, 32], 5.0)  # after a cut
+    assert not pace._is_new(own, [], 1.0)
 
 
 def test_more_samples_make_the_picture_of_all(
@@ -265,10 +259,29 @@ def test_what_is_told_is_what_a_frame_has() -> None:
     assert pace._decision(0.25).value == "25% of the file's samples"
     # under a noise threshold the pixels decide: of what the file takes on the mean
     pace = same_picture.SamePicture(4096, has_threshold=True)
-    pace._threshold = Threshold(54.0, 48.0, 4096.0, 1.0)
+    pace._asked = 54.0
     frame = SimpleNamespace(samples=27.0)
     share = pace._share(Sampled(1, {"": frame}, {}), asked=0.25)
     assert pace._decision(share).value == "50% of the file's samples"
+
+
+@pytest.mark.parametrize(
+    ("samples", "share", "expected"),
+    [
+        (None, 0.25, False),  # not known yet
+        (54.0, 0.25, True),
+        (54.0, 1.0, True),  # two halves under a threshold would have 64
+        (70.0, 1.0, False),  # the file's own way
+        (300.0, 0.15, True),
+        (300.0, 0.25, False),  # enough for Cycles to find where noise is
+    ],
+)
+def test_few_samples_under_a_threshold_are_even(
+    samples: float | None, share: float, expected: bool
+) -> None:
+    pace = same_picture.SamePicture(4096, has_threshold=True, share=share)
+    pace._asked = samples
+    assert pace._is_few() is expected
 
 
 @pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--sample-cache c"])
@@ -339,19 +352,19 @@ def test_the_plan_of_a_shot_says_so(
 def test_large_pictures_are_measured_in_parts_from_top_to_bottom(
     shape: tuple[int, int], share: float
 ) -> None:
-    regions = measured_regions(shape)
-    covered = np.zeros(shape, int)
-    for region in regions:
-        assert share == 1.0 or region.x % 32 == region.width % 32 == 0
-        assert region.height == shape[0]
-        covered[pixels_of(region)] += 1
-    assert covered.max() == 1
-    assert covered.mean() == pytest.approx(share, abs=0.04)
-    blocks = np.ones([-(-side // 32) for side in shape], bool)
-    rest = np.sum(blocks_beside(blocks, regions), axis=0)
-    assert rest.max(initial=0) == (share < 1.0)
-    for region in regions:
-        assert not rest[:, region.x // 32 : (region.x + region.width) // 32].any()
+    together = np.zeros(shape, int)
+    for turn in range(4):
+        covered = np.zeros(shape, int)
+        for region in measured_regions(shape, turn):
+            assert region.height == shape[0]
+            covered[pixels_of(region)] += 1
+        assert covered.max() == 1
+        assert covered.mean() == pytest.approx(share, abs=0.04)
+        assert np.array_equal(covered, covered[:, ::-1])
+        together += covered
+    # one after the other at other places, the middle among them
+    assert together[:, shape[1] // 2].all()
+    assert (together > 0).mean() >= min(0.9, 3.7 * share)
 
 
 def test_what_is_measured_is_the_picture(
@@ -377,7 +390,7 @@ def test_what_is_measured_is_the_picture(
     assert 0.0 < max(differences[1::2]) < 0.05  # the denoiser sees less
 
 
-def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
+def test_a_part_is_measured_and_all_of_the_frame_gets_what_it_lacks(
     shot: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bpy.ops.wm.open_mainfile(filepath=str(shot))
@@ -405,10 +418,9 @@ def test_a_part_is_measured_and_the_rest_gets_what_it_lacks(
     frames = render(shot, "same")
     assert sizes == [2 * 64 * 96] * 2
     shares = {number: x["share"] for number, x in zip(FRAMES, frames, strict=True)}
-    # all samples everywhere; where it was measured, frame 1 has those and a quarter
-    # more, and frame 4 had them all before
+    # all samples everywhere, and those that it was measured by
     part = 2 * 64 / 288
-    expected = {1: 1.0 + 1.25 * part, 4: 1.0 + 2.0 * part}
+    expected = {1: 1.0 + 2.0 * part, 4: 1.0 + 2.0 * part}
     for number in FRAMES:
         assert shares[number] == pytest.approx(expected.get(number, 1.0)), shares
     # what it is measured by is lent as well: others seemed to gain by their neighbours

@@ -99,13 +99,11 @@ def frames(moved: bool = True) -> tuple[list, Accumulated]:
 def test_what_neighbours_bring_is_counted() -> None:
     found, accumulated = frames(moved=False)
     gained = gain(accumulated, found[1])
-    everywhere = np.ones(gained.errors.shape, bool)
-    assert 2.0 < gained.of(everywhere) < 3.2
-    half = gain(accumulated, found[1], 0.5).of(everywhere)
-    assert half == pytest.approx(1.0 + (gained.of(everywhere) - 1.0) / 2, abs=0.1)
+    assert 2.0 < gained < 3.2
+    half = gain(accumulated, found[1], 0.5)
+    assert half == pytest.approx(1.0 + (gained - 1.0) / 2, abs=0.1)
     alone = gain(accumulate(found[1], []), found[1])
-    assert alone.of(everywhere) == pytest.approx(1.0)
-    assert np.allclose(alone.blocks[np.isfinite(alone.blocks)], 1.0)
+    assert alone == pytest.approx(1.0)
 
 
 def test_more_of_the_same_is_of_no_use_where_neighbours_lend_nothing() -> None:
@@ -114,24 +112,20 @@ def test_more_of_the_same_is_of_no_use_where_neighbours_lend_nothing() -> None:
     columns = samples.shape[1] // 2
     samples[:, :columns] = found[1].samples  # the left half is the frame's own alone
     accumulated = replace(accumulated, samples=samples)
-    everywhere = np.ones(gain(accumulated, found[1]).errors.shape, bool)
-    often = [gain(accumulated, found[1], x).of(everywhere) for x in (1.0, 8.0, 1e6)]
+    often = [gain(accumulated, found[1], x) for x in (1.0, 8.0, 1e6)]
     assert often[0] < often[1] < often[2] < 3.2, often  # half of the error stays
 
 
-def test_blocks_whose_noise_nobody_sees_lack_nothing() -> None:
-    found, _ = frames(moved=False)
+def test_noise_without_bounds_leaves_a_gain() -> None:
+    found, accumulated = frames(moved=False)
     noise = found[1].noise
     assert noise is not None
-    root = noise.brightness.astype(np.float32).reshape(found[1].shape)
-    apart = root * np.float32(0.01)
-    apart[: BLOCK + 4] = root[: BLOCK + 4] * np.float32(0.0005)  # noise is smoothed
-    guides = noise.guides.astype(np.float32)
-    noise = Noise.of(root.ravel(), apart.ravel(), guides)
-    own = replace(found[1], noise=noise)
-    blocks = gain(accumulate(own, []), own).blocks
-    assert np.isinf(blocks[0]).all()
-    assert np.allclose(blocks[1:], 1.0)
+    root, apart, guides = (
+        x.astype(np.float32) for x in (noise.brightness, noise.difference, noise.guides)
+    )
+    apart[5] = np.inf
+    own = replace(found[1], noise=Noise.of(root, apart, guides))
+    assert 2.0 < gain(accumulated, own) < 3.2
 
 
 def extra(samples: Array, value: float) -> Passes:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,27 +12,34 @@ from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
 from xrds_core.pace.error import Rendered, measure_errors
 from xrds_core.pace.extra_samples import mean_of
-from xrds_core.pace.worth import Errors, measurements
+from xrds_core.pace.worth import Errors
 
 from ..methods import Finishing
 from ..sampling import Sampled
-from .more import Extra, Part, measured_regions, measured_share, pixels_of
+from .more import (
+    Extra,
+    Part,
+    measured_regions,
+    measured_share,
+    pixels_of,
+    whole_of,
+)
 
 Render = Callable[[Part], dict[str, Passes]]
 """Renders more samples of a frame, by view."""
 
 
-def samples_of_measuring(shape: tuple[int, int], frames: int) -> float:
-    """What measuring takes in a shot, in frames (H, W) of all samples."""
-    return 2.0 * measurements(frames) * measured_share(shape)
+def price_of_measuring(shape: tuple[int, int]) -> float:
+    """What measuring in a frame (H, W) takes, in frames of all samples."""
+    return 2.0 * measured_share(shape)
 
 
 class Measured(NamedTuple):
     """What was measured in some regions of a frame, and the samples that it took.
 
-    `errors` are those of its picture, of one of all samples and of its own alone;
-    denoising a frame of this size by itself takes so many seconds. `asked` (H, W) are
-    the samples that the file takes, 0 elsewhere.
+    `errors` are those of its picture, of one of all samples and of its own alone, both
+    as by Cycles, which takes so many seconds for `denoising` a frame of this size.
+    `asked` (H, W) are the samples that the file takes, 0 elsewhere.
     """
 
     errors: Errors
@@ -48,23 +54,25 @@ def measure(
     others: Sequence[Sampled],
     samples: int,
     exposure: float,
+    turn: int,
     more: Render,
 ) -> Measured:
     """Compare an accumulated frame with one of all `samples` without neighbours.
 
-    In `measured_regions`, by two renders of all samples each, of two seeds. Renders of
-    half of them would not do: where texture is fine one sequence of all is far better
-    than two of half as many. White is a luminance of 1 / `exposure`.
+    In `measured_regions` of a `turn`, by two renders of all samples each, of two seeds.
+    Renders of half of them would not do: where texture is fine one sequence of all is
+    far better than two of half as many. Nor would our own denoiser: it is quicker than
+    Cycles' and blurs fine albedo more. White is a luminance of 1 / `exposure`.
     """
     view = next(iter(own.views))
     shape = own.views[view].shape
-    regions = measured_regions(shape)
+    regions = measured_regions(shape, turn)
     cells: list[list[Rendered]] = []
     seconds = 0.0
     extra: list[Extra] = []
     asked = np.zeros(shape, np.float32)
     for region in regions:
-        place = None if (region.height, region.width) == shape else region
+        place = None if region == whole_of(shape) else region
         pair = [more(Part(samples, 1.0, place, sequence=-i)) for i in (1, 2)]
         started = time.perf_counter()
         cells.append([_rendered(method, one[view]) for one in pair])
@@ -80,22 +88,22 @@ def measure(
     noisy = own.gathered[view].radiance
     assert noisy is not None
     places = [pixels_of(region) for region in regions]
-    single = replace(own, views={view: own.views[view]})
-    single = replace(single, gathered={view: method.accumulate(single, [], view)})
     # each part by itself, as the renders of all samples are
-    together, alone = (
-        np.concatenate([method.radiance(frame, beside, view, x) for x in places])
-        for frame, beside in ((own, others), (single, []))
-    )
+    together = np.concatenate([method.radiance(own, others, view, x) for x in places])
+    single = method.accumulate(own, [], view)
+    assert single.radiance is not None
+    guided = single.radiance, single.albedo, single.normal
+    alone = [method.as_by_cycles(*(x[place] for x in guided)) for place in places]
     around = np.concatenate([noisy[place] for place in places])
-    errors = measure_errors(together, alone, around, parts, exposure)
+    errors = measure_errors(together, np.concatenate(alone), around, parts, exposure)
     return Measured(errors, extra, seconds / 2 / measured_share(shape), asked)
 
 
 def _rendered(method: Finishing, samples: Passes) -> Rendered:
     radiance = samples.radiance
     assert radiance is not None
-    return Rendered(radiance, method.denoised(radiance, samples.albedo, samples.normal))
+    denoised = method.as_by_cycles(radiance, samples.albedo, samples.normal)
+    return Rendered(radiance, denoised)
 
 
 def _joined(cells: Sequence[Rendered]) -> Rendered:

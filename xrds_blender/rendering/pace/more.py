@@ -7,9 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from xrds_core.accumulation.accumulate import accumulate
 from xrds_core.accumulation.local_filters import BLOCK
 from xrds_core.accumulation.passes import Passes
@@ -75,7 +72,7 @@ def render_more(
 
 
 class Extra(NamedTuple):
-    """More samples of a region of a frame, by view; regions do not overlap."""
+    """More samples of a region of a frame, by view."""
 
     region: Region
     views: dict[str, Passes]
@@ -96,60 +93,45 @@ def with_more(own: Sampled, extra: Sequence[Extra], weight: float) -> Sampled:
 # Of a picture so much is measured in, but so many pixels, and half of it at most where
 # strips are not narrower than two blocks.
 _SHARE, _LEAST_AREA, _NARROWEST = 0.0625, 60_000, 2
+# How far the middles of both strips lie from the picture's, in turn: in its width.
+_OFFSETS = (0.25, 0.0, 0.375, 0.125)
 
 
-def measured_regions(shape: tuple[int, int]) -> list[Region]:
+def measured_regions(shape: tuple[int, int], turn: int = 0) -> list[Region]:
     """The parts of a picture (H, W) that show how large its errors are.
 
-    Two strips of blocks from top to bottom; all of a picture that these would cover.
+    Two strips from top to bottom, at other places each `turn`, as far left of the
+    middle as right of it; all of a picture that these would cover.
     """
+    height, width = shape
+    across = _across(shape)
+    if 2 * across >= width:
+        return [whole_of(shape)]
+    offset = max(round(_OFFSETS[turn % len(_OFFSETS)] * width), (across + 1) // 2)
+    left = max(width // 2 - offset - across // 2, 0)
+    right = width - left - across
+    return [Region(x, 0, across, height) for x in (left, right)]
+
+
+def _across(shape: tuple[int, int]) -> int:
+    """How many pixels wide a strip of a picture (H, W) is."""
     height, width = shape
     area = max(_SHARE * height * width, _LEAST_AREA)
     wanted = math.ceil(area / (2 * height * BLOCK))
-    across = max(min(wanted, width // (4 * BLOCK)), _NARROWEST) * BLOCK
-    if 2 * across >= width:
-        return [Region(0, 0, width, height)]
-    middles = (width // 4, 3 * width // 4)
-    starts = [max(x - across // 2, 0) // BLOCK * BLOCK for x in middles]
-    return [Region(x, 0, across, height) for x in starts]
+    return max(min(wanted, width // (4 * BLOCK)), _NARROWEST) * BLOCK
+
+
+def whole_of(shape: tuple[int, int]) -> Region:
+    """All of a picture (H, W)."""
+    return Region(0, 0, shape[1], shape[0])
 
 
 def measured_share(shape: tuple[int, int]) -> float:
     """What `measured_regions` are of a picture (H, W)."""
-    return sum(x.width * x.height for x in measured_regions(shape)) / math.prod(shape)
-
-
-def blocks_beside(
-    blocks: NDArray[np.bool_], regions: Sequence[Region]
-) -> list[NDArray[np.bool_]]:
-    """The blocks that are not in any of these strips, left, between and right."""
-    if not regions:
-        return [blocks]
-    places = [_columns_of(region) for region in regions]
-    ends = [0, *(x.stop for x in places)]
-    starts = [*(x.start for x in places), blocks.shape[1]]
-    parts = []
-    for first, last in zip(ends, starts, strict=True):
-        part = np.zeros_like(blocks)
-        part[:, first:last] = blocks[:, first:last]
-        parts.append(part)
-    return parts
+    return min(2 * _across(shape) / shape[1], 1.0)
 
 
 def pixels_of(region: Region) -> tuple[slice, slice]:
     """Its rows and columns."""
     rows = slice(region.y, region.y + region.height)
     return rows, slice(region.x, region.x + region.width)
-
-
-def _columns_of(region: Region) -> slice:
-    """The columns of blocks that a region covers; it begins with one."""
-    return slice(region.x // BLOCK, -(-(region.x + region.width) // BLOCK))
-
-
-def region_of(rows: slice, columns: slice, shape: tuple[int, int]) -> Region:
-    """A rectangle of blocks, in pixels of the picture."""
-    top, left = rows.start * BLOCK, columns.start * BLOCK
-    bottom = min(rows.stop * BLOCK, shape[0])
-    right = min(columns.stop * BLOCK, shape[1])
-    return Region(left, top, right - left, bottom - top)

@@ -17,36 +17,34 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from xrds_core.accumulation.passes import Passes
-from xrds_core.arrays import Array
 from xrds_core.errors import warn
-from xrds_core.finish import rectangles
-from xrds_core.pace.error import Gain, gain
+from xrds_core.pace.error import gain
 from xrds_core.pace.history import History
 from xrds_core.pace.savings import Savings
 from xrds_core.pace.worth import Worth
 
+from ...cycles.settings import LOOKS_EVERY
 from ...planning.plan import SAME_PICTURE, Decision
 from ...planning.request import Request
 from ...scene.contents import stands_still
 from ..methods import Finishing
 from ..sampling import Sampled, can_continue, is_even
-from .measuring import Measured, Render, measure
-from .more import Extra, More, Part, blocks_beside, region_of, with_more
+from .measuring import Measured, measure, price_of_measuring
+from .more import Extra, More, Part, whole_of, with_more
 from .obstacles import can_save
-from .threshold import Threshold, learn_threshold
 
 _FIRST = 0.25  # share that the first frames have
 # The least share, but where frames add up under a camera that stands still; and the
 # next share over the present one.
 _LEAST_SHARE, _FALL = 0.125, 0.5
+# Under a threshold fewer samples than this, on the mean, are taken evenly: both halves
+# of a frame have at least one step there, and two to differ in. So where a file takes
+# 48, its halves would take 64.
+_FEW = 4 * LOOKS_EVERY
 _LEAST = 2  # samples of a frame, which has halves then
-# Blocks with less than this share of what they need get more samples, and frames.
-_LACKING, _ENOUGH = 0.5, 0.8
-_MOST_LACKING = 0.5  # of the blocks; from there on the whole frame gets more
-_PARTS = 2  # of a frame that get more: for each Cycles syncs the scene again
+_ENOUGH = 0.8  # of what a frame needs; with less it gets more samples
 # The share of the next frames stays as it is as long as the last frames needed so much
 # of it, and no more: Cycles syncs the scene again for another number of samples.
 _TOO_MUCH = 0.85
@@ -96,13 +94,15 @@ class SamePicture:
     exposure: float = 1.0
     has_threshold: bool = False
     moves: bool = True
-    _threshold: Threshold | None = None
+    # what a file with a threshold takes, on the mean of its pixels, once it is known
+    _asked: float | None = None
     _worth: Worth = field(default_factory=Worth)
     _savings: Savings = field(default_factory=Savings)
     _is_decided: bool = False  # whether it saves enough, and that was said
     _takes_all: bool = False  # because it does not
     _reason: str = ""
     _measured_in: int | None = None
+    _measurements: int = 0
     # of frames: what all pixels have, with what was measured by where that was done
     _shares: dict[int, float] = field(default_factory=dict)
     _gains: deque[float] = field(default_factory=partial(deque, maxlen=_LAST))
@@ -142,30 +142,28 @@ class SamePicture:
         if self._is_new(own, beside, gained):
             self._worth = Worth()
         extra: list[Extra] = []
+        is_whole = False  # measured in all of it, which has all samples then
         beyond = 0.0  # the share of all samples that it is measured by
         # One frame of many samples is worth less than many of few: all its pixels lie
         # as far beside this one's. So it is not to be among the neighbours.
         is_due = self._worth.is_due(len(beside)) and self._measured_in not in beside
         if beside and is_due and not self._takes_all:
-            measured = measure(method, own, others, self.samples, self.exposure, render)
+            how = self.samples, self.exposure, self._measurements
+            measured = measure(method, own, others, *how, render)
             extra += measured.extra
             self._learn(own, measured, gained, len(beside))
+            is_whole = bool(measured.asked.all())
             beyond = 2.0 * float(measured.asked.mean()) / self._of_file
         share = self._shares.get(own.number, 1.0)
-        shares = np.full_like(gained.errors, share)
-        if self._threshold is not None and own.samples is not None:  # even ones
-            shares /= self._threshold.density(frame)
-        lacks = self._lacks(shares, gained)
-        rest = ~lacks if lacks.mean() < _MOST_LACKING else gained.errors > 0.0
         lent = self._lent(share, beside)  # among frames of its own share
         even = gained if lent == 1.0 else gain(gathered[view], frame, lent)
-        self._choose_next(even.of(rest))
-        # where it was measured it has all now
-        regions = [region for region, _ in extra]
-        for part in blocks_beside(lacks, regions):
-            extra += self._top_up(frame.shape, shares, gained, part, render)
+        self._choose_next(even)
+        missing = 0 if is_whole else self._missing(share, gained)
+        if missing:
+            part = self._more_of_all(missing)
+            extra.append(Extra(whole_of(frame.shape), render(part)))
         own = with_more(own, extra, self._weight)
-        self._note_seconds(own, share, bool(regions))
+        self._note_seconds(own, share, was_measured=beyond > 0.0)
         self._shares[own.number] = share + beyond  # what it lends
         share *= own.views[view].samples / frame.samples
         return replace(
@@ -176,12 +174,12 @@ class SamePicture:
             decisions=(self._decision(share),),
         )
 
-    def _is_new(self, own: Sampled, beside: Sequence[int], gained: Gain) -> bool:
+    def _is_new(self, own: Sampled, beside: Sequence[int], gained: float) -> bool:
         """Whether a frame shows something else than those before it, as after a cut."""
         if not beside or own.number < min(beside):
             return bool(beside)
         usual = np.mean(self._gains) if self._gains else 0.0
-        is_less = gained.whole < _CHANGED * usual
+        is_less = gained < _CHANGED * usual
         return bool(is_less) and self._worth.is_old
 
     def _before(self, own: Sampled, others: Sequence[Sampled]) -> list[Sampled]:
@@ -202,16 +200,15 @@ class SamePicture:
     @property
     def _of_file(self) -> int:
         """Samples of the file's frames, on the mean of their pixels."""
-        threshold = self._threshold
-        return self.samples if threshold is None else round(threshold.samples)
+        return self.samples if self._asked is None else round(self._asked)
 
     def _is_few(self) -> bool:
         """Whether the next frame takes even samples, of a file with a threshold.
 
         Under a camera that stands still its samples would be of another sequence.
         """
-        threshold = self._threshold
-        return self.moves and threshold is not None and threshold.is_few(self.share)
+        asked = self._asked
+        return self.moves and asked is not None and self.share * asked < _FEW
 
     def _share(self, frame: Sampled, asked: float) -> float:
         """What a frame has of the file's samples.
@@ -219,28 +216,29 @@ class SamePicture:
         Under a noise threshold that is not what it was `asked` for: a pixel has a
         least number, and Cycles stops in steps.
         """
-        if self._threshold is None:
+        if self._asked is None:
             return asked
-        return float(next(iter(frame.views.values())).samples / self._threshold.samples)
+        return float(next(iter(frame.views.values())).samples / self._asked)
 
     # ---- what was measured in a frame
 
     def _learn(
-        self, own: Sampled, measured: Measured, gained: Gain, neighbours: int
+        self, own: Sampled, measured: Measured, gained: float, neighbours: int
     ) -> None:
         """Learn from a frame what neighbours' samples are worth."""
         share = self._shares.get(own.number, 1.0)
         if self.has_threshold:
-            is_first = self._threshold is None
-            frame = next(iter(own.views.values()))
-            self._threshold = learn_threshold(frame, measured.asked)
+            is_first = self._asked is None
+            self._asked = float(measured.asked[measured.asked > 0.0].mean())
             had = self._share(own, share)
             if is_first:  # what the others have is known now as well
                 self._shares = {n: x * had / share for n, x in self._shares.items()}
             share = self._shares[own.number] = had
-        self._worth.add(measured.errors, share, gained.whole, neighbours)
+        price = price_of_measuring(next(iter(own.views.values())).shape)
+        self._worth.add(measured.errors, share, gained, neighbours, price)
         self._savings.denoising = measured.denoising
         self._measured_in = own.number
+        self._measurements += 1
         self._reason = (
             f"measured in frame {own.number}: with neighbours, {share:.0%} of them had "
             f"{measured.errors.ratio:.2f} times the error of the file's"
@@ -267,7 +265,7 @@ class SamePicture:
 
     # ---- what a frame lacks, and what the next ones take
 
-    def _equal(self, share: Any, gain: Any) -> Any:
+    def _equal(self, share: float, gain: float) -> float:
         """The share of all samples that is as good without neighbours.
 
         `gain` is how many times its own samples the frame has with them.
@@ -279,45 +277,19 @@ class SamePicture:
         """What neighbours' samples count beside more of the frame's own."""
         return min(self._worth.value / _USEFUL, 1.0)
 
-    def _lacks(self, shares: Array, gained: Gain) -> NDArray[np.bool_]:
-        """Which blocks, that have `shares` of the file's samples, are to get more."""
-        whole = np.ones(gained.errors.shape, bool)
-        if (shares >= 1.0).all():
-            return ~whole
-        with np.errstate(invalid="ignore"):  # blocks without noise lack nothing
-            lacks = self._equal(shares, gained.blocks) < _LACKING
-        enough = self._equal(shares.mean(), gained.of(whole)) >= _ENOUGH
-        return lacks if enough and lacks.mean() < _MOST_LACKING else whole
-
-    def _top_up(
-        self,
-        shape: tuple[int, int],
-        shares: Array,
-        gained: Gain,
-        lacks: NDArray[np.bool_],
-        render: Render,
-    ) -> list[Extra]:
-        """Render more samples where a frame lacks them, up to all of the file's."""
-        extra = []
-        for rows, columns in rectangles(lacks, most=_PARTS):
-            there = np.zeros_like(lacks)
-            there[rows, columns] = lacks[rows, columns]
-            length = self._missing(shares, gained, there)
-            if length < 1:
-                continue
-            region = region_of(rows, columns, shape)
-            begin = None if self.history is None else self._taken_more
-            self._taken_more += length
-            part = Part(length, length / self.samples, region, begin, self._newest)
-            extra.append(Extra(region, render(part)))
-        return extra
-
-    def _missing(self, shares: Array, gained: Gain, blocks: NDArray[np.bool_]) -> int:
-        """How many samples some blocks lack, up to all of the file's."""
-        share = float(shares[blocks].mean())
-        equal = float(self._equal(share, gained.of(blocks)))
+    def _missing(self, share: float, gain: float) -> int:
+        """How many samples a frame lacks, up to all of the file's."""
+        equal = self._equal(share, gain)
+        if share >= 1.0 or equal >= _ENOUGH:
+            return 0
         most = self.samples - round(self.samples * share)
-        return min(max(round(self.samples * (1.0 - equal)), 0), most)
+        return min(round(self.samples * (1.0 - equal)), most)
+
+    def _more_of_all(self, length: int) -> Part:
+        """So many more samples of a whole frame."""
+        begin = None if self.history is None else self._taken_more
+        self._taken_more += length
+        return Part(length, length / self.samples, None, begin, self._newest)
 
     def _lent(self, share: float, others: Sequence[int]) -> float:
         """What neighbours will lend if all frames have a `share`, over what they do.
@@ -338,7 +310,7 @@ class SamePicture:
         if self._takes_all:
             return
         self._gains.append(gain)
-        needed = 1.0 / float(self._equal(1.0, np.mean(self._gains)))
+        needed = 1.0 / self._equal(1.0, float(np.mean(self._gains)))
         least = _LEAST_SHARE if self.history is None else 0.0
         needed = max(needed, least, self.share * _FALL)
         if not _TOO_MUCH <= needed / self.share <= 1.0:
