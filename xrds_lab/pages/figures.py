@@ -54,15 +54,20 @@ def _shots(results: Results) -> Figures:
 
 def _equal_seconds(results: Results) -> Figures:
     """Of shots in the seconds of Cycles + OIDN; what a frame takes beside one alone."""
-    entries = only(results.shots["equal_seconds"], motion="pan", at=DEFAULT)
-    known = [x for x in entries if x["gain"] is not None]
-    found: Figures = {"equal.scenes": len({x["scene"] for x in known})}
-    for samples in {x["samples"] for x in known}:
-        rows = only(known, samples=samples)
-        name = f"equal.{samples}"
-        found[f"{name}.mean"] = mean(x["gain"] for x in rows)
-        found[f"{name}.worst"] = min(x["gain"] for x in rows)
-        found[f"{name}.steadier"] = 100.0 * (1.0 - mean(x["flicker"] for x in rows))
+    found: Figures = {}
+    for of, known in (
+        ("equal", results.equal_seconds),
+        ("equal.all", results.equal_seconds_of_all),
+    ):
+        found[f"{of}.scenes"] = len({x["scene"] for x in known})
+        for samples in {x["samples"] for x in known}:
+            rows = only(known, samples=samples)
+            name = f"{of}.{samples}"
+            found[f"{name}.scenes"] = len(rows)
+            found[f"{name}.mean"] = mean(x["gain"] for x in rows)
+            found[f"{name}.worst"] = min(x["gain"] for x in rows)
+            steadier = 1.0 - mean(x["flicker"] for x in rows)
+            found[f"{name}.steadier"] = 100.0 * steadier
     means = [found[f"equal.{samples}.mean"] for samples in (8, 16, 64)]
     found |= {"equal.least": min(means), "equal.most": max(means)}
     timed = [x for x in results.shots["shots"] if x["seconds_per_frame"]]

@@ -8,8 +8,10 @@ from functools import cached_property
 from statistics import mean
 from typing import TYPE_CHECKING, Any
 
+from ..shots import equal_seconds
 from ..shots.frames import REACH
 from ..shots.methods import DEFAULT, XRDS
+from ..shots.seconds import per_frame
 from ..shots.seeds import over_seeds
 
 if TYPE_CHECKING:
@@ -31,6 +33,12 @@ OLD_PATTERN = ("bmw27", "crystal-cave")
 """Files with Cycles' classic sampling pattern, which XRDS replaces at full size."""
 _UNLIT = 90.0  # dB: the PSNR of a part without light
 _NAMES = {"bmw27": "car", "crystal-cave": "cave"}
+
+
+def _compared(entries: Rows) -> Rows:
+    """Those at the seconds of Cycles + OIDN that have a gain."""
+    found = only(entries, motion="pan", at=DEFAULT)
+    return [x for x in found if x["gain"] is not None]
 
 
 def scene_name(scene: str) -> str:
@@ -84,6 +92,27 @@ class Results:
         """Shots of the seven scenes; means over seeds."""
         found = self.read("shots/results.json")
         return found | {"shots": over_seeds(found["shots"])}
+
+    @cached_property
+    def equal_seconds(self) -> Rows:
+        """Panning shots in the seconds of Cycles + OIDN, where both were timed."""
+        return _compared(self.shots["equal_seconds"])
+
+    @cached_property
+    def equal_seconds_of_all(self) -> Rows:
+        """The same of all scenes, timed in a quarter of the pixels, on a newer machine.
+
+        What a frame takes grows with its pixels.
+        """
+        known = self.read("shots/seconds.json")["scenes"]
+
+        def priced(point: dict[str, Any]) -> dict[str, Any]:
+            what = (point[name] for name in ("method", "samples", "radius"))
+            return point | {
+                "seconds_per_frame": per_frame(known[point["scene"]], *what)
+            }
+
+        return _compared(equal_seconds.entries(map(priced, self.shots["shots"])))
 
     @cached_property
     def both(self) -> Rows:

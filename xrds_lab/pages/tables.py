@@ -111,28 +111,36 @@ def peers(results: Results) -> Table:
 
 
 def equal_seconds(results: Results) -> Table:
-    """A shot in the seconds of Cycles + OIDN, where both were timed on both sides."""
+    """A shot in the seconds of Cycles + OIDN, and some on an older machine."""
     head = ["seconds of Cycles + OIDN with", "scenes", "gain", "worst", "flicker"]
-    table = [[*head, "worst", "median of three: gain", "non-local means"]]
-    entries = only(results.shots["equal_seconds"], motion="pan", at=DEFAULT)
-    known = [x for x in entries if x["gain"] is not None]
-    for samples in sorted({x["samples"] for x in known}):
-        rows = only(known, samples=samples)
+    head += ["worst", "median of three: gain", "non-local means"]
+    table = [[*head, "older: scenes", "gain", "flicker"]]
+    for samples in sorted({x["samples"] for x in results.equal_seconds_of_all}):
+        rows = only(results.equal_seconds_of_all, samples=samples)
+        older = only(results.equal_seconds, samples=samples)
         table.append(
             [
                 f"{samples} samples",
-                str(len(rows)),
-                f"{mean(x['gain'] for x in rows):+.1f}",
+                *_gain(rows),
                 _least_gain(rows),
-                f"{mean(x['flicker'] for x in rows):.2f}",
+                *_flicker(rows),
                 _most_flicker(rows, "flicker"),
                 *(
                     f"{mean(x['peers'][way] - x[DEFAULT] for x in rows):+.1f}"
                     for way in (MEDIAN, NL_MEANS)
                 ),
+                *(_gain(older) + _flicker(older) if older else ["-"] * 3),
             ]
         )
     return table
+
+
+def _gain(rows: Rows) -> list[str]:
+    return [str(len(rows)), f"{mean(x['gain'] for x in rows):+.1f}"]
+
+
+def _flicker(rows: Rows) -> list[str]:
+    return [f"{mean(x['flicker'] for x in rows):.2f}"]
 
 
 def held_out(results: Results) -> Table:

@@ -60,13 +60,7 @@ class SceneSeconds:
 
     def per_frame(self, method: str, samples: int, radius: int) -> float | None:
         """Seconds of all that the user waits for, per frame; None if nothing tells."""
-        name = _name(method, radius)
-        seconds = {int(n): x[name]["total"] for n, x in self.known.items() if name in x}
-        if samples in seconds or len(seconds) < 2:
-            return seconds.get(samples)
-        few, many = min(seconds), max(seconds)
-        slope = (seconds[many] - seconds[few]) / (many - few)
-        return float(seconds[few] + max(slope, 0.0) * (samples - few))
+        return per_frame(self.known, method, samples, radius)
 
     def measure(self, samples: int, radii: Sequence[int], rounds: int) -> None:
         """Time what is missing: a frame's samples, finishing it, and the rival."""
@@ -80,6 +74,22 @@ class SceneSeconds:
             few = self.known[str(_FINISHED)]
         known |= timed(self.shot.path, self.window, samples, left, rounds, few)
         write_json(self._path, self.known)
+
+
+def per_frame(
+    known: Mapping[str, Timed], method: str, samples: int, radius: int
+) -> float | None:
+    """Seconds of a frame, on the line through the least and the most `known` samples.
+
+    None if nothing tells.
+    """
+    name = _name(method, radius)
+    seconds = {int(n): x[name]["total"] for n, x in known.items() if name in x}
+    if samples in seconds or len(seconds) < 2:
+        return seconds.get(samples)
+    few, many = min(seconds), max(seconds)
+    slope = (seconds[many] - seconds[few]) / (many - few)
+    return float(seconds[few] + max(slope, 0.0) * (samples - few))
 
 
 def timed(
