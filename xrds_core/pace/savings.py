@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from statistics import median
 
 _FRAMES = 5  # that are timed before anything is said
 LEAST = 0.1
@@ -60,9 +61,11 @@ class Savings:
 
     @property
     def seconds(self) -> tuple[float, float]:
-        """Seconds of a frame here, and about what Cycles with its denoiser takes."""
-        count = max(len(self._ours), 1)
-        return sum(self._ours) / count, sum(self._theirs) / count
+        """Seconds of a frame here, and about what Cycles with its denoiser takes.
+
+        Medians: a machine that stood still in one of the frames does not decide.
+        """
+        return median(self._ours or [0.0]), median(self._theirs or [0.0])
 
     @property
     def are_enough(self) -> bool:

@@ -47,3 +47,13 @@ def test_the_first_frames_do_not_count_once_it_is_measured_again() -> None:
             now += taken
             savings.add(now, FRAME, 0.5)
     assert savings.are_enough
+
+
+def test_a_machine_that_stood_still_does_not_decide() -> None:
+    savings, now = Savings(denoising=2.0), 0.0
+    savings.leave_out(now)
+    for pause in (0.0, 0.0, 600.0, 0.0, 0.0):
+        now += 5.0 + pause
+        savings.add(now, FRAME, 0.5)
+    assert savings.are_known
+    assert savings.are_enough
