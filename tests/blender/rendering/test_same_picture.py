@@ -19,6 +19,7 @@ from xrds_blender.cycles import settings
 from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
 from xrds_blender.rendering import sampling
+from xrds_blender.rendering.full_size import FullSize
 from xrds_blender.rendering.pace import measuring, more, obstacles, same_picture
 from xrds_blender.rendering.pace.more import measured_regions, pixels_of
 from xrds_blender.rendering.sampling import Sampled
@@ -388,6 +389,26 @@ def test_what_is_measured_is_the_picture(
     assert len(differences) == 2 * len(MEASURED)
     assert max(differences[::2]) == 0.0
     assert 0.0 < max(differences[1::2]) < 0.05  # the denoiser sees less
+
+
+def test_the_other_eye_is_a_neighbour_where_it_is_measured(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    bpy.context.scene.render.use_multiview = True
+    bpy.ops.wm.save_mainfile()
+    measured(monkeypatch, 0.5)
+    inner, lent = FullSize.accumulate, []
+
+    def noted(self: Any, own: Sampled, others: Any, view: str) -> Any:
+        found = inner(self, own, others, view)
+        if not others:
+            lent.append(float(found.samples.mean()) - own.views[view].samples)
+        return found
+
+    monkeypatch.setattr(FullSize, "accumulate", noted)
+    render(shot, "same")
+    assert lent == [0.0] * len(MEASURED)
 
 
 def test_a_part_is_measured_and_all_of_the_frame_gets_what_it_lacks(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -90,7 +91,9 @@ def measure(
     places = [pixels_of(region) for region in regions]
     # each part by itself, as the renders of all samples are
     together = np.concatenate([method.radiance(own, others, view, x) for x in places])
-    single = method.accumulate(own, [], view)
+    # of stereo, the other eye is a neighbour as well
+    by_itself = replace(own, views={view: own.views[view]})
+    single = method.accumulate(by_itself, [], view)
     assert single.radiance is not None
     guided = single.radiance, single.albedo, single.normal
     alone = [method.as_by_cycles(*(x[place] for x in guided)) for place in places]
