@@ -60,7 +60,7 @@ class FullSize(Method):
         self, scene: Any, shot: Shot, *, layers: int = 1, beside: Pace | None = None
     ) -> None:
         if self.request.deadline is None:
-            self.pace = same_picture(scene, self.request, len(shot.order))
+            self.pace = same_picture(scene, self.request, shot)
         elif isinstance(beside, Deadline):
             self.pace = beside
         else:
@@ -78,10 +78,11 @@ class FullSize(Method):
             return sample_frame(
                 engine, depsgraph, self.request, place, self._on_sampled
             )
+        number = depsgraph.scene_eval.frame_current
         # it may be sampled several times: Cycles must not free the dependency graph
         with LayerSession(engine, depsgraph):
             while True:
-                request = pace.request(self.request)
+                request = pace.request(self.request, number)
                 sampled = sample_frame(engine, depsgraph, request, place)
                 if pace.takes(self, sampled):
                     return sampled

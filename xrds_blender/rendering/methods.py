@@ -54,8 +54,8 @@ class Finishing(Protocol):
 class Pace(Protocol):
     """What chooses the samples of each frame of one shot, in the order of time."""
 
-    def request(self, request: Request) -> Request:
-        """The request of the next frame that is sampled."""
+    def request(self, request: Request, number: int) -> Request:
+        """The request of the next frame that is sampled, the one of this number."""
 
     def takes(self, method: Finishing, frame: Sampled) -> bool:
         """Note a frame that was sampled; False where it is to be sampled again."""

@@ -72,7 +72,7 @@ class Farm:
 
         def load(number: int) -> Sampled:
             while True:
-                samples = pace.request(request).settings.own_samples
+                samples = pace.request(request, 1).settings.own_samples
                 took = (self.start + samples * self.sample) * cost(number)
                 sync = self.sync if number else 0.0
                 self.now += took + sync

@@ -26,12 +26,14 @@ from xrds_blender.rendering.sampling import Sampled
 from xrds_core.accumulation.frame import Frame, Stored
 from xrds_core.pace.savings import Savings
 from xrds_core.pace.worth import FALL, Errors
+from xrds_core.shot import Shot
 
 pytestmark = pytest.mark.skipif(
     not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
 )
 FRAMES = [1, 2, 3, 4, 5, 6, 7]
 SAMPLES = 16
+LONG = Shot(tuple(range(1, 49)), 4, cuts=frozenset({31}))
 MEASURED = [1, 4]  # the first frame, and the first beyond its neighbours
 
 
@@ -113,7 +115,7 @@ def test_all_samples_are_taken_where_neighbours_are_of_no_use(
 
 
 def test_one_frame_that_needs_more_does_not_raise_those_of_the_rest() -> None:
-    pace = same_picture.SamePicture(SAMPLES, neighbours=8)
+    pace = same_picture.SamePicture(SAMPLES, shot=LONG)
     errors = errors_of(0.8)
     pace._worth.add(errors, share=0.375, gain=4.0, neighbours=8)
     shares = []
@@ -130,6 +132,20 @@ def test_one_frame_that_needs_more_does_not_raise_those_of_the_rest() -> None:
     for _ in range(4):
         pace._choose_next(1.2)
     assert pace.share == 1.0  # where nearly all are needed
+
+
+def test_frames_with_fewer_neighbours_take_more_at_once() -> None:
+    pace = same_picture.SamePicture(SAMPLES, shot=LONG, share=0.25)
+    assert pace._share_for(1) == 0.25  # nothing is known yet
+    pace._worth.add(errors_of(0.8), share=0.25, gain=6.0, neighbours=8)
+    pace._choose_next(6.0)
+    usual = pace.share
+    shares = [pace._share_for(number) for number in LONG.frames]
+    assert shares[4:26] == [usual] * 22
+    for end in (shares[26:30], shares[44:48]):  # before the cut, and at the end
+        assert usual <= end[0] <= end[1] <= end[2] <= end[3], shares
+        assert usual < end[3] < 1.0
+    assert shares[30:34] == shares[29:25:-1]  # after the cut as before it
 
 
 def test_all_samples_are_taken_where_fewer_are_hardly_sooner(
@@ -170,7 +186,7 @@ def test_it_is_measured_anew_after_a_cut(
 
 
 def test_a_frame_that_shows_something_new_is_told_by_what_neighbours_add() -> None:
-    pace = same_picture.SamePicture(SAMPLES, neighbours=8)
+    pace = same_picture.SamePicture(SAMPLES, shot=LONG)
     pace._gains.extend([6.0] * 4)
     own, beside = Sampled(30, {}, {}), [28, 29, 31, 32]
 
@@ -280,9 +296,9 @@ def test_what_is_told_is_what_a_frame_has() -> None:
 def test_few_samples_under_a_threshold_are_even(
     samples: float | None, share: float, expected: bool
 ) -> None:
-    pace = same_picture.SamePicture(4096, has_threshold=True, share=share)
+    pace = same_picture.SamePicture(4096, has_threshold=True)
     pace._asked = samples
-    assert pace._is_few() is expected
+    assert pace._is_few(share) is expected
 
 
 @pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--sample-cache c"])

@@ -65,8 +65,8 @@ class Deadline:
     _rendered: float = 0.0  # seconds of renders since then
     _is_late: bool = False  # and that was said
 
-    def request(self, request: Request) -> Request:
-        """The request of the next frame that is sampled."""
+    def request(self, request: Request, number: int) -> Request:
+        """The request of the next frame that is sampled, whatever its number."""
         if not self.samples:
             return request.with_settings(samples=self._try)
         if self.continues:

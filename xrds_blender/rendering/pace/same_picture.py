@@ -24,6 +24,7 @@ from xrds_core.pace.error import gain
 from xrds_core.pace.history import History
 from xrds_core.pace.savings import Savings
 from xrds_core.pace.worth import Worth
+from xrds_core.shot import Shot
 
 from ...cycles.settings import LOOKS_EVERY
 from ...planning.plan import SAME_PICTURE, Decision
@@ -56,18 +57,15 @@ _ALL = 0.8
 _USEFUL = 0.25
 
 
-def same_picture(scene: Any, request: Request, frames: int) -> SamePicture | None:
-    """What chooses the samples of a shot of so many frames.
-
-    None where frames have what the request says.
-    """
-    if not can_save(scene, request, frames):
+def same_picture(scene: Any, request: Request, shot: Shot) -> SamePicture | None:
+    """What chooses the samples of a shot; None where frames have what is requested."""
+    if not can_save(scene, request, len(shot.order)):
         return None
     history = History() if can_continue(scene, request) else None
     pace = SamePicture(
         scene.cycles.samples,
         history,
-        neighbours=2 * request.settings.temporal_radius,
+        shot=shot,
         exposure=2.0**scene.view_settings.exposure,
         has_threshold=not is_even(scene, request),
         moves=not stands_still(scene.camera),
@@ -83,14 +81,14 @@ class SamePicture:
     `samples` are the file's, where it `has_threshold` the most that a pixel takes.
     Under a camera that stands still, and never `moves`, frames that have left the
     window count, as `history`. The next frame to be sampled takes a `share` of what the
-    file does. Frames have so many `neighbours`, but fewer near the ends of the shot.
-    White is a luminance of 1 / `exposure`.
+    file does, more near the ends of the `shot`, where it has fewer neighbours. White is
+    a luminance of 1 / `exposure`.
     """
 
     samples: int
     history: History | None = None
     share: float = _FIRST
-    neighbours: int = 0
+    shot: Shot = field(default_factory=partial(Shot, (), 0))
     exposure: float = 1.0
     has_threshold: bool = False
     moves: bool = True
@@ -106,22 +104,22 @@ class SamePicture:
     # of frames: what all pixels have, with what was measured by where that was done
     _shares: dict[int, float] = field(default_factory=dict)
     _gains: deque[float] = field(default_factory=partial(deque, maxlen=_LAST))
-    _newest: int = 0  # samples of the frame that was sampled last
+    _requested: float = _FIRST  # the share of the frame that was sampled last
     _taken: int = 0  # of the sequence that frames continue under a still camera
     _taken_more: int = 0  # of that of more samples
 
-    def request(self, request: Request) -> Request:
+    def request(self, request: Request, number: int) -> Request:
         """The request of the next frame that is sampled."""
-        if self._is_few():
-            return request.with_settings(samples=self._of_file, share=self.share)
+        self._requested = share = self._share_for(number)
+        if self._is_few(share):
+            return request.with_settings(samples=self._of_file, share=share)
         begin = None if self.history is None else self._taken
-        return request.with_settings(share=self.share, begin=begin)
+        return request.with_settings(share=share, begin=begin)
 
     def takes(self, method: Finishing, frame: Sampled) -> bool:
-        """Note that a frame was sampled with the present share."""
-        self._shares[frame.number] = self._share(frame, self.share)
-        self._newest = round(self.samples * self.share)
-        self._taken += self._newest
+        """Note that a frame was sampled as requested."""
+        self._shares[frame.number] = self._share(frame, self._requested)
+        self._taken += round(self.samples * self._requested)
         return True
 
     def complete(
@@ -202,13 +200,13 @@ class SamePicture:
         """Samples of the file's frames, on the mean of their pixels."""
         return self.samples if self._asked is None else round(self._asked)
 
-    def _is_few(self) -> bool:
-        """Whether the next frame takes even samples, of a file with a threshold.
+    def _is_few(self, share: float) -> bool:
+        """Whether a frame takes even samples, of a file with a threshold.
 
         Under a camera that stands still its samples would be of another sequence.
         """
         asked = self._asked
-        return self.moves and asked is not None and self.share * asked < _FEW
+        return self.moves and asked is not None and share * asked < _FEW
 
     def _share(self, frame: Sampled, asked: float) -> float:
         """What a frame has of the file's samples.
@@ -289,7 +287,8 @@ class SamePicture:
         """So many more samples of a whole frame."""
         begin = None if self.history is None else self._taken_more
         self._taken_more += length
-        return Part(length, length / self.samples, None, begin, self._newest)
+        at_once = round(self.samples * self._requested)
+        return Part(length, length / self.samples, None, begin, at_once)
 
     def _lent(self, share: float, others: Sequence[int]) -> float:
         """What neighbours will lend if all frames have a `share`, over what they do.
@@ -299,7 +298,7 @@ class SamePicture:
         beside = [self._shares.get(number, 1.0) for number in others]
         if not beside:
             return 1.0
-        more = max(self.neighbours / len(beside), 1.0)
+        more = max(2 * self.shot.radius / len(beside), 1.0)
         return share / float(np.mean(beside)) * more
 
     def _choose_next(self, gain: float) -> None:
@@ -315,6 +314,17 @@ class SamePicture:
         needed = max(needed, least, self.share * _FALL)
         if not _TOO_MUCH <= needed / self.share <= 1.0:
             self.share = self.possible(needed)
+
+    def _share_for(self, number: int) -> float:
+        """The share of a frame, more where it has fewer neighbours than others.
+
+        What it lacked afterwards would be of another sequence, which is worth less.
+        """
+        has = len(self.shot.neighbours(number)) / max(2 * self.shot.radius, 1)
+        if not self._gains or has >= 1.0:
+            return self.share
+        gain = 1.0 + (float(np.mean(self._gains)) - 1.0) * has
+        return max(self.share, self.possible(1.0 / self._equal(1.0, gain)))
 
     def possible(self, share: float) -> float:
         """The next share of whole samples."""
