@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -183,6 +184,36 @@ def test_it_is_measured_anew_after_a_cut(
     monkeypatch.setattr(same_picture, "measure", noted)
     render(shot, "same")
     assert found == [1, 4]
+
+
+def test_the_last_frames_show_nothing_new(
+    shot: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They gain less, for they have more samples of their own and fewer neighbours."""
+    frames = [*range(1, 18)]
+    monkeypatch.setattr(sys.modules[__name__], "FRAMES", frames)
+    monkeypatch.setattr(Savings, "are_known", False)  # whatever the clock says
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    for obj in bpy.data.objects:  # no frame is unlike another
+        obj.animation_data_clear()
+    camera = bpy.context.scene.camera
+    for number in (1, 40):
+        camera.location.x += 0.01
+        camera.keyframe_insert("location", frame=number)
+    bpy.context.scene.frame_end = frames[-1]
+    bpy.ops.wm.save_mainfile()
+    measured(monkeypatch, 0.5)
+    found: list[int] = []
+    inner = same_picture.measure
+
+    def noted(method: Any, own: Sampled, *more: Any) -> Any:
+        found.append(own.number)
+        return inner(method, own, *more)
+
+    monkeypatch.setattr(same_picture, "measure", noted)
+    made = render(shot, "same", temporal_radius=4)
+    assert made[-1]["share"] > made[8]["share"]
+    assert found == [1, 6]
 
 
 def test_a_frame_that_shows_something_new_is_told_by_what_neighbours_add() -> None:

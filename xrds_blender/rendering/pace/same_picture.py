@@ -137,7 +137,10 @@ class SamePicture:
         gained = gain(gathered[view], frame)
         spent = {"accumulate": time.perf_counter() - started}
         render = partial(_rendered, more, spent)
-        if self._is_new(own, beside, gained):
+        share = self._shares.get(own.number, 1.0)
+        lent = self._lent(share, beside)  # among frames of its own share
+        even = gained if lent == 1.0 else gain(gathered[view], frame, lent)
+        if self._is_new(own, beside, even):
             self._worth = Worth()
         extra: list[Extra] = []
         is_whole = False  # measured in all of it, which has all samples then
@@ -152,9 +155,7 @@ class SamePicture:
             self._learn(own, measured, gained, len(beside))
             is_whole = bool(measured.asked.all())
             beyond = 2.0 * float(measured.asked.mean()) / self._of_file
-        share = self._shares.get(own.number, 1.0)
-        lent = self._lent(share, beside)  # among frames of its own share
-        even = gained if lent == 1.0 else gain(gathered[view], frame, lent)
+            share = self._shares.get(own.number, share)  # of a threshold known now
         self._choose_next(even)
         missing = 0 if is_whole else self._missing(share, gained)
         if missing:
@@ -172,12 +173,15 @@ class SamePicture:
             decisions=(self._decision(share),),
         )
 
-    def _is_new(self, own: Sampled, beside: Sequence[int], gained: float) -> bool:
-        """Whether a frame shows something else than those before it, as after a cut."""
+    def _is_new(self, own: Sampled, beside: Sequence[int], even: float) -> bool:
+        """Whether a frame shows something else than those before it, as after a cut.
+
+        `even` is what it gains among frames of its own share.
+        """
         if not beside or own.number < min(beside):
             return bool(beside)
         usual = np.mean(self._gains) if self._gains else 0.0
-        is_less = gained < _CHANGED * usual
+        is_less = even < _CHANGED * usual
         return bool(is_less) and self._worth.is_old
 
     def _before(self, own: Sampled, others: Sequence[Sampled]) -> list[Sampled]:
