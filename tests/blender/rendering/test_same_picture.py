@@ -25,6 +25,7 @@ from xrds_blender.rendering.pace import measuring, more, obstacles, same_picture
 from xrds_blender.rendering.pace.more import measured_regions, pixels_of
 from xrds_blender.rendering.sampling import Sampled
 from xrds_core.accumulation.frame import Frame, Stored
+from xrds_core.pace.history import History
 from xrds_core.pace.savings import Savings
 from xrds_core.pace.worth import FALL, Errors
 from xrds_core.shot import Shot
@@ -147,6 +148,8 @@ def test_frames_with_fewer_neighbours_take_more_at_once() -> None:
         assert usual <= end[0] <= end[1] <= end[2] <= end[3], shares
         assert usual < end[3] < 1.0
     assert shares[30:34] == shares[29:25:-1]  # after the cut as before it
+    pace.history = History()  # frames before the window count as well
+    assert {pace._share_for(number) for number in LONG.frames} == {usual}
 
 
 def test_all_samples_are_taken_where_fewer_are_hardly_sooner(

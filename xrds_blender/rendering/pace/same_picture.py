@@ -322,10 +322,11 @@ class SamePicture:
     def _share_for(self, number: int) -> float:
         """The share of a frame, more where it has fewer neighbours than others.
 
-        What it lacked afterwards would be of another sequence, which is worth less.
+        What it lacked afterwards would be of another sequence, which is worth less. As
+        `history`, frames before the window make up for those that are missing.
         """
         has = len(self.shot.neighbours(number)) / max(2 * self.shot.radius, 1)
-        if not self._gains or has >= 1.0:
+        if not self._gains or has >= 1.0 or self.history is not None:
             return self.share
         gain = 1.0 + (float(np.mean(self._gains)) - 1.0) * has
         return max(self.share, self.possible(1.0 / self._equal(1.0, gain)))
