@@ -31,9 +31,7 @@ Rectangle = tuple[slice, slice]
 """Rows and columns."""
 
 
-def rectangles(
-    blocks: NDArray[np.bool_], call: float = 0.0, most: int = 4
-) -> list[Rectangle]:
+def rectangles(blocks: NDArray[np.bool_], most: int = 4) -> list[Rectangle]:
     """Cover marked blocks with a few rectangles.
 
     The rectangle that gains most by it is divided in two, as long as that leaves out a
@@ -43,8 +41,6 @@ def rectangles(
     ----------
     blocks : (rows, columns) bool array
         The marked blocks.
-    call : float
-        Cost of one more rectangle, in blocks; a division has to leave out as many.
     most : int
         Most rectangles to return.
 
@@ -57,7 +53,7 @@ def rectangles(
     while areas and len(areas) < most:
         splits = [(_split_in_two(blocks, area), area) for area in areas]
         (parts, gain), divided = max(splits, key=lambda split: split[0][1])
-        if not parts or gain < max(0.25 * _blocks_in(divided), call):
+        if not parts or gain < 0.25 * _blocks_in(divided):
             break
         areas.remove(divided)
         areas += parts
