@@ -59,7 +59,6 @@ def _equal_seconds(results: Results) -> Figures:
         ("equal", results.equal_seconds),
         ("equal.all", results.equal_seconds_of_all),
     ):
-        found[f"{of}.scenes"] = len({x["scene"] for x in known})
         for samples in {x["samples"] for x in known}:
             rows = only(known, samples=samples)
             name = f"{of}.{samples}"

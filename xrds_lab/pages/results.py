@@ -35,6 +35,14 @@ _UNLIT = 90.0  # dB: the PSNR of a part without light
 _NAMES = {"bmw27": "car", "crystal-cave": "cave"}
 
 
+def largest(rows: Rows) -> Rows:
+    """Return of each scene and number of samples the row of the largest pictures."""
+    found = {}
+    for row in sorted(rows, key=lambda x: int(x["size"].partition("x")[0])):
+        found[row["scene"], row["samples"], row["noise_threshold"]] = row
+    return list(found.values())
+
+
 def _compared(entries: Rows) -> Rows:
     """Those at the seconds of Cycles + OIDN that have a gain."""
     found = only(entries, motion="pan", at=DEFAULT)

@@ -10,14 +10,11 @@ import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from statistics import fmean
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from xrds_blender.planning.shot_figures import FILE
 
-from .results import Results, only
-
-if TYPE_CHECKING:
-    from .results import Rows
+from .results import Results, largest, only
 
 ROOT = Path(__file__).resolve().parents[2]
 _LAST = 128  # samples of most references in `by-samples.json`
@@ -31,7 +28,7 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
     # flicker is judged in the gallery where the camera stands still
     flicker = [x for x in results.gallery if x["flicker"] is not None]
     stills = {x["shot"] for x in flicker}
-    same = _largest(only(results.same_picture, method="same_picture", motion="pan"))
+    same = largest(only(results.same_picture, method="same_picture", motion="pan"))
     even = [x for x in same if not x["noise_threshold"]]
     noisy = [x for x in same if x["noise_threshold"]]
     locked = results.read("shots/locked-off.json")
@@ -75,14 +72,6 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
         "accumulate": _accumulating(results),
         "again": _mean(x["twice"] > 0.0 for x in gallery),
     }
-
-
-def _largest(rows: Rows) -> Rows:
-    """Of each scene and number of samples the row of the largest pictures."""
-    found = {}
-    for row in sorted(rows, key=lambda x: int(x["size"].partition("x")[0])):
-        found[row["scene"], row["samples"], row["noise_threshold"]] = row
-    return list(found.values())
 
 
 _NEIGHBOURS = 8

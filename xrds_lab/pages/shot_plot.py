@@ -11,7 +11,7 @@ from xrds_core.files import replacing
 from ..shots.frames import REACH
 from ..shots.methods import CYCLES, DEFAULT, MEDIAN, NL_MEANS, SAME_PICTURE, XRDS
 from ..shots.plot import error_plot
-from .results import only
+from .results import largest, only
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -55,9 +55,9 @@ def _sooner(rows: Rows, points: Rows) -> Rows:
     They take the seconds of a shot's frame of their samples. They were judged in other
     windows: differences and ratios are taken over, those of the largest pictures.
     """
-    found = {}
+    found = []
     ours = only(rows, method=SAME_PICTURE, motion=MOTION, noise_threshold=None)
-    for own in sorted(ours, key=lambda x: int(x["size"].partition("x")[0])):
+    for own in largest(ours):
         here = only(points, scene=own["scene"])
         shot = only(here, method=XRDS, radius=REACH)
         timed = sorted(
@@ -71,11 +71,14 @@ def _sooner(rows: Rows, points: Rows) -> Rows:
         same = {x: own[x] for x in ("scene", "samples", "motion", "noise_threshold")}
         (alone,) = only(rows, method=CYCLES, size=own["size"], **same)
         taken = own["late_share"] * own["samples"]
-        found[own["scene"], own["samples"]] = usual[0] | {
-            "method": SAME_PICTURE,
-            "radius": REACH,
-            "seconds_per_frame": float(np.interp(taken, *zip(*timed, strict=True))),
-            "psnr": usual[0]["psnr"] + own["gain"],
-            "flicker": usual[0]["flicker"] * own["flicker"] / alone["flicker"],
-        }
-    return list(found.values())
+        found.append(
+            usual[0]
+            | {
+                "method": SAME_PICTURE,
+                "radius": REACH,
+                "seconds_per_frame": float(np.interp(taken, *zip(*timed, strict=True))),
+                "psnr": usual[0]["psnr"] + own["gain"],
+                "flicker": usual[0]["flicker"] * own["flicker"] / alone["flicker"],
+            }
+        )
+    return found

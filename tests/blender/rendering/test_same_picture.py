@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Sequence
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -51,10 +51,12 @@ def shot(blend: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return blend
 
 
-def render(blend: Path, out: str, **job: Any) -> list[dict[str, Any]]:
+def render(
+    blend: Path, out: str, frames: Sequence[int] = FRAMES, **job: Any
+) -> list[dict[str, Any]]:
     request = {"scale": 1, "temporal_radius": 2, "same_picture": True} | job
     pattern = str(blend.parent / out / "#.exr")
-    result = render_file(blend, pattern, render_request(**request), frames=FRAMES)
+    result = render_file(blend, pattern, render_request(**request), frames=frames)
     return result["frames"]
 
 
@@ -84,6 +86,19 @@ def measured(monkeypatch: pytest.MonkeyPatch, ratio: float) -> list[tuple[int, i
 
     monkeypatch.setattr(more, "more_samples", noted)
     return lengths
+
+
+def measured_in(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The frames that will have been measured in."""
+    found: list[int] = []
+    inner = same_picture.measure
+
+    def noted(method: Any, own: Sampled, *more: Any) -> Any:
+        found.append(own.number)
+        return inner(method, own, *more)
+
+    monkeypatch.setattr(same_picture, "measure", noted)
+    return found
 
 
 def test_fewer_samples_are_taken_where_they_are_enough(
@@ -177,14 +192,7 @@ def test_it_is_measured_anew_after_a_cut(
     scene.timeline_markers.new("two", frame=4).camera = other
     bpy.ops.wm.save_mainfile()
     measured(monkeypatch, 0.5)
-    found: list[int] = []
-    inner = same_picture.measure
-
-    def noted(method: Any, own: Sampled, *more: Any) -> Any:
-        found.append(own.number)
-        return inner(method, own, *more)
-
-    monkeypatch.setattr(same_picture, "measure", noted)
+    found = measured_in(monkeypatch)
     render(shot, "same")
     assert found == [1, 4]
 
@@ -194,7 +202,6 @@ def test_the_last_frames_show_nothing_new(
 ) -> None:
     """They gain less, for they have more samples of their own and fewer neighbours."""
     frames = [*range(1, 18)]
-    monkeypatch.setattr(sys.modules[__name__], "FRAMES", frames)
     monkeypatch.setattr(Savings, "are_known", False)  # whatever the clock says
     bpy.ops.wm.open_mainfile(filepath=str(shot))
     for obj in bpy.data.objects:  # no frame is unlike another
@@ -206,15 +213,8 @@ def test_the_last_frames_show_nothing_new(
     bpy.context.scene.frame_end = frames[-1]
     bpy.ops.wm.save_mainfile()
     measured(monkeypatch, 0.5)
-    found: list[int] = []
-    inner = same_picture.measure
-
-    def noted(method: Any, own: Sampled, *more: Any) -> Any:
-        found.append(own.number)
-        return inner(method, own, *more)
-
-    monkeypatch.setattr(same_picture, "measure", noted)
-    made = render(shot, "same", temporal_radius=4)
+    found = measured_in(monkeypatch)
+    made = render(shot, "same", frames, temporal_radius=4)
     assert made[-1]["share"] > made[8]["share"]
     assert found == [1, 6]
 
@@ -333,6 +333,17 @@ def test_few_samples_under_a_threshold_are_even(
     pace = same_picture.SamePicture(4096, has_threshold=True)
     pace._asked = samples
     assert pace._is_few(share) is expected
+
+
+def test_what_was_not_measured_says_nothing_of_a_threshold() -> None:
+    pace = same_picture.SamePicture(4096, has_threshold=True)
+    asked = np.zeros((64, 192), np.float32)
+    asked[:, :64] = 96.0
+    frame = SimpleNamespace(samples=24.0, shape=asked.shape)
+    found = measuring.Measured(errors_of(0.5), [], 0.1, asked)
+    pace._learn(Sampled(1, {"": frame}, {}), found, 4.0, 8)
+    assert pace._asked == 96.0
+    assert pace._shares[1] == 0.25
 
 
 @pytest.mark.parametrize("what", ["--samples 4", "--scale 2", "--sample-cache c"])
