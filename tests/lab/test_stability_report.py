@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -65,6 +66,18 @@ def test_a_second_run_adds_to_the_first(
     values = {c["value"] for c in both["checks"] if c["name"] == "energy.smooth"}
     assert values == {0.5}
     assert both["curves"] == first["curves"]
+
+
+def test_what_blender_prints_is_kept_in_a_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def loud(subject: Subject) -> Iterator[Measured]:
+        os.write(1, b"Fra:1\n")  # as a library in C does
+        yield from even(subject)
+
+    measure(monkeypatch, tmp_path, loud)
+    assert "Fra:1" in (tmp_path / "blender.log").read_text()
+    assert "Fra:1" not in capfd.readouterr().out
 
 
 def test_other_weights_start_anew(

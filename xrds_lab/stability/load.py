@@ -7,7 +7,6 @@ long shot is.
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 import time
@@ -77,8 +76,6 @@ def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
     """Growth over a shot; only in fp32, for its network is the same for Blender."""
     if subject.precision != "fp32":
         return
-    from xrds_blender.command.console import stdout_to
-
     from .stiff_scenes import build
 
     scene = build("one_sample", SIDE)
@@ -86,16 +83,15 @@ def load(subject: Subject, weights: Path | None) -> Iterator[Measured]:
     for frame, angle in ((1, 0.0), (FRAMES, 6.0)):
         thing.rotation_euler[2] = angle
         thing.keyframe_insert("rotation_euler", frame=frame)
-    with stdout_to(Path(os.devnull)):  # Blender prints a line for every sample
-        frames = drive(
-            scene,
-            FRAMES,
-            scale=subject.scale,
-            samples=2,
-            preset=subject.preset,
-            device=subject.device,
-            weights=weights,
-        )
+    frames = drive(
+        scene,
+        FRAMES,
+        scale=subject.scale,
+        samples=2,
+        preset=subject.preset,
+        device=subject.device,
+        weights=weights,
+    )
     frames = settled(frames)
     memory = [frame.memory / 2**10 for frame in frames]
     numbers = range(FRAMES - len(frames) + 1, FRAMES + 1)

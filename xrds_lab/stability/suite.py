@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import xrds_core
+from xrds_blender.command import console
 from xrds_core.errors import UsageError
 from xrds_core.files import read_json, write_json
 from xrds_core.progress import Clock
@@ -81,7 +82,8 @@ def stability(
         weights: a folder of presets in place of the shipped.
         quick: of the networks `fast` x2 in single precision alone.
         resume: leave out what the same code and weights have measured into `out`.
-        progress: gets a line of text, with the time left, after every check.
+        progress: gets a line of text, with the time left, after every check. What is
+            printed on stdout goes to `out`/blender.log.
 
     Values of the same weights that `out` holds from an earlier run, as of other
     parts, stay in the report. Raises UsageError for unknown parts, WeightsError for
@@ -122,7 +124,9 @@ def stability(
 
     clock = Clock()
     for number, (subject, name, work) in enumerate(todo, start=1):
-        for check, measured in checks(subject, work):
+        with console.stdout_to(out / "blender.log"):  # it prints every sample
+            judged = list(checks(subject, work))
+        for check, measured in judged:
             verdicts[check.name, subject.name] = check
             if measured.curve:
                 curves[check.name, subject.name] = measured.curve
