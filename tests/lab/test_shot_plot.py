@@ -9,7 +9,7 @@ import pytest
 from xrds_lab.pages import shot_plot
 from xrds_lab.pages.results import Results
 from xrds_lab.shots.frames import REACH
-from xrds_lab.shots.methods import DEFAULT, MEDIAN, SAME_PICTURE, XRDS
+from xrds_lab.shots.methods import DEFAULT, MEDIAN, SAME_PICTURE, THRESHOLD, XRDS
 from xrds_lab.shots.plot import LINES
 
 RESULTS = Path(__file__).resolve().parents[2] / "docs/results"
@@ -53,6 +53,26 @@ def test_same_picture_lies_where_its_share_and_gain_put_it() -> None:
     assert (found["seconds_per_frame"], found["psnr"]) == (8.0, 30.5)  # of 4 samples
     assert found["flicker"] == pytest.approx(0.01)
     assert (found["method"], found["radius"]) in LINES
+
+
+def test_a_threshold_relates_to_even_samples_as_in_the_windows_of_both() -> None:
+    what = {"scene": "cubes", "motion": "pan", "size": "64x48"}
+    cycles = {"method": "cycles_oidn", "noise_threshold": None}
+    few = {"samples": 4, "psnr": 0.0, "flicker": 1.0, "processor_seconds": 1.0}
+    most = {"samples": 16, "psnr": 33.0, "flicker": 0.04, "processor_seconds": 8.0}
+    asked = {"noise_threshold": 0.1, "samples": 4096}
+    far = {"psnr": 35.0, "flicker": 0.02, "processor_seconds": 24.0}
+    ours = {"late_ratio": 0.5, "gain": 1.0, "flicker": 0.01}
+    rows = [what | cycles | few, what | cycles | most, what | cycles | asked | far]
+    rows.append(what | asked | ours | {"method": SAME_PICTURE})
+    theirs, own = shot_plot._adaptive(rows, [point(DEFAULT, 12.0)])
+    assert (theirs["seconds_per_frame"], theirs["psnr"]) == (36.0, 32.0)
+    assert (own["seconds_per_frame"], own["psnr"]) == (18.0, 33.0)
+    assert theirs["flicker"] == pytest.approx(0.01)
+    assert own["flicker"] == pytest.approx(0.005)
+    for found, method in ((theirs, THRESHOLD), (own, SAME_PICTURE)):
+        assert found["method"] == method
+        assert (method, found["radius"]) in LINES
 
 
 def test_results_without_shots_are_told(tmp_path: Path) -> None:

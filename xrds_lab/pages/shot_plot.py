@@ -9,7 +9,15 @@ import numpy as np
 from xrds_core.files import replacing
 
 from ..shots.frames import REACH
-from ..shots.methods import CYCLES, DEFAULT, MEDIAN, NL_MEANS, SAME_PICTURE, XRDS
+from ..shots.methods import (
+    CYCLES,
+    DEFAULT,
+    MEDIAN,
+    NL_MEANS,
+    SAME_PICTURE,
+    THRESHOLD,
+    XRDS,
+)
 from ..shots.plot import error_plot
 from .results import largest, only
 
@@ -30,6 +38,7 @@ def draw(results: Results, path: Path) -> None:
     cycles = {(x["scene"], x["samples"]): x for x in only(points, method=DEFAULT)}
     shown = [_priced(x, cycles) for x in points]
     shown += _sooner(results.same_picture, points)
+    shown += _adaptive(results.same_picture, points)
     size = results.shots["settings"]["seconds_resolution"]
     svg = error_plot(shown, MOTION, size)
     if svg is None:
@@ -68,17 +77,59 @@ def _sooner(rows: Rows, points: Rows) -> Rows:
         usual = only(here, method=DEFAULT, samples=own["samples"])
         if not (timed and usual):
             continue
-        same = {x: own[x] for x in ("scene", "samples", "motion", "noise_threshold")}
-        (alone,) = only(rows, method=CYCLES, size=own["size"], **same)
         taken = own["late_share"] * own["samples"]
-        found.append(
-            usual[0]
-            | {
-                "method": SAME_PICTURE,
-                "radius": REACH,
-                "seconds_per_frame": float(np.interp(taken, *zip(*timed, strict=True))),
-                "psnr": usual[0]["psnr"] + own["gain"],
-                "flicker": usual[0]["flicker"] * own["flicker"] / alone["flicker"],
-            }
-        )
+        seconds = float(np.interp(taken, *zip(*timed, strict=True)))
+        found.append(_same(own, _of_cycles(rows, own), usual[0], seconds))
     return found
+
+
+def _adaptive(rows: Rows, points: Rows) -> Rows:
+    """Cycles + OIDN and *Same Picture* with a noise threshold, beside the points.
+
+    Where the same windows were rendered without one, of the most samples there: errors
+    and seconds relate to those of Cycles + OIDN as they do there.
+    """
+    found = []
+    for own in only(rows, method=SAME_PICTURE, motion=MOTION):
+        place = {name: own[name] for name in ("scene", "motion", "size")}
+        even = only(rows, method=CYCLES, noise_threshold=None, **place)
+        if own["noise_threshold"] is None or not even:
+            continue
+        most = max(even, key=lambda x: x["samples"])
+        usual = only(
+            points, scene=own["scene"], method=DEFAULT, samples=most["samples"]
+        )
+        if not (usual and usual[0]["seconds_per_frame"]):
+            continue
+        cycles = _of_cycles(rows, own)
+        seconds = usual[0]["seconds_per_frame"]
+        seconds *= cycles["processor_seconds"] / most["processor_seconds"]
+        there = usual[0] | {
+            "method": THRESHOLD,
+            "samples": own["samples"],
+            "seconds_per_frame": seconds,
+            "psnr": usual[0]["psnr"] + cycles["psnr"] - most["psnr"],
+            "flicker": usual[0]["flicker"] * cycles["flicker"] / most["flicker"],
+        }
+        found += [there, _same(own, cycles, there, seconds * own["late_ratio"])]
+    return found
+
+
+def _of_cycles(rows: Rows, own: dict[str, Any]) -> dict[str, Any]:
+    """The row that one of *Same Picture* is compared with."""
+    names = ("scene", "samples", "motion", "noise_threshold", "size")
+    (cycles,) = only(rows, method=CYCLES, **{x: own[x] for x in names})
+    return cycles
+
+
+def _same(
+    own: dict[str, Any], cycles: dict[str, Any], beside: dict[str, Any], seconds: float
+) -> dict[str, Any]:
+    """*Same Picture* beside a point of Cycles + OIDN."""
+    return beside | {
+        "method": SAME_PICTURE,
+        "radius": REACH,
+        "seconds_per_frame": seconds,
+        "psnr": beside["psnr"] + own["gain"],
+        "flicker": beside["flicker"] * own["flicker"] / cycles["flicker"],
+    }

@@ -8,7 +8,15 @@ import numpy as np
 
 from ..bench.plots import svg_of, two_panels
 from .frames import REACH
-from .methods import BEST, DEFAULT, MEDIAN, NL_MEANS, SAME_PICTURE, XRDS
+from .methods import (
+    BEST,
+    DEFAULT,
+    MEDIAN,
+    NL_MEANS,
+    SAME_PICTURE,
+    THRESHOLD,
+    XRDS,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +27,7 @@ if TYPE_CHECKING:
 LINES = {
     (DEFAULT, 0): ("Cycles + OIDN", "#d55e00", "--", "s"),
     (BEST, 0): ("Cycles + OIDN, best mode", "#000000", "-", "o"),
+    (THRESHOLD, 0): ("Cycles + OIDN, threshold 0.1", "#d55e00", "", "X"),
     (MEDIAN, 1): ("median of three", "#cc79a7", "-.", "^"),
     (NL_MEANS, 1): ("non-local means", "#999999", ":", "x"),
     (XRDS, 0): ("XRDS, the frame alone", "#e69f00", ":", "P"),
