@@ -163,6 +163,11 @@ def test_frames_with_fewer_neighbours_take_more_at_once() -> None:
         assert usual <= end[0] <= end[1] <= end[2] <= end[3], shares
         assert usual < end[3] < 1.0
     assert shares[30:34] == shares[29:25:-1]  # after the cut as before it
+    lent = pace._equal(usual, 6.0) - usual  # by neighbours with the share of others
+    for missing, share in enumerate(shares[44:48], start=1):
+        equal = share + (8 - missing) / 8 * lent
+        assert equal >= 1.0, shares
+        assert share == usual or equal < 1.0 + 1.0 / SAMPLES, shares
     pace.history = History()  # frames before the window count as well
     assert {pace._share_for(number) for number in LONG.frames} == {usual}
 

@@ -328,8 +328,10 @@ class SamePicture:
         has = len(self.shot.neighbours(number)) / max(2 * self.shot.radius, 1)
         if not self._gains or has >= 1.0 or self.history is not None:
             return self.share
-        gain = 1.0 + (float(np.mean(self._gains)) - 1.0) * has
-        return max(self.share, self.possible(1.0 / self._equal(1.0, gain)))
+        # most of those that there are have no more samples than others
+        usual = self._equal(self.share, float(np.mean(self._gains)))
+        lent = has * (usual - self.share)
+        return max(self.share, self.possible(1.0 - lent))
 
     def possible(self, share: float) -> float:
         """The next share of whole samples."""
