@@ -70,6 +70,12 @@ def test_what_was_not_measured_is_left_out() -> None:
     assert found(points, "psnr")["low"] is None  # one scene tells nothing of others
 
 
+def test_an_error_that_noise_hides_has_no_ratio() -> None:
+    points = [*pair("car", 1.0, relmse_trimmed=-1e-5), *pair("house", 1.0)]
+    assert found(points, "relmse_trimmed")["scenes"] == {"house": 1.0}
+    assert found(points, "psnr")["scenes"] == {"car": 1.0, "house": 1.0}
+
+
 def test_an_interval_is_that_of_the_mean_of_scenes() -> None:
     rng = np.random.default_rng(3)
     values = rng.normal(2.0, 1.0, 200)

@@ -76,13 +76,16 @@ def _shot(point: Point) -> tuple[Any, ...]:
 def _by_scene(
     pairs: Sequence[tuple[Point, Point]], measure: str
 ) -> dict[str, list[float]]:
-    """Differences of each scene, one for each seed: dB, or logarithms of a ratio."""
+    """Differences of each scene, one for each seed: dB, or logarithms of a ratio.
+
+    There is none of errors that the noise of references hides: they may be negative.
+    """
     scenes: dict[str, list[float]] = {}
     for own, rival in pairs:
         ours, theirs = own[measure], rival[measure]
         if measure == "psnr":
             scenes.setdefault(own["scene"], []).append(ours - theirs)
-        elif ours and theirs:
+        elif ours and theirs and min(ours, theirs) > 0.0:
             scenes.setdefault(own["scene"], []).append(math.log(ours / theirs))
     return scenes
 
