@@ -23,12 +23,11 @@ pytestmark = pytest.mark.nightly  # it takes minutes
 SIZE = (64, 48)
 
 
-def run(blend: Path, *cases: Case, frames: int = sooner.FRAMES) -> dict[str, Any]:
+def run(blend: Path, *cases: Case) -> dict[str, Any]:
     return sooner.bench_same_picture(
         [blend],
         blend.parent / "out",
         cases,
-        frames=frames,
         resolution=SIZE,
         reference_samples=64,
     )
@@ -52,6 +51,7 @@ def test_each_method_has_a_row_that_is_measured_once(
     assert all(row["seconds"] > 0 and row["psnr"] > 15 for row in rows.values())
     report = (blend.parent / "out" / "report.md").read_text()
     assert report.count("| cubes | 8 |") == 3
+    assert {row["frames"] for row in rows.values()} == {sooner.FRAMES}
 
     def refuse(*_: Any, **__: Any) -> None:
         raise AssertionError("measured again")
@@ -106,14 +106,16 @@ def test_a_larger_window_ends_where_the_frame_does(
 
 def test_a_card_that_is_not_here_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cycles, "find_card", lambda: cycles.CPU)
-    options = Namespace(card=True, motions=(), samples=(8,), noise_thresholds=None)
+    options = Namespace(
+        card=True, motions=(), samples=(8,), noise_thresholds=None, frames=21
+    )
     with pytest.raises(UsageError, match="no graphics card"):
         bench_shots._same_picture(options)
 
 
 def test_a_shot_that_is_too_short_is_refused(blend: Path) -> None:
     with pytest.raises(UsageError, match="8 frames"):
-        run(blend, Case("pan", 8), frames=8)
+        run(blend, Case("pan", 8, frames=8))
 
 
 def test_a_file_may_move_as_it_says(blend: Path) -> None:

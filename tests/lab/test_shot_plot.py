@@ -41,6 +41,7 @@ def test_what_is_made_of_cycles_frames_takes_their_seconds() -> None:
 
 def test_same_picture_lies_where_its_share_and_gain_put_it() -> None:
     row = {"scene": "cubes", "motion": "pan", "samples": 16, "noise_threshold": None}
+    row |= {"frames": 21}
     small = {"size": "64x48", "late_share": 0.9, "gain": -1.0, "flicker": 0.02}
     large = {"size": "128x96", "late_share": 0.25, "gain": 0.5, "flicker": 0.01}
     rows = [
@@ -56,7 +57,7 @@ def test_same_picture_lies_where_its_share_and_gain_put_it() -> None:
 
 
 def test_a_threshold_relates_to_even_samples_as_in_the_windows_of_both() -> None:
-    what = {"scene": "cubes", "motion": "pan", "size": "64x48"}
+    what = {"scene": "cubes", "motion": "pan", "size": "64x48", "frames": 21}
     cycles = {"method": "cycles_oidn", "noise_threshold": None}
     few = {"samples": 4, "psnr": 0.0, "flicker": 1.0, "processor_seconds": 1.0}
     most = {"samples": 16, "psnr": 33.0, "flicker": 0.04, "processor_seconds": 8.0}

@@ -75,6 +75,7 @@ def add_same_picture(benches: Any) -> argparse.ArgumentParser:
         type=arguments.factors,
         help="of Cycles' adaptive sampling, as 0.1; none",
     )
+    add("--frames", type=arguments.positive, default=21, help="of a shot; 21")
     add(
         "--card",
         action="store_true",
@@ -145,11 +146,11 @@ def _same_picture(options: argparse.Namespace) -> dict[str, Any]:
     thresholds = options.noise_thresholds or ()
     counts = options.samples or (() if thresholds else SAMPLES)
     cases = [
-        case
+        Case(*case, frames=options.frames)
         for motion in options.motions
         for case in (
-            *(Case(motion, samples) for samples in counts),
-            *(Case(motion, MOST_SAMPLES, threshold) for threshold in thresholds),
+            *((motion, samples, None) for samples in counts),
+            *((motion, MOST_SAMPLES, threshold) for threshold in thresholds),
         )
     ]
     device = find_card() if options.card else CPU

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..shots.frames import REACH
 from ..shots.methods import DEFAULT, XRDS
-from .results import OLD_PATTERN, beside_cycles, only
+from .results import LONG_SHOT, OLD_PATTERN, beside_cycles, only
 
 if TYPE_CHECKING:
     from .results import Results
@@ -20,6 +20,7 @@ def figures(results: Results) -> Figures:
     return {
         **_shots(results),
         **_equal_seconds(results),
+        **_same_picture(results),
         **_own_seconds(results),
         **_held_out(results),
         **_gallery(results),
@@ -75,6 +76,16 @@ def _equal_seconds(results: Results) -> Figures:
         rows = only(timed, method=method, radius=radius, motion="pan", samples=16)
         found[f"frame.{way}"] = median(x["seconds_per_frame"] for x in rows)
     return found
+
+
+def _same_picture(results: Results) -> Figures:
+    """Per cent of Cycles' processor seconds in a long shot: of all frames, and late."""
+    rows = only(results.same_picture, **LONG_SHOT)
+    return {
+        "same.scenes": len(rows),
+        "same.seconds": 100.0 * mean(x["processor_ratio"] for x in rows),
+        "same.late": 100.0 * mean(x["late_ratio"] for x in rows),
+    }
 
 
 def _own_seconds(results: Results) -> Figures:

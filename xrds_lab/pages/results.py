@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..shots import equal_seconds
 from ..shots.frames import REACH
-from ..shots.methods import DEFAULT, XRDS
+from ..shots.methods import DEFAULT, SAME_PICTURE, XRDS
 from ..shots.seconds import per_frame
 from ..shots.seeds import over_seeds
 
@@ -31,14 +31,30 @@ SCENES = (
 )
 OLD_PATTERN = ("bmw27", "crystal-cave")
 """Files with Cycles' classic sampling pattern, which XRDS replaces at full size."""
+SAME_CASE = ("scene", "motion", "samples", "noise_threshold", "frames", "size")
+"""What rows of *Same Picture* and of what it is compared with have in common."""
+LONG_SHOT = {
+    "method": SAME_PICTURE,
+    "motion": "pan",
+    "samples": 16,
+    "noise_threshold": None,
+    "frames": 49,
+    "size": "960x512",
+}
+"""The rows of *Same Picture* that the first page tells of, and what is left out."""
 _UNLIT = 90.0  # dB: the PSNR of a part without light
 _NAMES = {"bmw27": "car", "crystal-cave": "cave"}
 
 
 def largest(rows: Rows) -> Rows:
-    """Return of each scene and number of samples the row of the largest pictures."""
+    """Return of each scene and number of samples the row of the largest pictures.
+
+    Of these that of the longest shot.
+    """
     found = {}
-    for row in sorted(rows, key=lambda x: int(x["size"].partition("x")[0])):
+    for row in sorted(
+        rows, key=lambda x: (int(x["size"].partition("x")[0]), x["frames"])
+    ):
         found[row["scene"], row["samples"], row["noise_threshold"]] = row
     return list(found.values())
 

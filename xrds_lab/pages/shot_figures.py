@@ -14,7 +14,7 @@ from typing import Any
 
 from xrds_blender.planning.shot_figures import FILE
 
-from .results import Results, largest, only
+from .results import SAME_CASE, Results, largest, only
 
 ROOT = Path(__file__).resolve().parents[2]
 _LAST = 128  # samples of most references in `by-samples.json`
@@ -40,7 +40,7 @@ def figures(root: Path = ROOT) -> dict[str, Any]:
             "gain: gallery of small shots, 320x180, middle frame of nine beside the "
             "frame alone; flicker: the gallery's under a camera that stands still, "
             "seven scenes under one that pans, along its motion; share: Same Picture, "
-            "late frames of 21 under a camera that pans; accumulate: 1080p"
+            "late frames of a shot under a camera that pans; accumulate: 1080p"
         ),
         "moving": {
             "gain": _means(
@@ -91,9 +91,8 @@ def _mean(values: Iterable[float]) -> float:
 
 def _flicker_ratios(rows: list[Any], ours: list[Any]) -> Iterable[float]:
     """Yield flicker beside that of Cycles + OIDN with the file's samples."""
-    names = ("scene", "motion", "samples", "noise_threshold", "size")
     for row in ours:
-        same = {name: row[name] for name in names}
+        same = {name: row[name] for name in SAME_CASE}
         (cycles,) = only(rows, method="cycles_oidn", **same)
         yield row["flicker"] / cycles["flicker"]
 

@@ -19,7 +19,7 @@ from ..shots.methods import (
     XRDS,
 )
 from ..shots.plot import error_plot
-from .results import largest, only
+from .results import SAME_CASE, largest, only
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,11 +30,15 @@ MOTION = "pan"
 
 
 def draw(results: Results, path: Path) -> None:
-    """Write the figure as SVG.
+    """Write the figure as SVG: of XRDS the frame alone and the usual radius.
 
     Raises ValueError where there are no shots.
     """
-    points = only(results.shots["shots"], motion=MOTION)
+    points = [
+        x
+        for x in only(results.shots["shots"], motion=MOTION)
+        if x["method"] != XRDS or x["radius"] in (0, REACH)
+    ]
     cycles = {(x["scene"], x["samples"]): x for x in only(points, method=DEFAULT)}
     shown = [_priced(x, cycles) for x in points]
     shown += _sooner(results.same_picture, points)
@@ -117,8 +121,7 @@ def _adaptive(rows: Rows, points: Rows) -> Rows:
 
 def _of_cycles(rows: Rows, own: dict[str, Any]) -> dict[str, Any]:
     """The row that one of *Same Picture* is compared with."""
-    names = ("scene", "samples", "motion", "noise_threshold", "size")
-    (cycles,) = only(rows, method=CYCLES, **{x: own[x] for x in names})
+    (cycles,) = only(rows, method=CYCLES, **{x: own[x] for x in SAME_CASE})
     return cycles
 
 

@@ -16,7 +16,15 @@ from ..shots.methods import (
     SAME_PICTURE,
     XRDS,
 )
-from .results import SCENES, Results, beside_cycles, only, scene_name
+from .results import (
+    LONG_SHOT,
+    SAME_CASE,
+    SCENES,
+    Results,
+    beside_cycles,
+    only,
+    scene_name,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -111,13 +119,13 @@ def peers(results: Results) -> Table:
 
 
 def equal_seconds(results: Results) -> Table:
-    """A shot in the seconds of Cycles + OIDN, and some on an older machine."""
+    """A shot in the seconds of Cycles + OIDN; of some scenes in larger frames, too."""
     head = ["seconds of Cycles + OIDN with", "scenes", "gain", "worst", "flicker"]
     head += ["worst", "median of three: gain", "non-local means"]
-    table = [[*head, "older: scenes", "gain", "flicker"]]
+    table = [[*head, "1920x1080: scenes", "gain", "flicker"]]
     for samples in sorted({x["samples"] for x in results.equal_seconds_of_all}):
         rows = only(results.equal_seconds_of_all, samples=samples)
-        older = only(results.equal_seconds, samples=samples)
+        large = only(results.equal_seconds, samples=samples)
         table.append(
             [
                 f"{samples} samples",
@@ -129,7 +137,7 @@ def equal_seconds(results: Results) -> Table:
                     f"{mean(x['peers'][way] - x[DEFAULT] for x in rows):+.1f}"
                     for way in (MEDIAN, NL_MEANS)
                 ),
-                *(_gain(older) + _flicker(older) if older else ["-"] * 3),
+                *(_gain(large) + _flicker(large) if large else ["-"] * 3),
             ]
         )
     return table
@@ -191,23 +199,25 @@ def same_picture(results: Results) -> Table:
 
     Held-out scenes are those that move as their files say.
     """
-    head = ["samples", "pictures", "scenes", "share of them", "seconds", "late"]
+    head = ["samples", "pictures", "frames", "scenes"]
+    head += ["share of them", "seconds", "late"]
     table = [[*head, "PSNR", "worst", "FLIP", "flicker"]]
     rows = results.same_picture
-    names = ("motion", "samples", "noise_threshold", "size")
+    names = SAME_CASE[1:]
     kinds = dict.fromkeys(map(itemgetter(*names), only(rows, method=SAME_PICTURE)))
     for kind in kinds:
         file = dict(zip(names, kind, strict=True))
         ours = only(rows, method=SAME_PICTURE, **file)
         cycles = only(rows, method=CYCLES, **file)
         alone = {x["scene"]: x for x in cycles}
-        motion, samples, threshold, size = kind
+        motion, samples, threshold, frames, size = kind
         label = "" if threshold is None else f", threshold {threshold:g}"
         held = ", held out" if motion == "file" else ""
         table.append(
             [
                 f"{samples}{label}",
                 size,
+                str(frames),
                 f"{len(ours)}{held}",
                 *(
                     _mean_of(ours, name)
@@ -318,16 +328,6 @@ def card(results: Results) -> Table:
     return table
 
 
-_SHOT = {
-    "method": SAME_PICTURE,
-    "motion": "pan",
-    "samples": 16,
-    "noise_threshold": None,
-    "size": "960x512",
-}
-"""The rows of *Same Picture* that docs/left-out.md tells of."""
-
-
 def left_out(results: Results) -> Table:
     """What is left out of each scene: of an animation, a still, an enlarged picture."""
     head = ["", "animation: samples left out", "its seconds saved"]
@@ -336,7 +336,7 @@ def left_out(results: Results) -> Table:
     ours = {x["scene"]: x["seconds"] for x in results.denoiser("XRDS-HIGH", 1)}
     enlarged = {x["scene"]: x for x in results.left_out}
     for scene in SCENES:
-        shot = only(results.same_picture, scene=scene, **_SHOT)
+        shot = only(results.same_picture, scene=scene, **LONG_SHOT)
         cells = ["-", "-"]
         if shot:
             left = 1.0 - shot[0]["mean_share"], 1.0 - shot[0]["processor_ratio"]

@@ -61,17 +61,22 @@ REFERENCE_SAMPLES = 128
 
 @dataclass(frozen=True)
 class Case:
-    """What a file asks for: samples, or with a noise threshold at most so many."""
+    """What a file asks for: samples, or with a noise threshold at most so many.
+
+    `frames` are those of the shot.
+    """
 
     motion: str
     samples: int
     noise_threshold: float | None = None
+    frames: int = FRAMES
 
     @property
     def label(self) -> str:
         """Name in files and tables."""
         adaptive = "" if self.noise_threshold is None else f"-{self.noise_threshold:g}"
-        return f"{self.motion}-{self.samples}{adaptive}"
+        length = "" if self.frames == FRAMES else f"-of{self.frames}"
+        return f"{self.motion}-{self.samples}{adaptive}{length}"
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,6 @@ def bench_same_picture(
     out: Path,
     cases: Sequence[Case],
     *,
-    frames: int = FRAMES,
     windows: Path | None = None,
     references: Path | None = None,
     resolution: tuple[int, int] | None = None,
@@ -119,8 +123,9 @@ def bench_same_picture(
     is rendered around the windows. Cycles renders on a `device` as in `Shot`. Raises
     UsageError for missing files, what does not fit, and too short a shot.
     """
-    if frames < 2 * REACH + 1:
-        raise UsageError(f"{frames} frames: give {2 * REACH + 1} or more")
+    fewest = min(case.frames for case in cases)
+    if fewest < 2 * REACH + 1:
+        raise UsageError(f"{fewest} frames: give {2 * REACH + 1} or more")
     make_folder(out)
     folder = Folder(cache or out / "cache")
     journal = Journal(folder.directory / "journal-same-picture.json", report_line)
@@ -133,7 +138,7 @@ def bench_same_picture(
         for methods in _IN_TURN:
             for case, part in product(cases, parts):
                 with journal.attempt(f"{part.shot.name}: {case.label}"):
-                    part.measure(case, frames, methods, journal)
+                    part.measure(case, methods, journal)
                 _write(parts, journal, out)
         return _write(parts, journal, out)
 
@@ -152,13 +157,11 @@ class _Scene:
             read_json(self._path) if self._path.is_file() else {}
         )
 
-    def measure(
-        self, case: Case, frames: int, methods: Sequence[str], journal: Journal
-    ) -> None:
+    def measure(self, case: Case, methods: Sequence[str], journal: Journal) -> None:
         """Render and judge what is missing of one case."""
         work = {
-            CYCLES: lambda: _cycles(self.shot, case, frames),
-            SAME_PICTURE: lambda: _same_picture(self.shot, case, frames),
+            CYCLES: lambda: _cycles(self.shot, case),
+            SAME_PICTURE: lambda: _same_picture(self.shot, case),
             SAME_SAMPLES: lambda: _same_samples(self.shot, case),
         }
         missing = [x for x in methods if f"{case.label}-{x}" not in self.rows]
@@ -173,16 +176,16 @@ class _Scene:
             picture = {"radiance": made.radiance, "following": made.following}
             self.folder.write(self._picture(case, method), picture, {})
             if method == SAME_PICTURE:
-                self._time_again(case, frames)
+                self._time_again(case)
             self.rows[f"{case.label}-{method}"] = self._judged(
                 case, method, made, truth
             )
             write_json(self._path, self.rows)
 
-    def _time_again(self, case: Case, frames: int) -> None:
+    def _time_again(self, case: Case) -> None:
         """Make Cycles' seconds the mean of those before and after a shot's."""
         row = self.rows[f"{case.label}-{CYCLES}"]
-        seconds, processor = _cycles_again(self.shot, case, frames)
+        seconds, processor = _cycles_again(self.shot, case)
         row["seconds"] = round((row["seconds"] + seconds) / 2, 3)
         row["processor_seconds"] = round((row["processor_seconds"] + processor) / 2, 3)
 
@@ -202,6 +205,7 @@ class _Scene:
             "motion": case.motion,
             "samples": case.samples,
             "noise_threshold": case.noise_threshold,
+            "frames": case.frames,
             "size": f"{self.shot.rendered.width}x{self.shot.rendered.height}",
             "method": method,
             "seconds": round(made.seconds, 3),
@@ -236,9 +240,9 @@ def _opened(shot: Shot, case: Case, reach: int) -> Any:
     return scene
 
 
-def _cycles(shot: Shot, case: Case, frames: int) -> Made:
+def _cycles(shot: Shot, case: Case) -> Made:
     """Cycles and its denoiser, as a new file has it."""
-    scene = _opened(shot, case, frames // 2)
+    scene = _opened(shot, case, case.frames // 2)
     middle = scene.frame_current
     numbers = range(middle - _TIMED // 2, middle + _TIMED // 2 + 1)
     shown, *taken = _rendered(scene, numbers)
@@ -246,9 +250,9 @@ def _cycles(shot: Shot, case: Case, frames: int) -> Made:
     return Made(shown[middle], shown[middle + 1], seconds, processor, _stops(scene))
 
 
-def _cycles_again(shot: Shot, case: Case, frames: int) -> tuple[float, float]:
+def _cycles_again(shot: Shot, case: Case) -> tuple[float, float]:
     """Seconds of its middle frame, by the clock and of all cores, without a sync."""
-    scene = _opened(shot, case, frames // 2)
+    scene = _opened(shot, case, case.frames // 2)
     middle = scene.frame_current
     _, seconds, processor = _rendered(scene, (middle - 1, middle))
     return seconds[-1], processor[-1]
@@ -271,9 +275,9 @@ def _rendered(
     return shown, seconds, processor
 
 
-def _same_picture(shot: Shot, case: Case, frames: int) -> Made:
+def _same_picture(shot: Shot, case: Case) -> Made:
     """The whole shot; its first frames' measuring is in the seconds."""
-    return _shot(shot, case, frames, same_picture=True)
+    return _shot(shot, case, case.frames, same_picture=True)
 
 
 def _same_samples(shot: Shot, case: Case) -> Made:
@@ -322,6 +326,7 @@ _COLUMNS = {
     "scene": "scene",
     "samples": "samples",
     "noise_threshold": "threshold",
+    "frames": "frames",
     "size": "size",
     "method": "method",
     "seconds": "s a frame",
