@@ -75,7 +75,7 @@ def add_same_picture(benches: Any) -> argparse.ArgumentParser:
         type=arguments.factors,
         help="of Cycles' adaptive sampling, as 0.1; none",
     )
-    add("--frames", type=arguments.positive, default=21, help="of a shot; 21")
+    add("--frames", type=arguments.positive, default=21, help="of a shot, odd; 21")
     add(
         "--card",
         action="store_true",

@@ -79,12 +79,11 @@ def _equal_seconds(results: Results) -> Figures:
 
 
 def _same_picture(results: Results) -> Figures:
-    """Per cent of Cycles' processor seconds in a long shot: of all frames, and late."""
+    """Per cent of Cycles' processor seconds that a long shot takes."""
     rows = only(results.same_picture, **LONG_SHOT)
     return {
         "same.scenes": len(rows),
         "same.seconds": 100.0 * mean(x["processor_ratio"] for x in rows),
-        "same.late": 100.0 * mean(x["late_ratio"] for x in rows),
     }
 
 
