@@ -39,16 +39,16 @@ def test_what_is_made_of_cycles_frames_takes_their_seconds() -> None:
     assert priced["seconds_per_frame"] == 12.0
 
 
-def test_same_picture_lies_where_its_share_and_gain_put_it() -> None:
+def test_same_picture_lies_where_the_longest_shot_puts_it() -> None:
     row = {"scene": "cubes", "motion": "pan", "samples": 16, "noise_threshold": None}
-    row |= {"frames": 21}
-    small = {"size": "64x48", "late_share": 0.9, "gain": -1.0, "flicker": 0.02}
-    large = {"size": "128x96", "late_share": 0.25, "gain": 0.5, "flicker": 0.01}
-    rows = [
-        row | {"size": x["size"], "method": "cycles_oidn", "flicker": 0.02}
-        for x in (small, large)
-    ]
-    rows += [row | x | {"method": SAME_PICTURE} for x in (large, small)]
+    short = {"size": "256x192", "frames": 21}
+    small = {"size": "64x48", "frames": 49}
+    large = {"size": "128x96", "frames": 49}
+    poor = {"late_share": 0.9, "gain": -1.0, "flicker": 0.02}
+    good = {"late_share": 0.25, "gain": 0.5, "flicker": 0.01}
+    cases = ((short, poor), (large, good), (small, poor))
+    rows = [row | x | {"method": "cycles_oidn", "flicker": 0.02} for x, _ in cases]
+    rows += [row | x | result | {"method": SAME_PICTURE} for x, result in cases]
     points = [point(DEFAULT, 12.0), point(XRDS, 6.0, 2), point(XRDS, 20.0)]
     (found,) = shot_plot._sooner(rows, points)
     assert (found["seconds_per_frame"], found["psnr"]) == (8.0, 30.5)  # of 4 samples
@@ -60,11 +60,12 @@ def test_a_threshold_relates_to_even_samples_as_in_the_windows_of_both() -> None
     what = {"scene": "cubes", "motion": "pan", "size": "64x48", "frames": 21}
     cycles = {"method": "cycles_oidn", "noise_threshold": None}
     few = {"samples": 4, "psnr": 0.0, "flicker": 1.0, "processor_seconds": 1.0}
-    most = {"samples": 16, "psnr": 33.0, "flicker": 0.04, "processor_seconds": 8.0}
+    near = {"samples": 16, "psnr": 33.0, "flicker": 0.04, "processor_seconds": 8.0}
+    many = {"samples": 64, "psnr": 40.0, "flicker": 0.01, "processor_seconds": 99.0}
     asked = {"noise_threshold": 0.1, "samples": 4096}
     far = {"psnr": 35.0, "flicker": 0.02, "processor_seconds": 24.0}
     ours = {"late_ratio": 0.5, "gain": 1.0, "flicker": 0.01}
-    rows = [what | cycles | few, what | cycles | most, what | cycles | asked | far]
+    rows = [what | cycles | x for x in (few, near, many, asked | far)]
     rows.append(what | asked | ours | {"method": SAME_PICTURE})
     theirs, own = shot_plot._adaptive(rows, [point(DEFAULT, 12.0)])
     assert (theirs["seconds_per_frame"], theirs["psnr"]) == (36.0, 32.0)

@@ -47,11 +47,12 @@ class Verdict:
     @property
     def passed(self) -> bool:
         """Whether it keeps the rule."""
-        return (
-            self.share <= SHARE
-            and self.worst >= -WORST_LOSS
-            and round(self.gain, 2) >= 0.0
-        )
+        return keeps_rule(self.gain, self.worst, self.share)
+
+
+def keeps_rule(gain: float, worst: float, share: float) -> bool:
+    """Whether a picture keeps the rule; gains in dB, of the frame and of its blocks."""
+    return share <= SHARE and worst >= -WORST_LOSS and round(gain, 2) >= 0.0
 
 
 def compare(picture: Array, alone: Array, references: Sequence[Array]) -> Verdict:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from statistics import mean, median
 from typing import TYPE_CHECKING
 
+from ..gallery.judge import keeps_rule
 from ..shots.frames import REACH
 from ..shots.methods import DEFAULT, XRDS
 from .results import LONG_SHOT, OLD_PATTERN, beside_cycles, only
@@ -112,6 +113,13 @@ def _held_out(results: Results) -> Figures:
 
 def _gallery(results: Results) -> Figures:
     rows = results.gallery
+    later = {}
+    for samples in {x["samples"] for x in results.later_gallery}:
+        here = only(results.later_gallery, samples=samples)
+        kept = sum(keeps_rule(x["gain"], x["worst"], x["share"]) for x in here)
+        later |= {f"{samples}.kept": kept, f"{samples}.rows": len(here)}
+    for name in ("kept", "rows"):
+        later[name] = sum(later[f"{samples}.{name}"] for samples in (2, 4, 16))
     flicker = [
         x["flicker"] for x in only(rows, half="judging") if x["flicker"] is not None
     ]
@@ -127,6 +135,7 @@ def _gallery(results: Results) -> Figures:
         "gallery.rows": len(rows),
         "gallery.kept": sum(x["passed"] for x in rows),
         "gallery.flicker": median(flicker),
+        **{f"gallery.later.{name}": count for name, count in later.items()},
     }
 
 

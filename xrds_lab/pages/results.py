@@ -42,18 +42,19 @@ LONG_SHOT = {
     "size": "960x512",
 }
 """The rows of *Same Picture* that the first page tells of, and what is left out."""
+_LAST = 128  # samples of most references in `by-samples.json`
 _UNLIT = 90.0  # dB: the PSNR of a part without light
 _NAMES = {"bmw27": "car", "crystal-cave": "cave"}
 
 
-def largest(rows: Rows) -> Rows:
-    """Return of each scene and number of samples the row of the largest pictures.
+def longest(rows: Rows) -> Rows:
+    """Return of each scene and number of samples the row of the longest shot.
 
-    Of these that of the longest shot.
+    Of these that of the largest pictures.
     """
     found = {}
     for row in sorted(
-        rows, key=lambda x: (int(x["size"].partition("x")[0]), x["frames"])
+        rows, key=lambda x: (x["frames"], int(x["size"].partition("x")[0]))
     ):
         found[row["scene"], row["samples"], row["noise_threshold"]] = row
     return list(found.values())
@@ -168,6 +169,12 @@ class Results:
     def gallery(self) -> Rows:
         """Small shots of what films hold."""
         return self.read("gallery/results.json")["shots"]
+
+    @cached_property
+    def later_gallery(self) -> Rows:
+        """The same by later code, in smaller pictures, against two references."""
+        rows = self.read("shots/by-samples.json")["rows"]
+        return [x for x in rows if "shot" in x and _LAST in x["reference_samples"]]
 
     @cached_property
     def parts(self) -> Rows:

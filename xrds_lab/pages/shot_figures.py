@@ -14,21 +14,19 @@ from typing import Any
 
 from xrds_blender.planning.shot_figures import FILE
 
-from .results import SAME_CASE, Results, largest, only
+from .results import SAME_CASE, Results, longest, only
 
 ROOT = Path(__file__).resolve().parents[2]
-_LAST = 128  # samples of most references in `by-samples.json`
 
 
 def figures(root: Path = ROOT) -> dict[str, Any]:
     """Return them as `ShotFigures` reads them."""
     results = Results(root / "docs/results")
-    by_samples = results.read("shots/by-samples.json")["rows"]
-    gallery = [x for x in by_samples if "shot" in x and _LAST in x["reference_samples"]]
+    gallery = results.later_gallery
     # flicker is judged in the gallery where the camera stands still
     flicker = [x for x in results.gallery if x["flicker"] is not None]
     stills = {x["shot"] for x in flicker}
-    same = largest(only(results.same_picture, method="same_picture", motion="pan"))
+    same = longest(only(results.same_picture, method="same_picture", motion="pan"))
     even = [x for x in same if not x["noise_threshold"]]
     noisy = [x for x in same if x["noise_threshold"]]
     locked = results.read("shots/locked-off.json")

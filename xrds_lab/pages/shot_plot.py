@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from ..shots.methods import (
     XRDS,
 )
 from ..shots.plot import error_plot
-from .results import SAME_CASE, largest, only
+from .results import SAME_CASE, longest, only
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -66,11 +67,11 @@ def _sooner(rows: Rows, points: Rows) -> Rows:
     """Late frames of *Same Picture* beside the points of Cycles + OIDN.
 
     They take the seconds of a shot's frame of their samples. They were judged in other
-    windows: differences and ratios are taken over, those of the largest pictures.
+    windows: differences and ratios are taken over, those of the longest pictures.
     """
     found = []
     ours = only(rows, method=SAME_PICTURE, motion=MOTION, noise_threshold=None)
-    for own in largest(ours):
+    for own in longest(ours):
         here = only(points, scene=own["scene"])
         shot = only(here, method=XRDS, radius=REACH)
         timed = sorted(
@@ -90,30 +91,31 @@ def _sooner(rows: Rows, points: Rows) -> Rows:
 def _adaptive(rows: Rows, points: Rows) -> Rows:
     """Cycles + OIDN and *Same Picture* with a noise threshold, beside the points.
 
-    Where the same windows were rendered without one, of the most samples there: errors
-    and seconds relate to those of Cycles + OIDN as they do there.
+    Where the same windows were rendered without one, with the samples that take Cycles
+    about as long: errors and seconds relate to those of Cycles + OIDN as they do there.
     """
     found = []
     for own in only(rows, method=SAME_PICTURE, motion=MOTION):
-        place = {name: own[name] for name in ("scene", "motion", "size")}
+        place = {name: own[name] for name in ("scene", "motion", "frames", "size")}
         even = only(rows, method=CYCLES, noise_threshold=None, **place)
         if own["noise_threshold"] is None or not even:
             continue
-        most = max(even, key=lambda x: x["samples"])
+        cycles = _of_cycles(rows, own)
+        asked = cycles["processor_seconds"]
+        near = min(even, key=lambda x: abs(math.log(x["processor_seconds"] / asked)))
         usual = only(
-            points, scene=own["scene"], method=DEFAULT, samples=most["samples"]
+            points, scene=own["scene"], method=DEFAULT, samples=near["samples"]
         )
         if not (usual and usual[0]["seconds_per_frame"]):
             continue
-        cycles = _of_cycles(rows, own)
         seconds = usual[0]["seconds_per_frame"]
-        seconds *= cycles["processor_seconds"] / most["processor_seconds"]
+        seconds *= asked / near["processor_seconds"]
         there = usual[0] | {
             "method": THRESHOLD,
             "samples": own["samples"],
             "seconds_per_frame": seconds,
-            "psnr": usual[0]["psnr"] + cycles["psnr"] - most["psnr"],
-            "flicker": usual[0]["flicker"] * cycles["flicker"] / most["flicker"],
+            "psnr": usual[0]["psnr"] + cycles["psnr"] - near["psnr"],
+            "flicker": usual[0]["flicker"] * cycles["flicker"] / near["flicker"],
         }
         found += [there, _same(own, cycles, there, seconds * own["late_ratio"])]
     return found
