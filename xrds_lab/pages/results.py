@@ -142,8 +142,8 @@ class Results:
     @cached_property
     def both(self) -> Rows:
         """Shots of the scenes where camera and objects move, over the frame alone."""
-        rows = self.read("shots/by-samples.json")["rows"]
-        return [x for x in rows if x.get("motion") == "both"]
+        rows = self.read("shots/both.json")["shots"]
+        return only(rows, motion="both", method=XRDS, radius=REACH)
 
     @cached_property
     def held_out(self) -> Rows:
@@ -174,7 +174,7 @@ class Results:
     def later_gallery(self) -> Rows:
         """The same by later code, in smaller pictures, against two references."""
         rows = self.read("shots/by-samples.json")["rows"]
-        return [x for x in rows if "shot" in x and _LAST in x["reference_samples"]]
+        return [x for x in rows if _LAST in x["reference_samples"]]
 
     @cached_property
     def parts(self) -> Rows:

@@ -88,11 +88,11 @@ def shots_by_samples(results: Results) -> Table:
         rows = results.pans(samples)
         gains = [x["gain"] for x in rows]
         flicker = [x["flicker_ratio"] for x in rows]
-        both = [x["gain"] for x in only(results.both, samples=samples)]
+        both = [x["gain_over_alone"] for x in only(results.both, samples=samples)]
         cells = [samples, len(rows), f"{mean(gains):+.1f}", f"{min(gains):+.1f}"]
         cells += [f"{mean(x['flip_ratio'] for x in rows):.2f}"]
         cells += [f"{mean(flicker):.2f}", f"{max(flicker):.2f}"]
-        cells += [f"{mean(both):+.1f}", f"{min(both):+.1f}"]
+        cells += [f"{mean(both):+.1f}", f"{min(both):+.1f}"] if both else ["-", "-"]
         table.append(list(map(str, cells)))
     return table
 
