@@ -51,7 +51,9 @@ def _shots(results: Results) -> Figures:
         name = f"shots.{samples}"
         found |= {f"{name}.mean": mean(gains), f"{name}.worst": min(gains)}
         found[f"{name}.steadier"] = 100.0 * (1.0 - flicker)
-    return found
+    both = [results.both(samples) for samples in results.pan_samples]
+    flickers = [mean(x["flicker_ratio"] for x in rows) for rows in both if rows]
+    return found | {"both.steadiest": min(flickers), "both.unsteadiest": max(flickers)}
 
 
 def _equal_seconds(results: Results) -> Figures:

@@ -140,12 +140,6 @@ class Results:
         return _compared(equal_seconds.entries(map(priced, self.shots["shots"])))
 
     @cached_property
-    def both(self) -> Rows:
-        """Shots of the scenes where camera and objects move, over the frame alone."""
-        rows = self.read("shots/both.json")["shots"]
-        return only(rows, motion="both", method=XRDS, radius=REACH)
-
-    @cached_property
     def held_out(self) -> Rows:
         """Shots on which no constant was chosen: all methods; means over seeds."""
         return over_seeds(self.read("held-out/results.json")["shots"])
@@ -196,6 +190,11 @@ class Results:
     def card(self) -> dict[str, Any]:
         """Seconds on a graphics card."""
         return self.read("card/h200.json")
+
+    def both(self, samples: int) -> Rows:
+        """Return shots where camera and objects move beside Cycles + OIDN."""
+        rows = self.read("shots/both.json")["shots"]
+        return beside_cycles(only(rows, motion="both", samples=samples))
 
     def pans(self, samples: int, method: str = XRDS, radius: int = REACH) -> Rows:
         """Return a method's rows of `shots` beside those of Cycles + OIDN."""

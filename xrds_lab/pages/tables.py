@@ -88,7 +88,7 @@ def shots_by_samples(results: Results) -> Table:
         rows = results.pans(samples)
         gains = [x["gain"] for x in rows]
         flicker = [x["flicker_ratio"] for x in rows]
-        both = [x["gain_over_alone"] for x in only(results.both, samples=samples)]
+        both = [x["gain_over_alone"] for x in results.both(samples)]
         cells = [samples, len(rows), f"{mean(gains):+.1f}", f"{min(gains):+.1f}"]
         cells += [f"{mean(x['flip_ratio'] for x in rows):.2f}"]
         cells += [f"{mean(flicker):.2f}", f"{max(flicker):.2f}"]
