@@ -75,7 +75,7 @@ def add_same_picture(benches: Any) -> argparse.ArgumentParser:
         type=arguments.factors,
         help="of Cycles' adaptive sampling, as 0.1; none",
     )
-    add("--frames", type=arguments.positive, default=21, help="of a shot, odd; 21")
+    add("--frames", type=arguments.positive, help="of a shot, odd; 21")
     add(
         "--card",
         action="store_true",
@@ -141,12 +141,12 @@ def _shots(options: argparse.Namespace) -> dict[str, Any]:
 def _same_picture(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("bench")
     from ..cards.cycles import CPU, find_card
-    from ..shots.sooner import MOST_SAMPLES, SAMPLES, Case, bench_same_picture
+    from ..shots.sooner import FRAMES, MOST_SAMPLES, SAMPLES, Case, bench_same_picture
 
     thresholds = options.noise_thresholds or ()
     counts = options.samples or (() if thresholds else SAMPLES)
     cases = [
-        Case(*case, frames=options.frames)
+        Case(*case, frames=options.frames or FRAMES)
         for motion in options.motions
         for case in (
             *((motion, samples, None) for samples in counts),

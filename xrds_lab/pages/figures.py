@@ -115,13 +115,7 @@ def _held_out(results: Results) -> Figures:
 
 def _gallery(results: Results) -> Figures:
     rows = results.gallery
-    later = {}
-    for samples in {x["samples"] for x in results.later_gallery}:
-        here = only(results.later_gallery, samples=samples)
-        kept = sum(keeps_rule(x["gain"], x["worst"], x["share"]) for x in here)
-        later |= {f"{samples}.kept": kept, f"{samples}.rows": len(here)}
-    for name in ("kept", "rows"):
-        later[name] = sum(later[f"{samples}.{name}"] for samples in (2, 4, 16))
+    later = [x for x in results.later_gallery if x["samples"] in (2, 4, 16)]
     flicker = [
         x["flicker"] for x in only(rows, half="judging") if x["flicker"] is not None
     ]
@@ -137,7 +131,10 @@ def _gallery(results: Results) -> Figures:
         "gallery.rows": len(rows),
         "gallery.kept": sum(x["passed"] for x in rows),
         "gallery.flicker": median(flicker),
-        **{f"gallery.later.{name}": count for name, count in later.items()},
+        "gallery.later.rows": len(later),
+        "gallery.later.kept": sum(
+            keeps_rule(x["gain"], x["worst"], x["share"]) for x in later
+        ),
     }
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..shots import equal_seconds
 from ..shots.frames import REACH
-from ..shots.methods import DEFAULT, SAME_PICTURE, XRDS
+from ..shots.methods import CYCLES, DEFAULT, SAME_PICTURE, XRDS
 from ..shots.seconds import per_frame
 from ..shots.seeds import over_seeds
 
@@ -58,6 +58,12 @@ def longest(rows: Rows) -> Rows:
     ):
         found[row["scene"], row["samples"], row["noise_threshold"]] = row
     return list(found.values())
+
+
+def of_cycles(rows: Rows, own: dict[str, Any]) -> dict[str, Any]:
+    """Return the row that one of *Same Picture* is compared with."""
+    (cycles,) = only(rows, method=CYCLES, **{x: own[x] for x in SAME_CASE})
+    return cycles
 
 
 def _compared(entries: Rows) -> Rows:

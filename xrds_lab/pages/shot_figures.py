@@ -14,7 +14,7 @@ from typing import Any
 
 from xrds_blender.planning.shot_figures import FILE
 
-from .results import SAME_CASE, Results, longest, only
+from .results import Results, longest, of_cycles, only
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -90,9 +90,7 @@ def _mean(values: Iterable[float]) -> float:
 def _flicker_ratios(rows: list[Any], ours: list[Any]) -> Iterable[float]:
     """Yield flicker beside that of Cycles + OIDN with the file's samples."""
     for row in ours:
-        same = {name: row[name] for name in SAME_CASE}
-        (cycles,) = only(rows, method="cycles_oidn", **same)
-        yield row["flicker"] / cycles["flicker"]
+        yield row["flicker"] / of_cycles(rows, row)["flicker"]
 
 
 def _accumulating(results: Results) -> float:

@@ -20,7 +20,7 @@ from ..shots.methods import (
     XRDS,
 )
 from ..shots.plot import error_plot
-from .results import SAME_CASE, longest, only
+from .results import longest, of_cycles, only
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -84,7 +84,7 @@ def _sooner(rows: Rows, points: Rows) -> Rows:
             continue
         taken = own["late_share"] * own["samples"]
         seconds = float(np.interp(taken, *zip(*timed, strict=True)))
-        found.append(_same(own, _of_cycles(rows, own), usual[0], seconds))
+        found.append(_same(own, of_cycles(rows, own), usual[0], seconds))
     return found
 
 
@@ -100,7 +100,7 @@ def _adaptive(rows: Rows, points: Rows) -> Rows:
         even = only(rows, method=CYCLES, noise_threshold=None, **place)
         if own["noise_threshold"] is None or not even:
             continue
-        cycles = _of_cycles(rows, own)
+        cycles = of_cycles(rows, own)
         asked = cycles["processor_seconds"]
         near = min(even, key=lambda x: abs(math.log(x["processor_seconds"] / asked)))
         usual = only(
@@ -119,12 +119,6 @@ def _adaptive(rows: Rows, points: Rows) -> Rows:
         }
         found += [there, _same(own, cycles, there, seconds * own["late_ratio"])]
     return found
-
-
-def _of_cycles(rows: Rows, own: dict[str, Any]) -> dict[str, Any]:
-    """The row that one of *Same Picture* is compared with."""
-    (cycles,) = only(rows, method=CYCLES, **{x: own[x] for x in SAME_CASE})
-    return cycles
 
 
 def _same(
