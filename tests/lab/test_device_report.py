@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -35,7 +34,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_without_minutes_nothing_is_begun_and_all_is_told(folder: Path) -> None:
     found = run(folder, minutes=0.0)
-    assert found["rows"] == []
+    assert found["shots"] == []
     assert len(found["failures"]) == 2
     assert all("run it again" in why for why in found["failures"].values())
 
@@ -44,8 +43,8 @@ def test_a_second_run_goes_on_to_the_whole_report(folder: Path) -> None:
     found = run(folder)
     assert found["failures"] == {}
     # Cycles on both devices, the frame alone, radius 1, a whole shot
-    assert len(found["rows"]) == 5
-    for row in found["rows"]:
+    assert len(found["shots"]) == 5
+    for row in found["shots"]:
         assert row["psnr"] > 10.0
         if row["method"] == "xrds":
             assert row["pixels_apart"] == 0.0  # the processor twice
@@ -53,8 +52,7 @@ def test_a_second_run_goes_on_to_the_whole_report(folder: Path) -> None:
     names = {path.name for path in folder.iterdir()}
     assert {"results.json", "results.csv", "error-seconds.svg"} <= names
     assert "XRDS, radius 1" in (folder / "error-seconds.svg").read_text()
-    pan = json.loads((folder / "same-picture-hand_held" / "results.json").read_text())
     methods = ["cycles_oidn", "same_picture", "same_samples"]
-    assert [row["method"] for row in pan["shots"]] == methods
+    assert [row["method"] for row in found["pans"]] == methods
     again = run(folder, minutes=0.0)
-    assert again["rows"] == found["rows"]
+    assert again["shots"] == found["shots"]

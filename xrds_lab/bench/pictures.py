@@ -11,7 +11,7 @@ import numpy as np
 
 from xrds_blender.planning.settings import DEFAULT_DENOISING, Network
 from xrds_blender.planning.settings import Denoising as Mode
-from xrds_core import denoising, exr
+from xrds_core import denoising
 from xrds_core.denoising import Denoiser
 from xrds_core.errors import SceneError
 from xrds_core.files import replacing
@@ -22,6 +22,7 @@ from ..checksum import checksum
 from .inputs import GENERATION, Folder, Request, open_scene, sample_adaptively
 from .journal import Strict
 from .rivals import ENLARGEMENTS
+from .windows import read_reference
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -178,7 +179,7 @@ class Pictures:
     def reference(self) -> Array:
         """The reference (H, W, 3): the shot's own, or the mean of two halves."""
         if self.shot.reference is not None:
-            return reference_file(self.shot.reference)
+            return read_reference(self.shot.reference)
         first, second = self.references()
         return (first + second) / 2
 
@@ -256,12 +257,6 @@ def _cleaned(arrays: Arrays) -> Arrays:
 @lru_cache(maxsize=1)
 def _denoisers_code() -> str:
     return checksum(Path(denoising.__file__).parent.glob("*.py"))
-
-
-@lru_cache(maxsize=2)
-def reference_file(path: Path) -> Array:
-    """The radiance (H, W, 3) of a reference's file."""
-    return np.asarray(exr.read_beauty(path).radiance[..., :3])
 
 
 def _sessions(requests: Sequence[Request]) -> list[list[Request]]:

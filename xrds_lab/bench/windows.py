@@ -5,8 +5,12 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from xrds_core import exr
 from xrds_core.errors import UsageError
 
 from ..cards.cycles import CPU
@@ -14,6 +18,8 @@ from ..cards.cycles import CPU
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
+
+    from xrds_core.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -165,6 +171,12 @@ def find_shots(
         window = known.get(path.stem) or _whole(path, resolution)
         shots.append(Shot(path, window, reference, digest(path), device))
     return shots
+
+
+@lru_cache(maxsize=2)
+def read_reference(path: Path) -> Array:
+    """The radiance (H, W, 3) of a reference's file."""
+    return np.asarray(exr.read_beauty(path).radiance[..., :3])
 
 
 def _whole(path: Path, resolution: tuple[int, int] | None) -> Window:

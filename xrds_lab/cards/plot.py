@@ -33,7 +33,7 @@ def draw(results: dict[str, Any], path: Path) -> None:
     mpl.use("svg")
     from matplotlib import pyplot
 
-    rows = results["rows"]
+    rows = results["shots"]
     if not rows:
         return
     size = min((row["size"] for row in rows), key=lambda x: x[0])

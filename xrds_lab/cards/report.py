@@ -70,13 +70,13 @@ def bench_devices(
         cycles = find_card()
         about = {**machine.describe(), "cycles_device": cycles}
         report_line(f"Cycles on {cycles}")
-        pans = _Pans(sizes[0], picture_samples, reference_samples, cycles, out)
+        pan = _Pan(sizes[0], picture_samples, reference_samples, cycles, out)
         for name in shots:
             if time.monotonic() > ends:
                 journal.failures[name] = "no minutes were left: run it again"
                 continue
             with journal.attempt(name):
-                pans.measure(name)
+                journal.failures.update(pan.measure(name)["failures"])
         known: list[Row] = []
         for case in _cases(shots, sizes, samples, radii, cycles):
             one = replace(case, rounds=rounds, reference_samples=reference_samples)
@@ -99,7 +99,7 @@ def bench_devices(
 
 
 @dataclass(frozen=True)
-class _Pans:
+class _Pan:
     """Shots of the gallery that a camera pans over, as `xrds bench same-picture`."""
 
     size: Size
@@ -108,7 +108,7 @@ class _Pans:
     device: str
     out: Path
 
-    def measure(self, name: str) -> None:
+    def measure(self, name: str) -> dict[str, Any]:
         """Measure what is missing of a shot, into a folder of its own."""
         import bpy
 
@@ -118,7 +118,7 @@ class _Pans:
         if not blend.is_file():
             ALL_SHOTS[name].build(folder, self.size)
             bpy.ops.wm.save_as_mainfile(filepath=str(blend.resolve()))
-        sooner.bench_same_picture(
+        return sooner.bench_same_picture(
             [blend],
             folder,
             [sooner.Case("pan", self.samples)],
@@ -160,7 +160,13 @@ def _cases(
 def _write(
     rows: Sequence[Row], about: dict[str, Any], journal: Journal, out: Path
 ) -> dict[str, Any]:
-    results = {"machine": about, "rows": list(rows), "failures": journal.failures}
+    pans = sorted(out.glob("same-picture-*/results.json"))
+    results = {
+        "machine": about,
+        "pans": [row for path in pans for row in read_json(path)["shots"]],
+        "shots": list(rows),
+        "failures": journal.failures,
+    }
     write_json(out / "results.json", results)
     write_table(out / "results.csv", [_flat(row) for row in rows])
     with suppress(ImportError):  # a bare machine has no matplotlib: draw it elsewhere

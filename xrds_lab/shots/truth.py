@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from ..bench.pictures import reference_file
+from ..bench.windows import read_reference
 from ..metrics import to_srgb
 from .flicker import flicker
 from .frames import MIDDLE, FrameRequest
@@ -51,7 +51,7 @@ class Truth:
         found = [frames.frame(x) for x in requests_of_truth(motion, samples)]
         renders = (found[0], found[1]), (found[2], found[3])
         if frames.shot.reference is not None:
-            own = reference_file(frames.shot.reference)
+            own = read_reference(frames.shot.reference)
             return cls((own, own), own, renders)
         return cls.of_renders(renders)
 
