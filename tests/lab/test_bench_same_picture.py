@@ -46,6 +46,7 @@ def test_each_method_has_a_row_that_is_measured_once(
     late = statistics.median(rows[SAME_PICTURE]["shares"][-7:])
     assert rows[SAME_PICTURE]["late_share"] == pytest.approx(late, abs=1e-3)
     assert rows[SAME_PICTURE]["mean_share"] <= 1.0
+    assert 0 < rows[SAME_PICTURE]["stages"]["beauty"] < rows[CYCLES]["seconds"] * 2
     assert rows[SAME_SAMPLES]["gain"] > rows[SAME_PICTURE]["gain"] - 1.0
     assert all(0 < row["flicker"] < 0.1 for row in rows.values())
     assert all(row["seconds"] > 0 and row["psnr"] > 15 for row in rows.values())

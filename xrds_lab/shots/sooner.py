@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -85,7 +85,8 @@ class Made:
 
     `seconds` are of a frame by the clock, `processor` of all cores; `late` the latter
     of a frame of the last third of the shot, None of one alone.
-    `shares` are of the file's samples, one for each frame.
+    `shares` are of the file's samples, one for each frame. `stages` are the seconds by
+    the clock of each part of a late frame, which run beside those of other frames.
     """
 
     radiance: Array
@@ -95,6 +96,7 @@ class Made:
     stops: float
     shares: tuple[float, ...] = ()
     late: float | None = None
+    stages: dict[str, float] = field(default_factory=dict)
 
     def within(self, place: tuple[slice, slice]) -> Made:
         """The same of rows and columns of the pictures."""
@@ -217,6 +219,7 @@ class _Scene:
             "mean_share": round(float(np.mean(made.shares or [1.0])), 3),
             "late_share": round(_late(made.shares), 3) if made.shares else None,
             "shares": [round(x, 3) for x in made.shares],
+            "stages": {name: round(x, 3) for name, x in made.stages.items()},
             "psnr": round(verdict.psnr, 3),
             "gain": round(verdict.gain, 3),
             "flip": round(error, 5),
@@ -294,12 +297,13 @@ def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     middle = scene.frame_current
     numbers = range(middle - reach, middle + reach + 1)
     job = render_request(scale=1, temporal_radius=REACH, **choices)
-    shown, shares, spent = {}, [], []
+    shown, shares, spent, stages = {}, [], [], []
     started, busy = time.perf_counter(), time.process_time()
     for number, picture in render_shot(scene, job, numbers):
         assert picture.settings is not None
         shares.append(float(picture.settings.share))
         spent.append(time.process_time())
+        stages.append(picture.seconds)
         if number in (middle, middle + 1):
             shown[number] = np.asarray(picture.radiance, np.float32)
     seconds = (time.perf_counter() - started) / len(numbers)
@@ -310,7 +314,15 @@ def _shot(shot: Shot, case: Case, frames: int, **choices: bool) -> Made:
     # is known, and of the last ones none is sampled
     between = np.diff(spent)[: len(spent) - REACH - 2]
     late = statistics.median(between[-len(spent) // 3 :])
-    return Made(*pictures, seconds, processor, stops, tuple(shares), float(late))
+    return Made(
+        *pictures,
+        seconds,
+        processor,
+        stops,
+        tuple(shares),
+        float(late),
+        {name: _late([x.get(name, 0.0) for x in stages]) for name in stages[-1]},
+    )
 
 
 def _late(values: Sequence[float]) -> float:
