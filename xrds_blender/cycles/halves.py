@@ -21,11 +21,18 @@ from xrds_core.arrays import Array
 from xrds_core.denoising.light_passes import LightPart, passes_by_name
 
 from ..internals.borrowed import Borrowed
-from . import session
+from . import live, session
 from .layer_session import LayerSession
 from .low_resolution import Region
 from .passes import CyclesPasses
-from .samples import COUNTS, GEOMETRY, sample_layer
+from .samples import (
+    COUNTS,
+    GEOMETRY,
+    Reader,
+    read_samples,
+    render_layer,
+    sample_layer,
+)
 from .session import StageClock
 from .settings import SAMPLE_COUNT, first_look, is_of_first_sample, set_share
 
@@ -77,6 +84,7 @@ def sample_halves(
         If the user stops it.
     """
     is_even = COUNTS not in geometry
+    names = {name for name, _ in geometry}
     parts, passes, clocks = [], [], []
     with LayerSession(engine, depsgraph) as layer, Borrowed() as borrowed:
         halves = subset.halves()
@@ -86,16 +94,17 @@ def sample_halves(
             if halves[0].length > first_look(scene.cycles.adaptive_min_samples):
                 halves = subset.sequences()
         for part in halves:
-            samples, clock = sample_layer(
-                engine,
-                depsgraph,
-                subset=part,
-                is_even=is_even,
-                geometry=geometry,
-                light=light,
+            clock = render_layer(
+                engine, depsgraph, subset=part, is_even=is_even, geometry=geometry
             )
+            found = layer.all_passes()
+            samples = {
+                view: read_samples(_reader(found, view), names, light)
+                for view in layer.views
+            }
+            live.show(samples[layer.views[0]].picture)
             parts.append({v: counted(x, part, clock) for v, x in samples.items()})
-            passes.append(layer.all_passes())
+            passes.append(found)
             clocks.append(clock)
         shares = subset.shares()
         by_view = {
@@ -108,6 +117,11 @@ def sample_halves(
             | _light_passes(light, by_view)
         )
     return by_view, seconds_of(clocks)
+
+
+def _reader(passes: _Named, view: str) -> Reader:
+    """Pixels of a view's passes, each of which is read of the result once."""
+    return lambda name: passes.get((view, name))
 
 
 def counted(samples: Passes, part: SampleSubset, clock: StageClock) -> Passes:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from xrds_core.accumulation.passes import Passes
+from xrds_core.accumulation.passes import Passes, contiguous
 from xrds_core.accumulation.sample_subsets import SampleSubset
 from xrds_core.arrays import Array
 from xrds_core.denoising.light_passes import LightPart, light_of
@@ -89,9 +89,34 @@ def sample_layer(
         If the user stops it.
     """
     layer_name = depsgraph.view_layer_eval.name
+    clock = render_layer(
+        engine,
+        depsgraph,
+        samples=samples,
+        seed=seed,
+        subset=subset,
+        is_even=is_even,
+        geometry=geometry,
+    )
+    by_view = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
+    live.show(next(iter(by_view.values())).picture)
+    return by_view, clock
+
+
+def render_layer(
+    engine: Any,
+    depsgraph: Any,
+    *,
+    samples: int | None = None,
+    seed: int | None = None,
+    subset: SampleSubset | None = None,
+    is_even: bool = True,
+    geometry: Sequence[tuple[str, str]] = (),
+) -> session.StageClock:
+    """Render what `sample_layer` does, into the result alone."""
     for name, letters in geometry:
-        spare_passes.add(engine, layer_name, name, letters)
-    clock = render_once(
+        spare_passes.add(engine, depsgraph.view_layer_eval.name, name, letters)
+    return render_once(
         engine,
         depsgraph,
         samples=samples,
@@ -100,9 +125,6 @@ def sample_layer(
         subset=subset,
         is_even=is_even,
     )
-    by_view = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
-    live.show(next(iter(by_view.values())).picture)
-    return by_view, clock
 
 
 def samples_in(
@@ -137,15 +159,15 @@ def read_samples(
     depth, vector = read_geometry(read, geometry) if geometry else (None, None)
     counts = read(SAMPLE_COUNT) if SAMPLE_COUNT in wanted else None
     if counts is not None:  # all 0 where this Blender's pass has another name
-        counts = np.ascontiguousarray(counts[..., 0]) if counts.any() else None
+        counts = contiguous(counts[..., 0]) if counts.any() else None
     path = read(DEPTH) if {DEPTH, FIRST_HIT} <= {*wanted} else None
     if path is not None:
-        path = np.ascontiguousarray(path[..., 0])
+        path = contiguous(path[..., 0])
     return Passes(
-        radiance=np.ascontiguousarray(picture[..., :3]),
-        alpha=np.ascontiguousarray(picture[..., 3]),
-        albedo=np.ascontiguousarray(albedo),
-        normal=np.ascontiguousarray(normal),
+        radiance=contiguous(picture[..., :3]),
+        alpha=contiguous(picture[..., 3]),
+        albedo=contiguous(albedo),
+        normal=contiguous(normal),
         depth=depth,
         vector=vector,
         counts=counts,
@@ -170,11 +192,11 @@ def read_geometry(read: Reader, wanted: Collection[str]) -> tuple[Array, Array |
     is_late = DEPTH in wanted and FIRST_HIT not in wanted
     depth = read(DEPTH if is_late else FIRST_HIT)
     assert depth is not None
-    depth = np.ascontiguousarray(depth[..., 0])
+    depth = contiguous(depth[..., 0])
     if is_late:
         depth = np.where(depth > 0.0, depth, np.float32(np.inf))  # 0 is the sky
     vector = read(MOTION) if MOTION in wanted else None
-    return depth, None if vector is None else np.ascontiguousarray(vector)
+    return depth, None if vector is None else contiguous(vector)
 
 
 def render_once(

@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from xrds_core.accumulation.passes import contiguous
 from xrds_core.errors import Cancelled
 
 from ..internals import spare_passes
@@ -211,7 +212,7 @@ def write_pass(layer: Any, name: str, view: str, pixels: Array) -> None:
 
     render_pass = layer.passes.find_by_name(name, view)
     if render_pass is not None:
-        flipped = np.ascontiguousarray(pixels[::-1], dtype=np.float32)
+        flipped = contiguous(pixels[::-1].astype(np.float32, copy=False))
         render_pass.rect.foreach_set(flipped.ravel())
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from ..errors import PictureError
+from ..native.library import bands, in_threads
 
 if TYPE_CHECKING:
     from ..arrays import Array
@@ -167,4 +168,26 @@ def weighted_mean(first: Array, second: Array, share: Array) -> Array:
     The share is (H, W), or one number.
     """
     wide = share[(...,) + (None,) * (first.ndim - 2)] if share.ndim else share
-    return np.asarray(first * wide + second * (np.float32(1.0) - wide))
+    mean = np.empty(first.shape, np.result_type(first, second, wide))
+
+    def work(rows: tuple[int, int]) -> None:
+        band = slice(*rows)
+        of_first = wide[band] if wide.ndim else wide
+        np.multiply(first[band], of_first, out=mean[band])
+        mean[band] += second[band] * (np.float32(1.0) - of_first)
+
+    in_threads(work, bands(len(first)))
+    return mean
+
+
+def contiguous(picture: Array) -> Array:
+    """Return a picture in the order of memory; a copy where it is not in that."""
+    if picture.flags.c_contiguous:
+        return picture
+    copy = np.empty(picture.shape, picture.dtype)
+
+    def work(rows: tuple[int, int]) -> None:
+        copy[slice(*rows)] = picture[slice(*rows)]
+
+    in_threads(work, bands(len(picture)))
+    return copy
