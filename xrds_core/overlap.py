@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from types import TracebackType
 
 T = TypeVar("T")
+Other = TypeVar("Other")
 
 
 class Overlap(Generic[T]):
@@ -23,6 +24,7 @@ class Overlap(Generic[T]):
     """
 
     def __init__(self, is_on: bool) -> None:
+        self.is_on = is_on
         self._pool = ThreadPoolExecutor(1, "finish") if is_on else None
         self._begun: Future[T] | None = None
 
@@ -38,6 +40,13 @@ class Overlap(Generic[T]):
         made = [] if before is None else [before.result()]
         self._begun = self._pool.submit(work)  # beside what is done with the result
         yield from made
+
+    def begin(self, work: Callable[[], Other]) -> Callable[[], Other]:
+        """Begin other work after what was put; returns what waits for its result.
+
+        Without `is_on` it is done when that is called.
+        """
+        return work if self._pool is None else self._pool.submit(work).result
 
     def rest(self) -> Iterator[T]:
         """Yield what the last piece makes, if there is one."""

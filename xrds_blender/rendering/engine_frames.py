@@ -7,12 +7,13 @@ are evaluated and sampled too, those ahead as well; none is sampled twice.
 from __future__ import annotations
 
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from xrds_core.arrays import Array
 from xrds_core.frame_source import FrameSource, Neighbourhood, Window
+from xrds_core.overlap import Overlap
 from xrds_core.shot import Shot
 
 from ..cycles import session
@@ -103,17 +104,29 @@ class EngineFrames(FrameSource[Sampled]):
         assert frame is not None
         return frame
 
-    def sample_next(self, engine: Any, depsgraph: Any) -> None:
+    def sample_next(self, engine: Any, depsgraph: Any, overlap: Overlap[Any]) -> None:
         """Sample what the frame after this one needs, while this one is finished.
 
-        The render result afterwards holds the passes that it held before. Raises
-        Cancelled when the user stops it.
+        Where frames are prepared, the next one is as well, while what the frame after
+        it needs is sampled. The render result afterwards holds the passes that it held
+        before. Raises Cancelled when the user stops it.
         """
         number = depsgraph.scene_eval.frame_current
-        later = [n for n in self.window.shot.frames if n > number]
-        missing = self.window.missing(min(later)) if later else []
+        later = sorted(n for n in self.window.shot.frames if n > number)
+        if not later:
+            return
+        self._sample_ahead(engine, depsgraph, self.window.missing(later[0]))
+        if self.prepares:
+            self.window.prepare(later[0], overlap)
+            for after in later[1:2]:
+                self._sample_ahead(engine, depsgraph, self.window.missing(after))
+
+    def _sample_ahead(
+        self, engine: Any, depsgraph: Any, missing: Sequence[int]
+    ) -> None:
         if not missing:
             return
+        number = depsgraph.scene_eval.frame_current
         with CyclesPasses(engine, depsgraph) as passes:
             before = passes.all_passes()
             self._call = _Call(engine, depsgraph, passes, number, None)
@@ -125,7 +138,17 @@ class EngineFrames(FrameSource[Sampled]):
                 go_to(engine, depsgraph, number)
                 passes.put_back(before)
 
-    def complete(self, frame: Neighbourhood[Sampled]) -> tuple[Sampled, Sampled]:
+    @property
+    def prepares(self) -> bool:
+        return self.method.prepares
+
+    def prepare(self, frame: Neighbourhood[Sampled]) -> Any:
+        """What of judging a frame needs no render."""
+        return self.method.prepare(frame.own, list(frame.neighbours.values()))
+
+    def complete(
+        self, frame: Neighbourhood[Sampled], prepared: Any
+    ) -> tuple[Sampled, Sampled]:
         """The frame with more samples, or sampled again, where it lacks them."""
         call, others = self._call, list(frame.neighbours.values())
         assert call is not None
@@ -140,7 +163,7 @@ class EngineFrames(FrameSource[Sampled]):
             request = self.method.request
             return render_more(call.engine, call.depsgraph, request, place, part)
 
-        return completed(self.method, frame.own, others, more)
+        return completed(self.method, frame.own, others, more, prepared)
 
     def load(self, number: int) -> Sampled:
         """Sample a frame, and keep its passes where others overwrite them."""

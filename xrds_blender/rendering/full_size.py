@@ -87,8 +87,15 @@ class FullSize(Method):
                 if pace.takes(self, sampled):
                     return sampled
 
-    def complete(self, own: Sampled, others: Sequence[Sampled], more: More) -> Sampled:
-        return own if self.pace is None else self.pace.complete(self, own, others, more)
+    def prepare(self, own: Sampled, others: Sequence[Sampled]) -> Any:
+        return None if self.pace is None else self.pace.prepare(self, own, others)
+
+    def complete(
+        self, own: Sampled, others: Sequence[Sampled], more: More, prepared: Any
+    ) -> Sampled:
+        if self.pace is None:
+            return own
+        return self.pace.complete(self, own, others, more, prepared)
 
     def begin_finishing(self, engine: Any) -> Report:
         if self._timed.denoise_in_time is not None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 from xrds_core.accumulation.accumulate import Accumulated
 from xrds_core.arrays import Array
@@ -60,12 +60,26 @@ class Pace(Protocol):
     def takes(self, method: Finishing, frame: Sampled) -> bool:
         """Note a frame that was sampled; False where it is to be sampled again."""
 
+    prepares: ClassVar[bool]
+    """Whether `prepare` takes long enough to be done beside the samples of a frame."""
+
+    def prepare(
+        self, method: Finishing, own: Sampled, others: Sequence[Sampled]
+    ) -> Any:
+        """What `complete` takes that needs no render, perhaps in another thread."""
+
     def complete(
-        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: More
+        self,
+        method: Finishing,
+        own: Sampled,
+        others: Sequence[Sampled],
+        more: More,
+        prepared: Any,
     ) -> Sampled:
         """A frame with all that it is finished from; `more` renders more samples.
 
-        Raises Cancelled when the user stops their render.
+        `prepared` is what `prepare` has returned. Raises Cancelled when the user stops
+        their render.
         """
 
 
@@ -111,10 +125,22 @@ class Method:
         """Whether what is missing of a frame is not shown by others after all."""
         return False
 
-    def complete(self, own: Sampled, others: Sequence[Sampled], more: More) -> Sampled:
+    @property
+    def prepares(self) -> bool:
+        """Whether `prepare` takes long enough to be done beside a frame's samples."""
+        return self.pace is not None and self.pace.prepares
+
+    def prepare(self, own: Sampled, others: Sequence[Sampled]) -> Any:
+        """What `complete` takes that needs no render, perhaps in another thread."""
+        return None
+
+    def complete(
+        self, own: Sampled, others: Sequence[Sampled], more: More, prepared: Any
+    ) -> Sampled:
         """The frame with all that it is finished from; `more` renders more samples.
 
-        Raises Cancelled when the user stops their render.
+        `prepared` is what `prepare` has returned. Raises Cancelled when the user stops
+        their render.
         """
         return own
 
@@ -193,13 +219,17 @@ class CyclesOnly(Method):
 
 
 def completed(
-    method: Method, own: Sampled, others: Sequence[Sampled], more: More
+    method: Method,
+    own: Sampled,
+    others: Sequence[Sampled],
+    more: More,
+    prepared: Any,
 ) -> tuple[Sampled, Sampled]:
     """A frame with all that it is finished from, and what it lends to others.
 
     It lends the samples that it has got as well, but what was accumulated on it is its
     own.
     """
-    whole = method.complete(own, others, more)
+    whole = method.complete(own, others, more, prepared)
     lent = own if whole.views is own.views else replace(whole, gathered={})
     return whole, lent

@@ -201,7 +201,7 @@ def _finish(
     method: Method,
     own: Sampled,
     others: Sequence[Sampled] = (),
-    ahead: Callable[[], None] | None = None,
+    ahead: Callable[[Overlap[Any]], None] | None = None,
 ) -> Picture:
     """Make the picture of each view and write it; returns the first view's.
 
@@ -219,7 +219,7 @@ def _finish(
             # Blender's progress is for its own thread alone
             with Overlap[dict[str, Picture]](True) as overlap:
                 list(overlap.put(partial(finish, None)))
-                ahead()
+                ahead(overlap)
                 (pictures,) = overlap.rest()
         session.stop_if_cancelled(engine)
     except NetworkFailed:

@@ -102,13 +102,23 @@ class _SceneFrames(FrameSource[Sampled]):
     def is_done(self, frame: Neighbourhood[Sampled]) -> bool:
         return self.finished(frame.number)
 
-    def complete(self, frame: Neighbourhood[Sampled]) -> tuple[Sampled, Sampled]:
+    @property
+    def prepares(self) -> bool:
+        return self.method.prepares
+
+    def prepare(self, frame: Neighbourhood[Sampled]) -> Any:
+        return self.method.prepare(frame.own, list(frame.neighbours.values()))
+
+    def complete(
+        self, frame: Neighbourhood[Sampled], prepared: Any
+    ) -> tuple[Sampled, Sampled]:
         number, others = frame.number, list(frame.neighbours.values())
         if self.method.lacks(frame.own, others):
             own = _sample(self.scene, self.method, self.numbers, number)
             own = replace(own, strength=frame.own.strength)
             return own, own
-        return completed(self.method, frame.own, others, partial(self._more, number))
+        more = partial(self._more, number)
+        return completed(self.method, frame.own, others, more, prepared)
 
     def _more(self, number: int, part: Part) -> Any:
         self.scene.frame_set(number)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from statistics import median
 
+_RENDERS = 2  # in which a frame is sampled, half of its samples each
 _FRAMES = 5  # that are timed before anything is said
 LEAST = 0.1
 """Share of Cycles' seconds that has to be saved: else a better picture is worth more.
@@ -18,11 +19,17 @@ class Savings:
 
     Attributes
     ----------
+    samples : int
+        Samples of the file's frames.
     denoising : float
         Seconds that Cycles' denoiser takes for one picture.
+    one : float or None
+        Seconds of a render of one sample; None as long as that is not known.
     """
 
+    samples: int
     denoising: float = 0.0
+    one: float | None = None
     _last: float | None = None
     _ours: list[float] = field(default_factory=list)
     _theirs: list[float] = field(default_factory=list)
@@ -49,10 +56,21 @@ class Savings:
             Share of all samples that it was rendered with.
         """
         if self._last is not None:
-            sampling = seconds.get("beauty", 0.0) / share
+            sampling = self._of_all(seconds.get("beauty", 0.0), share)
             self._ours.append(now - self._last)
             self._theirs.append(seconds.get("sync", 0.0) + sampling + self.denoising)
         self._last = now
+
+    def _of_all(self, seconds: float, share: float) -> float:
+        """Return the seconds of a render of all samples, by those of a share.
+
+        On a card most of a render of few samples is not spent on samples.
+        """
+        most, count = seconds / share, share * self.samples
+        if self.one is None or count <= _RENDERS:
+            return most
+        sample = (seconds - _RENDERS * self.one) / (count - _RENDERS)
+        return min(self.one + max(sample, 0.0) * (self.samples - 1), most)
 
     @property
     def are_known(self) -> bool:

@@ -298,11 +298,18 @@ class _Card(FrameSource[_Judged]):
             time.sleep(_SAMPLING)
         return self._stored[number], None
 
-    def complete(self, frame: Neighbourhood[_Judged]) -> tuple[_Judged, _Judged]:
-        own, _ = frame.own
+    @property
+    def prepares(self) -> bool:
+        return True
+
+    def prepare(self, frame: Neighbourhood[_Judged]) -> accumulation.Accumulated:
         others = [stored for stored, _ in frame.neighbours.values()]
-        found = accumulation.accumulate(own, others, self._movement)
-        return (own, found), frame.own
+        return accumulation.accumulate(frame.own[0], others, self._movement)
+
+    def complete(
+        self, frame: Neighbourhood[_Judged], prepared: accumulation.Accumulated
+    ) -> tuple[_Judged, _Judged]:
+        return (frame.own[0], prepared), frame.own
 
 
 def _bytes(frame: Frame | Stored) -> int:

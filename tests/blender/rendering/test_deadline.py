@@ -84,7 +84,7 @@ class Farm:
                     return frame
 
         for found in Window(Shot(tuple(range(frames)), RADIUS), Frames(load)):
-            frame = pace.complete(self, found.own, (), lambda _: ({}, {}))
+            frame = pace.complete(self, found.own, (), lambda _: ({}, {}), None)
             assert frame.decisions[0].decision == "deadline"
             self.finish()
             yield found.number

@@ -12,10 +12,12 @@ import pytest
 from channels import read_channels
 
 from xrds_blender.cycles.session import samples_on_card
+from xrds_blender.cycles.settings import has_subsets
 from xrds_blender.planning.request import render_request
 from xrds_blender.rendering import render as renders
 from xrds_blender.rendering import shot as shots
 from xrds_blender.rendering.full_size import FullSize
+from xrds_blender.rendering.pace import obstacles
 
 FRAMES = range(1, 6)
 
@@ -47,6 +49,67 @@ def test_a_shot_is_the_same_and_finished_while_the_next_is_sampled(
         np.testing.assert_array_equal(picture.radiance, expected[number].radiance)
     assert len(threads) == len(FRAMES)
     assert all(name.startswith("finish") for name in threads)
+
+
+@pytest.mark.skipif(
+    not has_subsets(bpy.context.scene), reason="Cycles has no sample subsets"
+)
+def test_a_frame_is_judged_while_the_next_is_sampled(
+    life: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One frame late, in a shot as in the engine's own animation."""
+    life.cycles.samples, life.cycles.use_adaptive_sampling = 8, False
+    numbers = range(1, 10)
+    monkeypatch.setattr(obstacles, "FEWEST_FRAMES", len(numbers))
+    events: list[str] = []
+    inner = {x: getattr(FullSize, x) for x in ("sample", "prepare", "complete")}
+
+    def noted(name: str, number: int, worked_on: str) -> None:
+        assert threading.current_thread().name.startswith(worked_on)
+        events.append(f"{name} {number}")
+
+    def sample(self: Any, engine: Any, depsgraph: Any, *more: Any, **how: Any) -> Any:
+        noted("sample", depsgraph.scene_eval.frame_current, "Main")
+        return inner["sample"](self, engine, depsgraph, *more, **how)
+
+    def prepare(self: Any, own: Any, others: Any) -> Any:
+        noted("prepare", own.number, "finish" if own.number > first else "")
+        return inner["prepare"](self, own, others)
+
+    def complete(self: Any, own: Any, *more: Any) -> Any:
+        noted("complete", own.number, "Main")
+        return inner["complete"](self, own, *more)
+
+    for method in (sample, prepare, complete):
+        monkeypatch.setattr(FullSize, method.__name__, method)
+    for module in (shots, renders):
+        monkeypatch.setattr(module, "samples_on_card", lambda _: True)
+    first = 0
+    job = render_request(scale=1, temporal_radius=1, same_picture=True)
+    pictures = dict(shots.render_shot(life, job, numbers))
+    assert list(pictures) == list(numbers)
+    orders = [list(events)]
+    events.clear()
+    first = 1  # there is nothing to judge the engine's first frame beside
+    life.render.engine = "XRDS"
+    life.xrds.mode, life.xrds.temporal_radius = "full_size", 1
+    life.xrds.animation = "same_picture"
+    life.frame_start, life.frame_end = numbers[0], numbers[-1]
+    life.render.filepath = str(tmp_path / "#.exr")
+    life.render.image_settings.file_format = "OPEN_EXR"
+    bpy.ops.render.render(animation=True)
+    orders.append(events)
+    for order in orders:
+        for name in ("sample", "prepare", "complete"):
+            done = [x for x in order if x.startswith(name)]
+            assert done == [f"{name} {n}" for n in numbers]
+        for number in range(2, 8):
+            judged, made = (
+                order.index(f"{x} {number}") for x in ("prepare", "complete")
+            )
+            last, later = (order.index(f"sample {number + x}") for x in (1, 2))
+            assert last < judged < made
+            assert later < made
 
 
 def test_an_animation_of_the_engine_is_the_same(

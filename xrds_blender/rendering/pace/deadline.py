@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, ClassVar
 
 from xrds_core.errors import warn
 from xrds_core.progress import duration
@@ -64,6 +64,7 @@ class Deadline:
     _completed: float | None = None  # when the last frame was
     _rendered: float = 0.0  # seconds of renders since then
     _is_late: bool = False  # and that was said
+    prepares: ClassVar[bool] = False
 
     def request(self, request: Request, number: int) -> Request:
         """The request of the next frame that is sampled, whatever its number."""
@@ -91,8 +92,18 @@ class Deadline:
         self._choose()
         return True
 
+    def prepare(
+        self, method: Finishing, own: Sampled, others: Sequence[Sampled]
+    ) -> None:
+        """Nothing: a frame is not judged."""
+
     def complete(
-        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: More
+        self,
+        method: Finishing,
+        own: Sampled,
+        others: Sequence[Sampled],
+        more: More,
+        prepared: None,
     ) -> Sampled:
         """The frame as it is, with why it has its samples."""
         now = _now()

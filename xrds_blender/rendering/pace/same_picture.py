@@ -14,10 +14,11 @@ from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from xrds_core.accumulation.accumulate import Accumulated
 from xrds_core.accumulation.passes import Passes
 from xrds_core.errors import warn
 from xrds_core.pace.error import gain
@@ -74,6 +75,20 @@ def same_picture(scene: Any, request: Request, shot: Shot) -> SamePicture | None
     return pace
 
 
+class Gathered(NamedTuple):
+    """A frame's `views` with the samples of `others`, and what these add to it.
+
+    It has `gained` so many times its own samples, among frames of its own share `even`
+    so many. That took `seconds`.
+    """
+
+    views: Mapping[str, Accumulated]
+    others: Sequence[Sampled]
+    gained: float
+    even: float
+    seconds: float
+
+
 @dataclass
 class SamePicture:
     """How many samples the frames of a shot take, from the first that is finished.
@@ -95,7 +110,7 @@ class SamePicture:
     # what a file with a threshold takes, on the mean of its pixels, once it is known
     _asked: float | None = None
     _worth: Worth = field(default_factory=Worth)
-    _savings: Savings = field(default_factory=Savings)
+    _savings: Savings = field(init=False)
     _is_decided: bool = False  # whether it saves enough, and that was said
     _takes_all: bool = False  # because it does not
     _reason: str = ""
@@ -107,6 +122,10 @@ class SamePicture:
     _requested: float = _FIRST  # the share of the frame that was sampled last
     _taken: int = 0  # of the sequence that frames continue under a still camera
     _taken_more: int = 0  # of that of more samples
+    prepares: ClassVar[bool] = True
+
+    def __post_init__(self) -> None:
+        self._savings = Savings(self.samples)
 
     def request(self, request: Request, number: int) -> Request:
         """The request of the next frame that is sampled."""
@@ -122,24 +141,39 @@ class SamePicture:
         self._taken += round(self.samples * self._requested)
         return True
 
+    def prepare(
+        self, method: Finishing, own: Sampled, others: Sequence[Sampled]
+    ) -> Gathered:
+        """A frame with the samples of its neighbours, and what these add to it."""
+        view, started = next(iter(own.views)), time.perf_counter()
+        frame, beside = own.views[view], [x.number for x in others]
+        others = (*others, *self._before(own, others))
+        gathered = {v: method.accumulate(own, others, v) for v in own.views}
+        gained = gain(gathered[view], frame)
+        lent = self._lent(self._shares.get(own.number, 1.0), beside)
+        even = gained if lent == 1.0 else gain(gathered[view], frame, lent)
+        seconds = time.perf_counter() - started
+        return Gathered(gathered, others, gained, even, seconds)
+
     def complete(
-        self, method: Finishing, own: Sampled, others: Sequence[Sampled], more: More
+        self,
+        method: Finishing,
+        own: Sampled,
+        others: Sequence[Sampled],
+        more: More,
+        prepared: Gathered,
     ) -> Sampled:
         """A frame with all that it is finished from, more samples where it lacks them.
 
         Raises Cancelled when the user stops their render.
         """
-        view, started = next(iter(own.views)), time.perf_counter()
-        frame, beside = own.views[view], [x.number for x in others]
-        others = [*others, *self._before(own, others)]
-        gathered = {v: method.accumulate(own, others, v) for v in own.views}
-        own = replace(own, gathered=gathered)
-        gained = gain(gathered[view], frame)
-        spent = {"accumulate": time.perf_counter() - started}
+        view, beside = next(iter(own.views)), [x.number for x in others]
+        frame, others = own.views[view], prepared.others
+        gained, even = prepared.gained, prepared.even
+        own = replace(own, gathered=prepared.views)
+        spent = {"accumulate": prepared.seconds}
         render = partial(_rendered, more, spent)
         share = self._shares.get(own.number, 1.0)
-        lent = self._lent(share, beside)  # among frames of its own share
-        even = gained if lent == 1.0 else gain(gathered[view], frame, lent)
         if self._is_new(own, beside, even):
             self._worth = Worth()
         extra: list[Extra] = []
@@ -151,6 +185,8 @@ class SamePicture:
         if beside and is_due and not self._takes_all:
             how = self.samples, self.exposure, self._measurements
             measured = measure(method, own, others, *how, render)
+            if not self._is_decided:
+                self._time_one(more, spent)
             extra += measured.extra
             self._learn(own, measured, gained, len(beside))
             is_whole = bool(measured.asked.all())
@@ -239,12 +275,19 @@ class SamePicture:
         price = price_of_measuring(next(iter(own.views.values())).shape)
         self._worth.add(measured.errors, share, gained, neighbours, price)
         self._savings.denoising = measured.denoising
+        self._savings.samples = self._of_file
         self._measured_in = own.number
         self._measurements += 1
         self._reason = (
             f"measured in frame {own.number}: with neighbours, {share:.0%} of them had "
             f"{measured.errors.ratio:.2f} times the error of the file's"
         )
+
+    def _time_one(self, more: More, spent: dict[str, float]) -> None:
+        """Note what a render of one sample takes, which is not used."""
+        _, seconds = more(Part(1, 1.0 / self.samples, sequence=0))
+        self._savings.one = seconds["beauty"]
+        spent.update(_added(spent, seconds))
 
     def _note_seconds(self, own: Sampled, share: float, was_measured: bool) -> None:
         """Note what a frame took; decide once whether fewer samples are sooner."""
