@@ -15,8 +15,8 @@ from xrds_lab.bench.windows import Window, find_shots
 from xrds_lab.cards import cycles
 from xrds_lab.commands import bench_shots
 from xrds_lab.shots import motions, sooner
-from xrds_lab.shots.methods import CYCLES, SAME_PICTURE
-from xrds_lab.shots.sooner import SAME_SAMPLES, Case
+from xrds_lab.shots.methods import CYCLES, SAME_PICTURE, SAME_SAMPLES
+from xrds_lab.shots.sooner import Case
 
 pytestmark = pytest.mark.nightly  # it takes minutes
 

@@ -37,7 +37,7 @@ SHOTS = ("hand_held", "figure", "plane_mirror")
 SIZES = ((1920, 1080), (3840, 2160))
 SAMPLES = (16, 4, 1, 64)
 RADII = (1, 2, 4)
-MINUTES = 20.0
+MINUTES = 10.0
 PICTURE_SAMPLES = 64  # of a file whose picture is made in fewer
 
 

@@ -24,8 +24,8 @@ def add_device_report(benches: Any) -> argparse.ArgumentParser:
     add(
         "--minutes",
         type=arguments.factor,
-        default=20.0,
-        help="after which nothing more is begun; a second run goes on (default: 20)",
+        default=10.0,
+        help="after which nothing more is begun; a second run goes on (default: 10)",
     )
     command.set_defaults(work=_device_report)
     return command

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..gallery.judge import keeps_rule
 from ..shots.frames import REACH
-from ..shots.methods import DEFAULT, XRDS
+from ..shots.methods import CYCLES, DEFAULT, SAME_SAMPLES, XRDS
 from .results import LONG_SHOT, OLD_PATTERN, beside_cycles, only
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ def figures(results: Results) -> Figures:
         **_denoisers(results),
         **_low_budgets(results),
         **_networks(results),
+        **_cards(results),
         **_installs(results),
     }
 
@@ -206,6 +207,22 @@ def _denoisers(results: Results) -> Figures:
 def _low_budgets(results: Results) -> Figures:
     gains = [x["gain"] for x in only(results.low_budgets, guides="rendered")]
     return {"rendered.least": min(gains), "rendered.most": max(gains)}
+
+
+def _cards(results: Results) -> Figures:
+    cycles, shots = (
+        only(results.card_pans, method=method) for method in (CYCLES, SAME_SAMPLES)
+    )
+    found = {
+        "cycles": [x["seconds"] for x in cycles],
+        "shot": [x["seconds"] for x in shots],
+        "gain": [x["gain"] for x in shots],
+    }
+    return {
+        f"card.{name}.{which.__name__}": which(values)
+        for name, values in found.items()
+        for which in (min, max)
+    }
 
 
 def _networks(results: Results) -> Figures:

@@ -197,6 +197,12 @@ class Results:
         """Seconds on a graphics card."""
         return self.read("card/h200.json")
 
+    @cached_property
+    def card_pans(self) -> Rows:
+        """Return pans on a graphics card: real scenes, and shots of the gallery."""
+        shots = self.read("card/same-picture.json")["shots"]
+        return [*shots, *self.read("card/device-report.json")["pans"]]
+
     def both(self, samples: int) -> Rows:
         """Return shots where camera and objects move beside Cycles + OIDN."""
         rows = self.read("shots/both.json")["shots"]

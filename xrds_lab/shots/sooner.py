@@ -33,7 +33,7 @@ from ..csv_table import write_table
 from ..gallery.judge import compare
 from ..progress import report_line
 from .frames import MIDDLE, REACH, ShotFrames
-from .methods import CYCLES, SAME_PICTURE
+from .methods import CYCLES, SAME_PICTURE, SAME_SAMPLES
 from .motions import animate
 from .truth import Truth, requests_of_truth
 
@@ -53,7 +53,6 @@ FRAMES = 21
 """
 MOST_SAMPLES = 4096
 """Of a pixel under a noise threshold, as in a new file."""
-SAME_SAMPLES = "same_samples"
 _IN_TURN = ((CYCLES, SAME_PICTURE), (SAME_SAMPLES,))  # what takes longest comes last
 _TIMED = 3  # frames of Cycles, around the middle one
 REFERENCE_SAMPLES = 128
