@@ -182,7 +182,9 @@ def test_the_add_on_s_top_is_its_front_alone() -> None:
     assert [path.name for path in files] == ["__init__.py"]
 
 
-@pytest.mark.parametrize("module", [*PACKAGES, "xrds_lab.cards.report"])
+@pytest.mark.parametrize(
+    "module", [*PACKAGES, "xrds_lab.cards.report", "xrds_lab.shots.own_seconds"]
+)
 def test_what_a_bare_machine_runs_loads_no_torch(module: str) -> None:
     code = f"import sys, {module}; sys.exit('torch' in sys.modules)"
     done = subprocess.run(

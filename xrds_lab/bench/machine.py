@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import os
 import platform
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,19 +50,18 @@ def only_cores(count: int) -> Iterator[None]:
 
     Threads made meanwhile inherit it. Raises OSError where there are too few.
     """
-    import torch
-
     allowed = sorted(os.sched_getaffinity(0))
     if count > len(allowed):
         raise OSError(f"this process may use {len(allowed)} cores, not {count}")
-    threads = torch.get_num_threads()
-    _hold(set(allowed[:count]))
-    torch.set_num_threads(count)
-    try:
+    with ExitStack() as held:
+        with suppress(ImportError):  # full size and shots need none
+            import torch
+
+            held.callback(torch.set_num_threads, torch.get_num_threads())
+            torch.set_num_threads(count)
+        held.callback(_hold, set(allowed))
+        _hold(set(allowed[:count]))
         yield
-    finally:
-        _hold(set(allowed))
-        torch.set_num_threads(threads)
 
 
 def _hold(chosen: set[int]) -> None:
