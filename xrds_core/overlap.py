@@ -1,4 +1,4 @@
-"""Work in a thread of its own, such as finishing a frame while a card samples the next.
+"""Work in threads of its own, such as finishing a frame while a card samples the next.
 
 On the processor both would share the same cores: nothing is gained there.
 """
@@ -17,15 +17,15 @@ Other = TypeVar("Other")
 
 
 class Overlap(Generic[T]):
-    """Runs work beside what goes on here, one piece at a time, in order.
+    """Runs work beside what goes on here, in order: one piece at a time.
 
+    Beside that piece other work can be begun, such as what prepares the next one.
     Without `is_on` it runs where it is put. Work that is left when an error ends the
     `with` block is dropped: nobody waits for it.
     """
 
     def __init__(self, is_on: bool) -> None:
-        self.is_on = is_on
-        self._pool = ThreadPoolExecutor(1, "finish") if is_on else None
+        self._pool = ThreadPoolExecutor(2, "finish") if is_on else None
         self._begun: Future[T] | None = None
 
     def put(self, work: Callable[[], T]) -> Iterator[T]:
@@ -42,7 +42,7 @@ class Overlap(Generic[T]):
         yield from made
 
     def begin(self, work: Callable[[], Other]) -> Callable[[], Other]:
-        """Begin other work after what was put; returns what waits for its result.
+        """Begin other work beside what was put; returns what waits for its result.
 
         Without `is_on` it is done when that is called.
         """

@@ -35,6 +35,21 @@ def test_one_piece_runs_beside_what_goes_on_here() -> None:
         assert all(overlap.rest())
 
 
+def test_other_work_runs_beside_a_piece() -> None:
+    both = threading.Barrier(2)
+    with Overlap[int](True) as overlap:
+        for _ in range(3):
+            list(overlap.put(lambda: both.wait(600)))
+            found = overlap.begin(lambda: both.wait(600))
+        assert {found(), *overlap.rest()} == {0, 1}
+    made: list[int] = []
+    with Overlap[int](False) as overlap:
+        work = overlap.begin(lambda: made.append(1))
+        assert made == []
+        work()
+    assert made == [1]
+
+
 def test_the_next_piece_has_begun_when_a_result_is_taken() -> None:
     begun = threading.Event()
     with Overlap[bool](True) as overlap:
