@@ -18,6 +18,7 @@ from xrds_blender.rendering import render as renders
 from xrds_blender.rendering import shot as shots
 from xrds_blender.rendering.full_size import FullSize
 from xrds_blender.rendering.pace import obstacles
+from xrds_blender.rendering.pace.same_picture import SamePicture
 
 FRAMES = range(1, 6)
 
@@ -112,14 +113,26 @@ def test_a_frame_is_judged_while_the_next_is_sampled(
             assert later < made
 
 
+@pytest.mark.parametrize("ahead", [2, 3])
 def test_an_animation_of_the_engine_is_the_same(
-    life: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    life: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ahead: int
 ) -> None:
-    """Pictures and passes, with frames sampled while the one before is finished."""
+    """Pictures and passes, with frames sampled while the one before is finished.
+
+    One further `ahead` where it is judged how many samples a frame needs.
+    """
+    if ahead == 3:
+        if not has_subsets(life):
+            pytest.skip("Cycles has no sample subsets")
+        life.cycles.samples, life.cycles.use_adaptive_sampling = 8, False
+        monkeypatch.setattr(obstacles, "FEWEST_FRAMES", len(FRAMES))
+        # a later frame hears of it a frame later: here all have the same share
+        monkeypatch.setattr(SamePicture, "_choose_next", lambda *_: None)
+        life.xrds.animation = "same_picture"
     life.render.engine = "XRDS"
     life.xrds.mode, life.xrds.temporal_radius = "full_size", 1
     life.frame_start, life.frame_end = 1, 5
-    life.view_layers[0].use_pass_normal = True
+    life.view_layers[0].use_pass_normal = life.view_layers[0].use_pass_z = True
     for number in (1, 5):
         life.camera.location.x = 0.2 * number
         life.camera.keyframe_insert("location", frame=number)
@@ -166,5 +179,5 @@ def test_an_animation_of_the_engine_is_the_same(
     turn, beside = orders
     assert turn.index("sample 3") > turn.index("finish 1")
     assert turn.index("sample 4") > turn.index("finish 2")
-    assert beside.index("sample 4") < beside.index("finish 3")
+    assert beside.index(f"sample {ahead + 2}") < beside.index("finish 3")
     assert len(beside) == len(turn) == 2 * len(FRAMES)
