@@ -30,7 +30,7 @@ from .samples import (
     GEOMETRY,
     Reader,
     read_samples,
-    render_layer,
+    render_once,
     sample_layer,
 )
 from .session import StageClock
@@ -94,8 +94,13 @@ def sample_halves(
             if halves[0].length > first_look(scene.cycles.adaptive_min_samples):
                 halves = subset.sequences()
         for part in halves:
-            clock = render_layer(
-                engine, depsgraph, subset=part, is_even=is_even, geometry=geometry
+            clock = render_once(
+                engine,
+                depsgraph,
+                noisy=True,
+                subset=part,
+                is_even=is_even,
+                geometry=geometry,
             )
             found = layer.all_passes()
             samples = {

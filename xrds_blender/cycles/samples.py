@@ -89,34 +89,7 @@ def sample_layer(
         If the user stops it.
     """
     layer_name = depsgraph.view_layer_eval.name
-    clock = render_layer(
-        engine,
-        depsgraph,
-        samples=samples,
-        seed=seed,
-        subset=subset,
-        is_even=is_even,
-        geometry=geometry,
-    )
-    by_view = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
-    live.show(next(iter(by_view.values())).picture)
-    return by_view, clock
-
-
-def render_layer(
-    engine: Any,
-    depsgraph: Any,
-    *,
-    samples: int | None = None,
-    seed: int | None = None,
-    subset: SampleSubset | None = None,
-    is_even: bool = True,
-    geometry: Sequence[tuple[str, str]] = (),
-) -> session.StageClock:
-    """Render what `sample_layer` does, into the result alone."""
-    for name, letters in geometry:
-        spare_passes.add(engine, depsgraph.view_layer_eval.name, name, letters)
-    return render_once(
+    clock = render_once(
         engine,
         depsgraph,
         samples=samples,
@@ -124,7 +97,11 @@ def render_layer(
         noisy=True,
         subset=subset,
         is_even=is_even,
+        geometry=geometry,
     )
+    by_view = samples_in(engine, layer_name, {name for name, _ in geometry}, light)
+    live.show(next(iter(by_view.values())).picture)
+    return by_view, clock
 
 
 def samples_in(
@@ -209,6 +186,7 @@ def render_once(
     noisy: bool = False,
     subset: SampleSubset | None = None,
     is_even: bool = True,
+    geometry: Sequence[tuple[str, str]] = (),
 ) -> StageClock:
     """Render into the engine's result, exactly as Cycles' own engine would.
 
@@ -230,6 +208,8 @@ def render_once(
     is_even : bool
         Whether all pixels of a subset take as many samples; if not, the scene's noise
         threshold stays.
+    geometry : sequence of (str, str)
+        Further passes, as in `sample_layer`.
 
     Returns
     -------
@@ -243,9 +223,9 @@ def render_once(
     """
     keeps_session = engine.path_resolve("render").use_persistent_data
     scene, layer = depsgraph.scene_eval, depsgraph.view_layer_eval
-    if noisy:
-        for name, letters, _ in GUIDE_PASSES:
-            spare_passes.add(engine, layer.name, name, letters)
+    guides = [(name, letters) for name, letters, _ in GUIDE_PASSES]
+    for name, letters in (*geometry, *(guides if noisy else ())):
+        spare_passes.add(engine, layer.name, name, letters)
     with Borrowed() as borrowed:
         set_samples(borrowed, scene, samples, seed, subset, is_even)
         if noisy:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from xrds_core.arrays import Array
-from xrds_core.frame_source import FrameSource, Neighbourhood, Window
+from xrds_core.frame_source import Neighbourhood, Window
 from xrds_core.overlap import Overlap
 from xrds_core.shot import Shot
 
@@ -21,7 +21,7 @@ from ..cycles.passes import CyclesPasses
 from ..scene.contents import cuts, frame_range, requested_passes
 from ..scene.strength import strength_of
 from . import stages
-from .methods import Method, completed
+from .methods import Method, MethodFrames
 from .pace.more import Part, render_more
 from .sampling import Sampled, can_continue, first_sample
 
@@ -50,7 +50,7 @@ class _Call:
 
 
 @dataclass
-class EngineFrames(FrameSource[Sampled]):
+class EngineFrames(MethodFrames):
     """The frames of one view layer of an animation, for one render job.
 
     `ahead` are Cycles' own passes of frames that were sampled before their turn.
@@ -138,32 +138,23 @@ class EngineFrames(FrameSource[Sampled]):
                 go_to(engine, depsgraph, number)
                 passes.put_back(before)
 
-    @property
-    def prepares(self) -> bool:
-        return self.method.prepares
-
-    def prepare(self, frame: Neighbourhood[Sampled]) -> Any:
-        """What of judging a frame needs no render."""
-        return self.method.prepare(frame.own, list(frame.neighbours.values()))
-
     def complete(
         self, frame: Neighbourhood[Sampled], prepared: Any
     ) -> tuple[Sampled, Sampled]:
-        """The frame with more samples, or sampled again, where it lacks them."""
-        call, others = self._call, list(frame.neighbours.values())
+        assert self._call is not None
+        go_to(self._call.engine, self._call.depsgraph, frame.number)
+        return super().complete(frame, prepared)
+
+    def sample_again(self, number: int) -> Sampled:
+        self.ahead.pop(number, None)  # its own passes are rendered now
+        return self._sample(between=False)
+
+    def more(self, number: int, part: Part) -> Any:
+        call = self._call
         assert call is not None
-        go_to(call.engine, call.depsgraph, frame.number)
-        if self.method.lacks(frame.own, others):
-            self.ahead.pop(frame.number, None)  # its own passes are rendered now
-            own = replace(self._sample(between=False), strength=frame.own.strength)
-            return own, own
-
-        def more(part: Part) -> Any:
-            place = _place(call.depsgraph.scene_eval)
-            request = self.method.request
-            return render_more(call.engine, call.depsgraph, request, place, part)
-
-        return completed(self.method, frame.own, others, more, prepared)
+        place = _place(call.depsgraph.scene_eval)
+        request = self.method.request
+        return render_more(call.engine, call.depsgraph, request, place, part)
 
     def load(self, number: int) -> Sampled:
         """Sample a frame, and keep its passes where others overwrite them."""

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, ClassVar, Protocol
 
 from xrds_core.accumulation.accumulate import Accumulated
+from xrds_core.accumulation.passes import Passes
 from xrds_core.arrays import Array
+from xrds_core.frame_source import FrameSource, Neighbourhood
 from xrds_core.shot import Shot
 
 from ..cycles import session
@@ -19,7 +22,7 @@ from ..cycles.samples import render_once
 from ..cycles.settings import COMBINED
 from ..planning.request import Request
 from . import stages
-from .pace.more import More
+from .pace.more import More, Part
 from .picture import Picture, peak_memory
 from .sampling import Sampled
 
@@ -218,18 +221,41 @@ class CyclesOnly(Method):
         return lambda _: True
 
 
-def completed(
-    method: Method,
-    own: Sampled,
-    others: Sequence[Sampled],
-    more: More,
-    prepared: Any,
-) -> tuple[Sampled, Sampled]:
-    """A frame with all that it is finished from, and what it lends to others.
+class MethodFrames(FrameSource[Sampled]):
+    """Frames that a method samples and judges, whoever asks Cycles for them."""
 
-    It lends the samples that it has got as well, but what was accumulated on it is its
-    own.
-    """
-    whole = method.complete(own, others, more, prepared)
-    lent = own if whole.views is own.views else replace(whole, gathered={})
-    return whole, lent
+    method: Method
+
+    @property
+    def prepares(self) -> bool:
+        return self.method.prepares
+
+    def prepare(self, frame: Neighbourhood[Sampled]) -> Any:
+        return self.method.prepare(frame.own, list(frame.neighbours.values()))
+
+    def complete(
+        self, frame: Neighbourhood[Sampled], prepared: Any
+    ) -> tuple[Sampled, Sampled]:
+        """The frame with more samples, or sampled again, where it lacks them.
+
+        It lends the samples that it has got as well, but what was accumulated on it is
+        its own.
+        """
+        own, others = frame.own, list(frame.neighbours.values())
+        if self.method.lacks(own, others):
+            again = replace(self.sample_again(frame.number), strength=own.strength)
+            return again, again
+        more = partial(self.more, frame.number)
+        whole = self.method.complete(own, others, more, prepared)
+        lent = own if whole.views is own.views else replace(whole, gathered={})
+        return whole, lent
+
+    def sample_again(self, number: int) -> Sampled:
+        """Sample a frame, with all that others may show as well."""
+        raise NotImplementedError
+
+    def more(
+        self, number: int, part: Part
+    ) -> tuple[dict[str, Passes], dict[str, float]]:
+        """Render more samples of a frame, as `More` does."""
+        raise NotImplementedError

@@ -13,7 +13,7 @@ from typing import Any
 
 from xrds_core.accumulation.camera import Camera
 from xrds_core.errors import SceneError
-from xrds_core.frame_source import FrameSource, Neighbourhood, finish_frames
+from xrds_core.frame_source import Neighbourhood, finish_frames
 from xrds_core.progress import ShotClock
 from xrds_core.shot import Shot, place_of
 
@@ -25,7 +25,7 @@ from ..scene.contents import cuts
 from ..scene.strength import is_keyed, neighbours_count, strength_of
 from . import stages
 from .blender_job import call_engine
-from .methods import Method, completed
+from .methods import Method, MethodFrames
 from .pace.more import Part, render_more
 from .picture import Picture, joined
 from .render import method_of
@@ -70,7 +70,7 @@ def render_shot(
 
 
 @dataclass(frozen=True)
-class _SceneFrames(FrameSource[Sampled]):
+class _SceneFrames(MethodFrames):
     """Frames of an open scene, each a Blender job; `numbers` are those to render."""
 
     scene: Any
@@ -102,25 +102,10 @@ class _SceneFrames(FrameSource[Sampled]):
     def is_done(self, frame: Neighbourhood[Sampled]) -> bool:
         return self.finished(frame.number)
 
-    @property
-    def prepares(self) -> bool:
-        return self.method.prepares
+    def sample_again(self, number: int) -> Sampled:
+        return _sample(self.scene, self.method, self.numbers, number)
 
-    def prepare(self, frame: Neighbourhood[Sampled]) -> Any:
-        return self.method.prepare(frame.own, list(frame.neighbours.values()))
-
-    def complete(
-        self, frame: Neighbourhood[Sampled], prepared: Any
-    ) -> tuple[Sampled, Sampled]:
-        number, others = frame.number, list(frame.neighbours.values())
-        if self.method.lacks(frame.own, others):
-            own = _sample(self.scene, self.method, self.numbers, number)
-            own = replace(own, strength=frame.own.strength)
-            return own, own
-        more = partial(self._more, number)
-        return completed(self.method, frame.own, others, more, prepared)
-
-    def _more(self, number: int, part: Part) -> Any:
+    def more(self, number: int, part: Part) -> Any:
         self.scene.frame_set(number)
 
         def work(engine: Any, depsgraph: Any) -> Any:

@@ -24,8 +24,7 @@ def add_device_report(benches: Any) -> argparse.ArgumentParser:
     add(
         "--minutes",
         type=arguments.factor,
-        default=10.0,
-        help="after which nothing more is begun; a second run goes on (default: 10)",
+        help="after which nothing more is begun; a second run goes on; 10",
     )
     command.set_defaults(work=_device_report)
     return command
@@ -61,13 +60,13 @@ def add_left_out(benches: Any) -> argparse.ArgumentParser:
 
 def _device_report(options: argparse.Namespace) -> dict[str, Any]:
     need_blender("bench")
-    from ..cards.report import SAMPLES, SIZES, bench_devices
+    from ..cards.report import MINUTES, SAMPLES, SIZES, bench_devices
 
     return bench_devices(
         options.out,
         sizes=(options.resolution,) if options.resolution else SIZES,
         samples=options.samples or SAMPLES,
-        minutes=options.minutes,
+        minutes=options.minutes or MINUTES,
         rounds=options.rounds,
         reference_samples=options.reference_samples,
     )

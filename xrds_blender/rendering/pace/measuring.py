@@ -75,13 +75,10 @@ def measure(
     for region in regions:
         place = None if region == whole_of(shape) else region
         pair = [more(Part(samples, 1.0, place, sequence=-i)) for i in (1, 2)]
-        cells.append([])
-        taken = []
-        for one in pair:
-            started = time.perf_counter()
-            cells[-1].append(_rendered(method, one[view]))
-            taken.append(time.perf_counter() - started)
-        seconds += min(taken)  # the first of a size makes the denoiser ready for it
+        made = [_rendered(method, one[view]) for one in pair]
+        cells.append([rendered for rendered, _ in made])
+        # the first of a size makes the denoiser ready for it
+        seconds += min(taken for _, taken in made)
         views = {name: mean_of([one[name] for one in pair]) for name in own.views}
         extra.append(Extra(region, views))
         both = views[view].counts
@@ -106,11 +103,13 @@ def measure(
     return Measured(errors, extra, seconds / measured_share(shape), asked)
 
 
-def _rendered(method: Finishing, samples: Passes) -> Rendered:
+def _rendered(method: Finishing, samples: Passes) -> tuple[Rendered, float]:
+    """Samples as rendered and denoised, and the seconds of denoising them."""
     radiance = samples.radiance
     assert radiance is not None
+    started = time.perf_counter()
     denoised = method.as_by_cycles(radiance, samples.albedo, samples.normal)
-    return Rendered(radiance, denoised)
+    return Rendered(radiance, denoised), time.perf_counter() - started
 
 
 def _joined(cells: Sequence[Rendered]) -> Rendered:
